@@ -275,6 +275,11 @@ class Settings(BaseSettings):
         return self
 
     @property
+    def recordings(self) -> Path:
+        """Indices of recordings, and their frames that groups use."""
+        return self.home / "recordings"
+
+    @property
     def uploads(self) -> Path:
         """Files uploaded over REST."""
         return self.home / "uploads"

@@ -53,6 +53,7 @@ KINDS = (
     "practice",
     "paint",
     "proposals",
+    "recordings",
 )
 """What workers are used for, as the metrics call it."""
 

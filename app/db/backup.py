@@ -38,7 +38,7 @@ from app.finite import json_text
 
 FORMAT, FORMAT_VERSION = "touchline-backup", 1
 DATABASE, MANIFEST = "touchline.db", "manifest.json"
-FRAMES = ("uploads", "sample", "practice")
+FRAMES = ("uploads", "recordings", "sample", "practice")
 """Folders of a home that hold frames, and the files that were imported from."""
 EXPORTS = ("exports",)
 _CHUNK = 1 << 20

@@ -23,7 +23,7 @@ NETWORK_FILE_SYSTEMS = frozenset(
     {"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "9p", "glusterfs"}
 )
 """Where file locks and shared memory do not hold, SQLite's WAL loses data."""
-FOLDERS = ("uploads", "exports", "cache", "sample", "practice", "backups")
+FOLDERS = ("uploads", "recordings", "exports", "cache", "sample", "practice", "backups")
 """What we make in a home beside the database and its side files."""
 ASIDE, RESTORING = "before-restore-", f".restore{PARTIAL}"
 """Folders of a restore: how those with what was there before begin, and where it works."""

@@ -28,7 +28,13 @@ def clear(path: Path) -> None:
 
 DAY = 86_400.0
 """Seconds."""
-_HALF_WRITTEN = (f".*{PARTIAL}", f"*/.*{PARTIAL}", f"uploads/*{PART}", f"uploads/*/.*{PARTIAL}")
+_HALF_WRITTEN = (
+    f".*{PARTIAL}",
+    f"*/.*{PARTIAL}",
+    f"uploads/*{PART}",
+    f"uploads/*/.*{PARTIAL}",
+    f"recordings/*/.*{PARTIAL}",
+)
 """Names that we give to what is not complete yet, in the places where we do; anywhere else a file
 of such a name is somebody's."""
 

@@ -53,6 +53,7 @@ KNOWN_REVISIONS = (
     "0033",
     "0034",
     "0035",
+    "0036",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

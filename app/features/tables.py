@@ -23,6 +23,7 @@ from app.features.people import tables as people  # noqa: F401
 from app.features.pitches import tables as pitches  # noqa: F401
 from app.features.predictions import tables as predictions  # noqa: F401
 from app.features.queue import tables as queue  # noqa: F401
+from app.features.recordings import tables as recordings  # noqa: F401
 from app.features.saved_views import tables as saved_views  # noqa: F401
 from app.features.solutions import tables as solutions  # noqa: F401
 from app.features.verdicts import tables as verdicts  # noqa: F401

@@ -19,6 +19,9 @@ ImportFormat = Literal[
 ]
 """YOLO labels hold no cameras, lines or groups: they are predictions."""
 
+CommandFormat = Literal[ImportFormat, "video"]
+"""What the command ``import`` takes: recordings have requests of their own."""
+
 ExportFormat = Literal[
     "soccernet-v3d",
     "soccernet-v3",

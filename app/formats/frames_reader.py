@@ -18,8 +18,8 @@ from app.soccer.group import Group, Station, View
 _HEADS = (16 * 1024, 1024 * 1024)
 """Bytes of a picture in which its size is looked for."""
 IS_VIDEO = (
-    "is a video, and recordings are not read yet: export stills from it as PNG or JPEG, and import "
-    "those as frames"
+    "is a video: bring it in as a recording (import video, or the page Recordings), and take frames "
+    "from it"
 )
 
 BY_FOLDER = "folder"

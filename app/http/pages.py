@@ -138,6 +138,8 @@ PAGES = (
     "/help",
     "/help/{tab}",
     "/import",
+    "/recordings",
+    "/recordings/{recording}",
     "/jobs",
     "/work",
     "/account",

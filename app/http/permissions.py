@@ -128,6 +128,7 @@ WHOLE = frozenset(
         OwnedKind.PREDICTIONS,
         OwnedKind.EVALUATION,
         OwnedKind.BATCH,
+        OwnedKind.RECORDING,
     }
 )
 """Kinds that tell of all groups of a dataset at once."""

@@ -28,6 +28,8 @@ from app.features.policies.noise import NoiseStore
 from app.features.practice.service import resume_practice
 from app.features.predictions.jobs import resume_evaluations
 from app.features.predictions.reader import PredictionReader
+from app.features.recordings.frames import RecordingFrames
+from app.features.recordings.jobs import resume_recordings
 from app.features.solve.jobs import resume_solving, solve_leftovers
 from app.features.upkeep.service import Upkeep
 from app.features.versions.jobs import resume_versions
@@ -72,6 +74,7 @@ class Services:
     settings: Settings
     store: Store
     frames: Frames
+    recordings: RecordingFrames
     large: LargeEdits
     previews: Previews
     predictions: PredictionReader
@@ -101,6 +104,7 @@ class Services:
             settings,
             store,
             frames,
+            RecordingFrames(settings),
             large,
             Previews(settings, store, PaintFollower(frames), large),
             PredictionReader(settings),
@@ -125,6 +129,7 @@ class Services:
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
+        resume_recordings(self.jobs, self.store)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
         self.jobs.on_lead(self._lead)
@@ -179,5 +184,6 @@ class Services:
         self.previews.close()
         self.large.close()
         self.frames.close()
+        self.recordings.close()
         self.predictions.close()
         self.store.close()

@@ -33,6 +33,10 @@ PicturesWritten = Literal[PicturesSent, "link"]
 """What an export into a folder of this machine does with frames."""
 TrainingViews = Literal["valid", "all"]
 """Which views training data are made from: those in which the 3D ball holds, or all."""
+ShotKind = Literal["main", "replay", "closeup", "other"]
+"""What a shot of a recording shows."""
+ShotStart = Literal["start", "cut", "dissolve", "wipe", "fade"]
+"""How a shot begins."""
 GoldStart = Literal["imported", "without_balls", "bare"]
 """What annotators of a gold group begin with."""
 BatchState = Literal["open", "closed"]

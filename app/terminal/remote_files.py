@@ -53,14 +53,18 @@ def import_values(
             "a policy in a file cannot be sent with an import",
             hint=f"Name one of {', '.join(POLICIES)}, and change its thresholds in the browser.",
         )
-    more: dict[str, Any] = {} if lines is None else {"lines": {"upload": _send(client, lines)}}
+    more: dict[str, Any] = {} if lines is None else {"lines": {"upload": send_file(client, lines)}}
     if frames is not None:
         stored = is_address(frames)
-        more["frames"] = {"folder": frames} if stored else {"upload": _send(client, Path(frames))}
+        more["frames"] = (
+            {"folder": frames} if stored else {"upload": send_file(client, Path(frames))}
+        )
     body = {
         "dataset": dataset,
         "format": format_,
-        "source": {"folder": path} if isinstance(path, str) else {"upload": _send(client, path)},
+        "source": {"folder": path}
+        if isinstance(path, str)
+        else {"upload": send_file(client, path)},
         "options": {**options, **more},
         "policy": policy,
         "dry_run": dry_run,
@@ -169,7 +173,7 @@ def _set(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any
     files = {"upload": path, "images_upload": source.images, "cameras_upload": source.cameras}
     sizes = {"size": source.size, "cameras_size": source.cameras_size}
     body: dict[str, Any] = {
-        **{field: _send(client, file) for field, file in files.items() if file is not None},
+        **{field: send_file(client, file) for field, file in files.items() if file is not None},
         **{name: [size.width, size.height] for name, size in sizes.items() if size is not None},
         "format": source.format,
         "category": source.category,
@@ -177,7 +181,7 @@ def _set(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any
     return dict(client.post(place, body))
 
 
-def _send(client: Client, path: Path) -> str:
+def send_file(client: Client, path: Path) -> str:
     """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
     from app.features.imports.upload_queries import upload_id
     from touchline.errors import NotFoundError as NotThere

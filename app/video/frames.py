@@ -81,6 +81,10 @@ class RecordingReader:
         self._keep(number, image)
         return image
 
+    def has(self, number: int) -> bool:
+        """Whether a frame is among those that are kept."""
+        return number in self._kept
+
     def prefetch(self, number: int, count: int) -> None:
         """Decode the frames that follow one, as far as there are any, so that they can be read at once."""
         for following in range(number + 1, min(number + 1 + count, len(self._index))):

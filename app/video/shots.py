@@ -185,6 +185,22 @@ def shots_of_recording(
     def progress(done: int, total: int | None = None, sentence: str = "") -> None:
         tell((done, total, sentence))
 
+    return shots_of_indexed(path, index, progress)
+
+
+def shots_of_indexed(
+    path: Path, index: RecordingIndex, progress: TellProgress | None = None
+) -> RecordingShots:
+    """Find the shots of a recording that is indexed, in this process.
+
+    Args:
+        path: The file.
+        index: Its index.
+        progress: Called with how many shots were looked at.
+
+    Raises:
+        ImageError: The file is no video that can be read any more, or another one by now.
+    """
     with closing(RecordingReader(path, index, kept_bytes=0)) as reader:
 
         def look(numbers: Sequence[int]) -> list[LookedAt]:

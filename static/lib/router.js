@@ -14,11 +14,11 @@ function here() {
 export const place = signal(here());
 
 /** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation' | 'agreement'} DatasetPage */
-/** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'work' | 'exports' | 'account' | 'people' | 'audit' | 'join' | 'login' | 'unknown'} PlainPage */
-/** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration' | 'history', group: number} | {page: 'compare', group: number, other: number} | {page: 'adjudicate', group: number} | {page: DatasetPage, dataset: string}} Page */
+/** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'work' | 'exports' | 'recordings' | 'account' | 'people' | 'audit' | 'join' | 'login' | 'unknown'} PlainPage */
+/** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration' | 'history', group: number} | {page: 'compare', group: number, other: number} | {page: 'adjudicate', group: number} | {page: 'recording', recording: number} | {page: DatasetPage, dataset: string}} Page */
 
 const PLAIN = /** @type {{[path: string]: PlainPage}} */ ({
-	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/work': 'work', '/exports': 'exports',
+	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/work': 'work', '/exports': 'exports', '/recordings': 'recordings',
 	'/account': 'account', '/people': 'people', '/audit': 'audit', '/join': 'join', '/login': 'login',
 });
 /** A dataset without a page is its yield, which says most about it. */
@@ -36,6 +36,8 @@ export const page = computed(/** @returns {Page} */ () => {
 	if (compared) return { page: 'compare', group: Number(compared[1]), other: Number(compared[2]) };
 	const disputed = /^\/adjudicate\/(\d+)\/?$/.exec(path);
 	if (disputed) return { page: 'adjudicate', group: Number(disputed[1]) };
+	const film = /^\/recordings\/(\d+)\/?$/.exec(path);
+	if (film) return { page: 'recording', recording: Number(film[1]) };
 	const past = /^\/review\/(\d+)\/history\/?$/.exec(path);
 	if (past) return { page: 'history', group: Number(past[1]) };
 	const help = /^\/help(?:\/(keys|legend|words|guide|practice))?\/?$/.exec(path);

@@ -26,6 +26,7 @@ const PLAIN_PAGES = [
 	{ name: 'work', label: 'My work', href: '/work' },
 	{ name: 'datasets', label: 'Datasets', href: '/datasets' },
 	{ name: 'import', label: 'Import', href: '/import' },
+	{ name: 'recordings', label: 'Recordings', href: '/recordings' },
 	{ name: 'jobs', label: 'Jobs', href: '/jobs' },
 	{ name: 'exports', label: 'Exports', href: '/exports' },
 	{ name: 'help', label: 'Help', href: '/help' },

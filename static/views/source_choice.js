@@ -21,7 +21,8 @@ export function sizeText(bytes) {
 	return `${(bytes / 1000 ** power).toFixed(power === 0 ? 0 : 1)} ${units[power]}`;
 }
 
-const STILLS = 'Recordings are not read yet. Export stills from it as PNG or JPEG, for example with ffmpeg (ffmpeg -i VIDEO -vf fps=1 still_%05d.png) or the snapshot of a video player, and drop those here: each becomes a group.';
+const ELSEWHERE = 'Add it on the page Recordings: its shots are found there, and frames that you choose become groups.';
+const ONE_VIDEO = 'Choose one video: a recording is one file.';
 
 /** One file to send: the only one as it is, several in a zip. @param {PathFile[]} files @param {AbortSignal} signal */
 async function toSend(files, signal) {
@@ -31,8 +32,8 @@ async function toSend(files, signal) {
 	return packFiles(files, `${folder}.zip`, signal);
 }
 
-/** Sends files at once, and says how far they are. @param {(sent: UploadJson | null) => void} onUploaded */
-function useUpload(onUploaded) {
+/** Sends files at once, and says how far they are. @param {(sent: UploadJson | null) => void} onUploaded @param {boolean} [videos] one video is wanted, and nothing else */
+function useUpload(onUploaded, videos = false) {
 	const [state, setState] = useState({ share: 0, name: '', error: '', done: false });
 	const sending = useRef(/** @type {AbortController | null} */ (null));
 	/** @param {PathFile[] | Promise<PathFile[]>} given */
@@ -45,9 +46,13 @@ function useUpload(onUploaded) {
 		try {
 			const files = await given;
 			if (files.length === 0) return;
-			if (areVideos(files)) {
+			if (videos && (files.length > 1 || !areVideos(files))) {
+				setState({ share: 0, name: '', error: ONE_VIDEO, done: false });
+				return;
+			}
+			if (!videos && areVideos(files)) {
 				const [{ path }] = files;
-				setState({ share: 0, name: '', error: `${files.length === 1 ? `${path} is a video.` : `${path} and ${plural(files.length - 1, 'other file')} are videos.`} ${STILLS}`, done: false });
+				setState({ share: 0, name: '', error: `${files.length === 1 ? `${path} is a video.` : `${path} and ${plural(files.length - 1, 'other file')} are videos.`} ${ELSEWHERE}`, done: false });
 				return;
 			}
 			const name = files.length === 1 ? files[0].path : plural(files.length, 'file');
@@ -134,17 +139,18 @@ function UploadRoom({ sent }) {
 	`;
 }
 
-/** Any number of files or a folder, chosen here or dropped. @param {{dropped: Promise<PathFile[]> | null, over: boolean, onUploaded: (sent: UploadJson | null) => void}} props */
-function DropField({ dropped, over, onUploaded }) {
-	const { state, send } = useUpload(onUploaded);
+/** Any number of files or a folder, chosen here or dropped. @param {{dropped: Promise<PathFile[]> | null, over: boolean, videos: boolean, onUploaded: (sent: UploadJson | null) => void}} props */
+function DropField({ dropped, over, videos, onUploaded }) {
+	const { state, send } = useUpload(onUploaded, videos);
 	useEffect(() => { if (dropped) send(dropped); }, [dropped]);
 	return html`
 		<div class="form__row import__drop" data-over=${over}>
 			<label for="import-file">File</label>
-			<input class="field" id="import-file" type="file" multiple onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
-			<label for="import-folder">or a whole folder</label>
-			<input class="field" id="import-folder" type="file" webkitdirectory onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
-			<small>Or drop files, pictures or a folder anywhere on this page.</small>
+			<input class="field" id="import-file" type="file" multiple=${!videos} accept=${videos ? 'video/*,.mkv,.ts,.mts,.m2ts' : undefined} onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
+			${videos ? html`<small>Or drop a video anywhere on this page.</small>` : html`
+				<label for="import-folder">or a whole folder</label>
+				<input class="field" id="import-folder" type="file" webkitdirectory onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
+				<small>Or drop files, pictures or a folder anywhere on this page.</small>`}
 			<${UploadState} state=${state} />
 			<${UploadRoom} sent=${state.done} />
 		</div>
@@ -192,8 +198,8 @@ function FolderList({ chosen, choose, guess }) {
 	`;
 }
 
-/** @param {{onSource: (source: ImportSource | null) => void, guess: (format: string) => void}} props `guess`: what the files most likely are */
-export function SourceChoice({ onSource, guess }) {
+/** @param {{onSource: (source: ImportSource | null) => void, guess: (format: string) => void, videos?: boolean}} props `guess`: what the files most likely are; `videos`: one video is wanted */
+export function SourceChoice({ onSource, guess, videos = false }) {
 	const [kind, setKind] = useState('upload');
 	const [folder, setFolder] = useState('');
 	const [dropped, setDropped] = useState(/** @type {Promise<PathFile[]> | null} */ (null));
@@ -207,11 +213,11 @@ export function SourceChoice({ onSource, guess }) {
 	return html`
 		<fieldset class="choice import__choice">
 			<legend>Source</legend>
-			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>Files on this computer<small>zip, JSON, CSV or pictures</small></span></label>
-			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A folder on the server<small>or in an object store; frames stay there</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>${videos ? 'A file' : 'Files'} on this computer<small>${videos ? 'a video, which is sent' : 'zip, JSON, CSV or pictures'}</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A ${videos ? 'file' : 'folder'} on the server<small>${videos ? 'it stays there' : 'or in an object store; frames stay there'}</small></span></label>
 		</fieldset>
 		${kind === 'upload'
-			? html`<${DropField} dropped=${dropped} over=${over} onUploaded=${(/** @type {UploadJson | null} */ sent) => {
+			? html`<${DropField} dropped=${dropped} over=${over} videos=${videos} onUploaded=${(/** @type {UploadJson | null} */ sent) => {
 				onSource(sent && { upload: sent.id });
 				if (sent?.format) guess(sent.format);
 			}} />`

@@ -41,6 +41,7 @@ from app.features.policies.service import read_policy
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
+from app.features.recordings.service import add_recording, get_shots, index_now
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station
 from app.features.versions.freeze import FreezeRequest, freeze
@@ -49,6 +50,7 @@ from app.features.webhooks.service import make_webhook, send_ping
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.main import create_app
+from tests.videos import write_video
 from tests.waiting import SECONDS
 
 EXAMPLES = 5
@@ -58,6 +60,7 @@ EXPORT, DELETED_EXPORT = "1", "2"
 """Exports are the first jobs of the home; what is deleted must not be asked for later."""
 DELETED_WEBHOOK = "2"
 DELETED_COMMENT = "2"
+DELETED_RECORDING = "2"
 HOOK = "http://127.0.0.1:9/hook"
 """Where webhooks may be sent, and nobody listens."""
 REFUSALS = ["2xx", "400", "404", "409", "412", "422", "428", "503"]
@@ -118,6 +121,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
         send_ping(store, "small", webhook.id, actor="local")
     for name in ("kept", "deleted"):
         make_batch(store, "small", NewBatch(name, skip_given=False), actor="local")
+    add_recordings(store)
     talk = begin_thread(store, 1, "Is this the ball?", actor="local")
     reply(store, 1, talk.id, "It is.", actor="local")
     yield app
@@ -136,6 +140,15 @@ def add_evaluations(store: Store) -> None:
         request = EvaluationRequest(predictions=found.id, groups="all")
         done = run_evaluation(store, "small", request, actor="local")
         assert (str(found.id), str(done.id)) == (name, name)
+
+
+def add_recordings(store: Store) -> None:
+    """One that is indexed, and one that is there to be deleted."""
+    film = write_video(store.settings.home / "film.mp4", "mp4v", 20)
+    for path in (film, film.with_name("gone.mp4")):
+        number = add_recording(store, "small", path, actor="local").id
+    assert str(number) == DELETED_RECORDING
+    index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
 
 
 @pytest.fixture(scope="module")
@@ -209,6 +222,7 @@ class Attack:
         self.aim_at_batches(case)
         self.aim_at_words(case)
         self.aim_at_evaluations(case)
+        self.aim_at_recordings(case)
         if "against" in (case.query or {}):
             case.query["against"] = 1
         if case.operation.path.endswith("/versions") and case.method == "POST":
@@ -302,10 +316,21 @@ class Attack:
             case.body = {**case.body, "upload": self.upload(), "cameras_upload": None}
             case.body |= {"images_upload": None, "format": "csv", "size": None, "category": None}
 
-    def upload(self) -> str:
-        """A file of predictions that fits."""
-        writer = UploadWriter(self.store.settings, "predictions.csv")
-        writer.write((self.store.settings.home / "predictions.csv").read_bytes())
+    def aim_at_recordings(self, case: schemathesis.Case) -> None:
+        """The recording that there is, and frames of it."""
+        if case.method == "DELETE" and "recording" in case.path_parameters:
+            case.path_parameters["recording"] = DELETED_RECORDING
+        if case.operation.path.endswith("/recordings") and case.method == "POST":
+            case.body = {"dataset": "small", "source": {"upload": self.upload("film.mp4")}}
+        if case.operation.path.endswith("/shots") and case.method == "PUT":
+            case.body = {"shots": [{"first": 0, "last": 5, "kind": "main"}]}
+        if case.operation.path.endswith("/{recording}/groups"):
+            case.body = {"frames": [1], "propose": False}
+
+    def upload(self, name: str = "predictions.csv") -> str:
+        """A file of predictions that fits, or another one of the home."""
+        writer = UploadWriter(self.store.settings, name)
+        writer.write((self.store.settings.home / name).read_bytes())
         return writer.finish().id
 
     def etag(self, case: schemathesis.Case) -> str:
@@ -316,6 +341,8 @@ class Attack:
             return read_policy(self.store, "small").etag
         if case.operation.path.endswith("/pitches"):
             return read_pitches(self.store, "small").etag
+        if "recording" in case.path_parameters:
+            return get_shots(self.store, 1).etag
         return load(self.store, 1).etag
 
 

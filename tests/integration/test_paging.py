@@ -26,6 +26,7 @@ from app.features.people.service import invite
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
+from app.features.recordings.service import Shot, add_recording, index_now, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.webhooks.messages import Kind
@@ -33,6 +34,7 @@ from app.features.webhooks.service import make_webhook, send_ping
 from app.http.server import listen, make_server
 from app.main import create_app
 from tests.scenes import make_scenes
+from tests.videos import write_video
 from tests.waiting import SECONDS
 
 HOOK = "http://127.0.0.1:9/hook"
@@ -40,7 +42,7 @@ SECRET = "three plain words"
 ITEMS = "items"
 ADDRESS = {
     "dataset": "small", "group": "1", "view": "1", "batch": "1", "evaluation": "1", "user": "1",
-    "webhook": "1",
+    "webhook": "1", "recording": "1",
 }  # fmt: skip
 """Values of the parameters in the addresses of lists."""
 PAGED_ALREADY = 3
@@ -50,7 +52,7 @@ FULL = (
     "listEvaluations", "listSavedViews", "listThreads", "listWebhooks", "listWebhookDeliveries",
     "listBatches", "listBatchGroups", "getMyWork", "getTeamWork", "listUsers", "listMembers",
     "listTokens", "listSessions", "listDatasets", "listUploads", "listVerdictBatches", "getAudit",
-    "getBell", "getHistory", "listPolicies", "listQueryFields", "listEvaluationFrames",
+    "getBell", "getHistory", "listRecordings", "listShots", "listPolicies", "listQueryFields", "listEvaluationFrames",
 )  # fmt: skip
 """Lists of which the home has several things, so that their second pages are looked at."""
 
@@ -88,6 +90,11 @@ def fill(store: Store, home: Path) -> None:
         send_ping(store, "small", 1, actor="local")
         batch = NewBatch(f"b{number}", annotators=["admin"], skip_given=False)
         make_batch(store, "small", batch, actor="local")
+        film = write_video(home / f"{number}.mp4", "mp4v", 20)
+        recording = add_recording(store, "small", film, actor="local")
+        index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+        shots = [Shot(first, first + 4, "main", "cut") for first in range(0, 20, 5)]
+        put_shots(store, recording.id, shots, None, actor="local")
         begin_thread(store, 1, f"Is this the ball, @admin? {number}", actor="lead")
 
 

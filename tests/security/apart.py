@@ -26,6 +26,7 @@ from app.features.people.members import give_role
 from app.features.people.ownership import OwnedKind
 from app.features.people.roles import Role
 from app.features.people.service import invite
+from app.features.recordings.queries import insert_recording
 from app.features.solutions.service import solve_dataset
 from app.main import create_app
 from tests.scenes import make_scenes
@@ -52,6 +53,9 @@ BODIES: Mapping[str, dict[str, Any]] = {
     "POST /api/v1/groups/{group}/threads": {"text": "one"},
     "POST /api/v1/exports": {"format": "soccernet-v3d", "all": True},
     "POST /api/v1/imports": {"format": "soccernet-v3", "source": {}, "dry_run": True},
+    "POST /api/v1/recordings": {"source": {}},
+    "PUT /api/v1/recordings/{recording}/shots": {"shots": []},
+    "POST /api/v1/recordings/{recording}/groups": {"frames": [0]},
     "POST /api/v1/predictions/accept": {"q": "", "dry_run": True},
     "POST /api/v1/datasets/{dataset}/predictions": {"name": "p2", "format": "csv"},
     "POST /api/v1/datasets/{dataset}/evaluations": {"groups": "all"},
@@ -209,6 +213,13 @@ class Apart:
             # Ids of different kinds shall not be the same by accident.
             for spare in ("one", "two"):
                 self.ask(owner, "POST", f"{at}/saved-views", {**body, "name": spare})
+        with self.store.write() as session:
+            for spare in range(6 if name == MINE else 1):
+                number = int(self.ids[name][OwnedKind.GROUP])
+                film = f"/{name}/{spare}.mp4"
+                found[OwnedKind.RECORDING] = insert_recording(
+                    session, number, f"film {spare}", film, actor=owner
+                )
         found[OwnedKind.SAVED_VIEW] = self.ask(owner, "POST", f"{at}/saved-views", body).json()[
             "id"
         ]

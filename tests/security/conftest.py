@@ -34,6 +34,7 @@ from tests.security.asking import JSON, Asker
 from tests.security.door import Door
 from tests.security.table import CORPUS
 from tests.security.team import Team
+from tests.videos import write_video
 from tests.waiting import SECONDS
 
 API = "/api/v1"
@@ -151,6 +152,13 @@ def _fill(guarded: Guarded, frame: str) -> None:
     }
     ids |= {"figure": "sensitivity", "table": "sensitivity", "upload": upload, "tab": "keys"}
     ids |= {"predictions": str(predictions), "export": str(export["result"]["export"])}
+    film = write_video(guarded.home / "film.mp4", "mp4v", 20)
+    recorded = {
+        "dataset": "small",
+        "source": {"upload": guarded.upload(film.name, film.read_bytes())},
+    }
+    indexed = json_("POST", "/recordings", recorded)
+    ids |= {"recording": str(indexed["result"]["recording"]), "frame": "3"}
     ids |= {"batch": str(batch["batch"]), "saved": str(view["id"]), "path": "nothing"}
 
 

@@ -395,6 +395,7 @@ class TestFilesOfOthers:
         assert {str(row) for row in rows("images")} == {
             f"POST {API}/imports",
             f"GET {API}/views/{{view}}/image",
+            f"GET {API}/recordings/{{recording}}/frames/{{frame}}",
             f"GET {API}/datasets/{{dataset}}/guidelines/pictures/{{digest}}",
             f"POST {API}/views/{{view}}/paint",
             f"POST {API}/views/{{view}}/propose",
@@ -416,6 +417,13 @@ class TestFilesOfOthers:
             kept = f"{API}/datasets/{group['dataset']['id']}/guidelines/pictures"
             answer = guarded.ask("POST", kept, JSON, json.dumps({"upload": upload}).encode())
             assert answer.status in (413, 415, 422), (name, answer.body)
+        source = {"upload": guarded.upload("page.mp4", (CORPUS / "page.svg").read_bytes())}
+        body = json.dumps({"dataset": "spoiled", "source": source}).encode()
+        job = json.loads(guarded.ask("POST", f"{API}/recordings", JSON, body).body)["id"]
+        assert guarded.ended(job)["state"] == "failed"
+        found = json.loads(guarded.ask("GET", f"{API}/recordings?dataset=spoiled").body)["items"]
+        answer = guarded.ask("GET", f"{API}/recordings/{found[0]['id']}/frames/0")
+        assert (answer.status, b"<s" in answer.body) == (409, False)
 
     def test_no_cell_of_a_table_is_a_formula(self, guarded: Guarded) -> None:
         cells = 0

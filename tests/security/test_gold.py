@@ -314,7 +314,7 @@ class TestGold:
         for copy in (cheat.copies[cheat.gold.index(True)], cheat.copies[cheat.gold.index(False)]):
             document = ask(person, "GET", f"/groups/{copy}").json()
             etag = {"If-Match": document["etag"]}
-            view, batch = document["views"][0]["id"], before[0].batch_id
+            view, batch = document["views"][0]["id"], before[0]["batch_id"]
             dataset, state = document["dataset"]["id"], {"state": "unreviewed"}
             tried = [
                 ("PATCH", f"/views/{view}/ball", {"box": [*BALL[:3], 30.0]}),

@@ -16,6 +16,7 @@ from app.db.session import Session
 from app.features.datasets.tables import ViewModel
 from app.features.imports.upload_queries import list_uploads
 from app.features.queue.tables import QueueModel
+from app.features.recordings.tables import RecordingModel
 from app.features.solutions.tables import CalibrationModel, SolutionModel
 from app.object_store.address import is_address
 
@@ -53,15 +54,34 @@ def _has_unsolved(session: Session) -> bool:
 
 
 def unread_uploads(session: Session, settings: Settings) -> list[str]:
-    """Ids of uploads that are kept for their frames, though no view has its frame there."""
-    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
-    paths = [Path(path) for path in session.scalars(statement) if path and not is_address(path)]
-    folders = {parent for path in paths for parent in path.parents}
+    """Ids of uploads that are kept for their frames, though no view has its frame there and none is a
+    recording."""
+    folders = {folder for path in _paths(session) for folder in path.parents}
     return [
         upload.id
         for upload in list_uploads(settings)
-        if upload.kept and settings.uploads / upload.id not in folders
+        if upload.kept and settings.uploads.absolute() / upload.id not in folders
     ]
+
+
+def unused_frames(session: Session, settings: Settings) -> list[str]:
+    """Folders and files of the home's recordings that no view and no recording uses."""
+    used = {path.parent.name for path in _paths(session)}
+    used |= {sha256 for sha256 in session.scalars(select(RecordingModel.sha256)) if sha256}
+    if not settings.recordings.is_dir():
+        return []
+    return sorted(
+        path.name
+        for path in settings.recordings.iterdir()
+        if path.name.partition(".")[0] not in {*used, ""}
+    )
+
+
+def _paths(session: Session) -> list[Path]:
+    """Where frames of views and recordings lie on this disk."""
+    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
+    found = [*session.scalars(statement), *session.scalars(select(RecordingModel.path))]
+    return [Path(path) for path in found if path and not is_address(path)]
 
 
 def expire_cache(settings: Settings) -> int:

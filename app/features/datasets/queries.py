@@ -36,6 +36,7 @@ from app.features.groups.codecs import policy_from_json, policy_to_json
 from app.features.jobs.tables import JobModel
 from app.features.people.visibility_queries import COPIES
 from app.features.predictions.tables import EvaluationModel, PredictionSetModel
+from app.features.recordings.tables import RecordingModel
 from app.features.saved_views.tables import SavedViewModel
 from app.features.solutions.tables import SolutionModel
 from app.features.tables import Base
@@ -151,6 +152,7 @@ _DATASET_OF: Mapping[str, Select[Any]] = {
     "predictions": select(PredictionSetModel.dataset_id).where(PredictionSetModel.id == _ID),
     "evaluation": select(EvaluationModel.dataset_id).where(EvaluationModel.id == _ID),
     "saved view": select(SavedViewModel.dataset_id).where(SavedViewModel.id == _ID),
+    "recording": select(RecordingModel.dataset_id).where(RecordingModel.id == _ID),
     "work": select(BatchModel.dataset_id).where(BatchModel.id == _ID),
     "batch": select(VerdictBatchModel.dataset_id).where(VerdictBatchModel.id == _ID),
 }
@@ -189,6 +191,7 @@ _COUNTED = {
     "views": "view",
     "verdicts": "verdict",
     "saved_views": "saved_view",
+    "recordings": "recording",
     "versions": "version",
     "predictions": "prediction_set",
     "evaluations": "evaluation",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.policies.commands import read_policy_option
-from app.formats.format_names import ExportFormat, ImportFormat
+from app.formats.format_names import CommandFormat, ExportFormat
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath, find_path, target_path
 from app.soccer.choices import BoxKind, CalibrationChoice, PicturesWritten, TrainingViews
@@ -37,11 +37,13 @@ commands = typer.Typer()
 
 @commands.command("import")
 def import_(
-    format_: Annotated[ImportFormat, typer.Argument(metavar="FORMAT")],
-    path: Annotated[
-        str,
+    format_: Annotated[CommandFormat, typer.Argument(metavar="FORMAT")],
+    paths: Annotated[
+        list[str],
         typer.Argument(
-            parser=parse_place, metavar="PATH", help="A folder, a file or s3://NAME/..."
+            parser=parse_place,
+            metavar="PATH...",
+            help="A folder, a file or s3://NAME/...; of video one file or more.",
         ),
     ],
     dataset: Dataset,
@@ -109,8 +111,22 @@ def import_(
     """Read files into a dataset; doing it again changes nothing.
 
     FORMAT is soccernet-v3, soccernet-v3d, issia, issia-3d, sn-calibration, cameras, gamestate,
-    coco, parquet, frames (pictures alone) or touchline; docs/formats.md says what each of them holds.
+    coco, parquet, frames (pictures alone), video (recordings) or touchline; docs/formats.md says what
+    each of them holds.
     """
+    if format_ == "video":
+        from app.features.recordings.commands import import_videos
+
+        if dry_run:
+            raise typer.BadParameter("a recording is indexed, or not; leave --dry-run out")
+        usual = lines, calibration, size, policy, frames, ball_category or None, group_by or None
+        if any(value is not None for value in usual) or frame_offset != "8" or flip or not propose:
+            raise typer.BadParameter("video takes --dataset and --json alone")
+        import_videos([Path(path) for path in paths], dataset, json_)
+        return
+    if len(paths) > 1:
+        raise typer.BadParameter(f"{format_} is read from one place: name one PATH")
+    path = paths[0]
     server = given_server()
     if server is not None:
         from app.terminal import remote_files

@@ -100,9 +100,9 @@ class BallTally:
         return f"no ball was read from {groups}{boxes}"
 
 
-STILLS_HINT = (
-    "Export stills from it as PNG or JPEG, for example with ffmpeg (ffmpeg -i VIDEO -vf fps=1 "
-    "still_%05d.png) or a video player's snapshot, and import those as frames."
+RECORDING_HINT = (
+    "Bring it in with `touchline import video FILE --dataset NAME`, or on the page Recordings: its "
+    "shots are found, and frames that you choose become groups."
 )
 FRAMES_HINT = (
     "Import them as frames: each picture becomes a group of one view, to be annotated here."
@@ -231,7 +231,7 @@ class Imported:
         if self.something:
             return None
         if holds_videos_alone(self.source.path):
-            return "holds a video, and recordings are not read yet", STILLS_HINT
+            return "holds a video, which is a recording", RECORDING_HINT
         if self.source.format != "frames" and guess_format(self.source.path) == "frames":
             return "holds pictures and no annotations", FRAMES_HINT
         return None

@@ -23,7 +23,7 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.features.comments.check import examine_threads
-from app.features.datasets.orphan_queries import spare_calibrations, unread_uploads
+from app.features.datasets.orphan_queries import spare_calibrations, unread_uploads, unused_frames
 from app.features.integrity.database import examine
 from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import linked_admins, read_rules
@@ -107,6 +107,7 @@ def examine_surroundings(store: Store) -> list[Check]:
             _leftovers(settings),
             _calibrations(session),
             _uploads(session, settings),
+            _recordings(session, settings),
         ]
 
 
@@ -249,6 +250,13 @@ def _uploads(session: Session, settings: Settings) -> Check:
     sentence = f"{len(found):,} kept for frames that no dataset reads"
     mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
     return Check("uploads", True, sentence, mend)
+
+
+def _recordings(session: Session, settings: Settings) -> Check:
+    found = unused_frames(session, settings)
+    sentence = f"{len(found):,} indices and folders of frames that nothing uses"
+    mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None
+    return Check("recordings", True, sentence, mend)
 
 
 def examine_everything(settings: Settings) -> list[Check]:

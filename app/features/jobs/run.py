@@ -135,6 +135,16 @@ def _pictures(result: Json) -> str:
     return f"{matches} estimated, {proposed:,} with a proposal."
 
 
+def _indexed(result: Json) -> str:
+    shots, frames = plural(result["shots"], "shot"), plural(result["frames"], "frame")
+    return f"{result['name']} has {frames} in {shots}."
+
+
+def _taken(result: Json) -> str:
+    there = f"; {result['unchanged']:,} were there before" if result["unchanged"] else ""
+    return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
+
+
 _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "solve": _solved,
     "import": _imported,
@@ -149,6 +159,8 @@ _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "paint": _painted,
     "proposals": _proposed,
     "pictures": _pictures,
+    "recording": _indexed,
+    "instants": _taken,
 }
 """By the kind of the job."""
 

@@ -25,6 +25,8 @@ JobKind = Literal[
     "paint",
     "proposals",
     "pictures",
+    "recording",
+    "instants",
 ]
 
 

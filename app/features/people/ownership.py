@@ -43,6 +43,7 @@ class OwnedKind(StrEnum):
     """Verdicts that were given at once."""
     WORK = "work"
     """Groups that were given out."""
+    RECORDING = "recording"
     UPLOAD = "upload"
     FOLDER = "folder"
     """One of the operator, which lies beside all datasets."""

@@ -76,7 +76,7 @@ class TestReadFrames:
         assert len(read(shots, report)) == 2
         told = {Path(problem.path).name: problem.problem for problem in report.problems}
         assert sorted(told) == ["c.jpg", "iphone.heic", "match.mp4", "notes.txt", "wide.png"]
-        assert told["match.mp4"].startswith("is a video, and recordings are not read yet: export")
+        assert told["match.mp4"].startswith("is a video: bring it in as a recording")
         assert told["notes.txt"] == "is no JPEG, PNG or WebP picture"
         assert told["c.jpg"] == "is damaged in its header"
         assert told["wide.png"].startswith("declares 600 x 10 pixels")

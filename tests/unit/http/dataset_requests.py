@@ -37,6 +37,7 @@ from tests.unit.http.group_requests import (
     services_of,
     store_of,
 )
+from tests.videos import write_video
 
 BROADCAST = "/datasets/broadcast"
 
@@ -75,6 +76,33 @@ def using(api: Any, **values: Any) -> None:
     """Let the policy of the dataset be another one, and wait until all is solved under it."""
     path = f"{BROADCAST}/policy"
     ended(api, ("PUT", path, values, etag_of(api, path)))
+
+
+def recording(api: Any) -> str:
+    """The address of a recording that is indexed."""
+    folder = store_of(api).settings.home
+    film = write_video(folder / "film.mp4", "mp4v", 20)
+    upload = uploaded(api, film.name, film.read_bytes())
+    body = {"dataset": "broadcast", "source": {"upload": upload}}
+    return f"/recordings/{ended(api, ('POST', '/recordings', body, {})).result['recording']}"
+
+
+def no_recording(api: Any) -> Request:
+    return "DELETE", recording(api), None, {}
+
+
+def found_shots(api: Any) -> Request:
+    return "POST", f"{recording(api)}/shots", None, {}
+
+
+def shots(api: Any) -> Request:
+    path = f"{recording(api)}/shots"
+    body = {"shots": [{"first": 0, "last": 9, "kind": "replay"}]}
+    return "PUT", path, body, etag_of(api, path)
+
+
+def instants(api: Any) -> Request:
+    return "POST", f"{recording(api)}/groups", {"frames": [3], "propose": False}, {}
 
 
 def saved_view(_api: Any) -> Request:

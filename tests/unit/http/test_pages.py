@@ -18,7 +18,8 @@ from app.http.site import Site, script_hashes
 class TestPages:
     @pytest.mark.parametrize("path", PAGES)
     def test_every_page_is_the_same_document(self, pages_client, static_folder, path: str) -> None:
-        answer = pages_client.get(path.format(group=12, other=30, dataset="sample", tab="legend"))
+        named = {"group": 12, "other": 30, "dataset": "sample", "tab": "legend", "recording": 1}
+        answer = pages_client.get(path.format(**named))
         assert answer.status_code == 200
         assert answer.headers["content-type"] == "text/html; charset=utf-8"
         written = re.sub(rb"/assets/\w+/", b"/static/", answer.content)

@@ -49,11 +49,13 @@ KEPT: dict[str, Made] = {
     "deleteEvaluation": dataset_requests.no_evaluation,
     "deleteExport": dataset_requests.no_export,
     "deletePredictions": dataset_requests.no_predictions,
+    "deleteRecording": dataset_requests.no_recording,
     "deleteSavedView": dataset_requests.no_saved_view,
     "dismissFinding": group_requests.dismissal,
     "editViews": group_requests.bulk_edits,
     "estimateMatchPictures": dataset_requests.estimate,
     "estimatePitches": dataset_requests.pitch_estimates,
+    "findShots": dataset_requests.found_shots,
     "forgetDatasetProposals": dataset_requests.no_proposals,
     "freezeVersion": dataset_requests.freeze,
     "handBackAdjudicated": group_requests.adjudication_back,
@@ -76,6 +78,7 @@ KEPT: dict[str, Made] = {
     "setMatchPicture": dataset_requests.match_picture,
     "setPitch": dataset_requests.pitch,
     "setPolicy": dataset_requests.policy,
+    "setShots": dataset_requests.shots,
     "setStationLines": group_requests.station_lines,
     "setVerdict": group_requests.verdict,
     "setVerdicts": dataset_requests.bulk,
@@ -87,6 +90,7 @@ KEPT: dict[str, Made] = {
     "startImport": dataset_requests.data_import,
     "startPractice": dataset_requests.practice,
     "takeDatasetPaintBack": dataset_requests.no_paint,
+    "takeInstants": dataset_requests.instants,
     "takeHandInBack": group_requests.hand_in_taken_back,
     "takeNoiseBack": dataset_requests.no_noise,
     "takePositionsBack": dataset_requests.no_positions,
@@ -101,6 +105,7 @@ KEPT: dict[str, Made] = {
 """Operations whose answer is in the transaction of their work; where one has several ways, a word
 behind its name tells them apart."""
 HARMLESS = {
+    "addRecording": "The same file again is the same recording, and is indexed once more.",
     "changeTeam": "The same setting once more changes nothing, and has the same answer.",
     "clearMaintenance": "A notice that is taken away is away.",
     "deleteUpload": "It is written down before what goes: the rest is done, and the answer the same.",

@@ -203,8 +203,8 @@ class TestImportSource:
         [
             (
                 "match.mp4",
-                "holds a video, and recordings are not read yet",
-                "Export stills from it",
+                "holds a video, which is a recording",
+                "import video",
             ),
             ("still.jpg", "holds pictures and no annotations", "Import them as frames"),
         ],

@@ -1,0 +1,49 @@
+"""Recordings on the command line: ``import video``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from app.terminal.opened import opened_store
+from app.terminal.options import acting
+from app.terminal.remote import follow, some
+from app.terminal.remote_files import send_file
+from app.terminal.server import connected, given_server
+from app.terminal.terminal import print_json, print_values, show_progress
+
+TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "shots", "sha256")
+
+
+def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:
+    """Bring recordings into a dataset, index them and find their shots; print what they are."""
+    server = given_server()
+    if server is None:
+        found = _import_here(paths, dataset)
+    else:
+        found = []
+        with connected(server) as client, show_progress("Indexing") as progress:
+            for path in paths:
+                body = {"dataset": dataset, "source": {"upload": send_file(client, path)}}
+                job = follow(client, client.post("recordings", body), progress)
+                found.append(client.get(f"recordings/{job['result']['recording']}"))
+    rows = [some(one, *TOLD) for one in found]
+    if as_json:
+        print_json(rows)
+        return
+    for row in rows:
+        print_values(row, False)
+
+
+def _import_here(paths: Sequence[Path], dataset: str) -> list[dict[str, Any]]:
+    from app.features.recordings.service import add_recording, index_now, require_video
+
+    files = [require_video(path.resolve()) for path in paths]
+    found = []
+    with opened_store() as store, show_progress("Indexing") as progress:
+        for file in files:
+            recording = add_recording(store, dataset, file, actor=acting())
+            indexed = index_now(store, recording.id, progress=progress, stop=lambda: None)
+            found.append(vars(indexed))
+    return found

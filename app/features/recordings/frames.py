@@ -1,0 +1,159 @@
+"""Frames of recordings, decoded in a worker process that stays warm between them."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from app.canonical import digest_of
+from app.config import Settings
+from app.durable import replace_file
+from app.errors import ConflictError, ImageError, OverloadedError, ReviewError
+from app.features.recordings.service import Recording, read_index
+from app.media.files import JPEG_QUALITY
+from app.media.frames import refused_picture
+from app.video.frames import Image, RecordingReader
+from app.worker_pool import PoolTask, WorkerPool
+from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
+
+LIMITS = WorkerLimits(memory=1536 * 2**20, processor=120.0, silence=120.0)
+"""For one frame; where key frames are far apart, many are decoded on the way to it."""
+WAITING = 64
+"""Frames that may wait; one more is told to come back."""
+BEHIND, AHEAD = 10, 4
+"""Frames that are decoded with one that is jumped to, so that steps back find them, and frames that
+are decoded before somebody asks, while one steps or plays."""
+THUMBNAIL = 320
+"""Pixels of width up to which pictures are kept in the cache: a strip shows hundreds at once."""
+MOST_OPEN = 2
+"""Recordings that the process keeps open."""
+KEPT_BYTES = 192 * 2**20
+"""Of the decoded frames of each: 32 of 1080p."""
+
+
+class RecordingFrames:
+    """Gives frames of recordings as JPEG."""
+
+    def __init__(self, settings: Settings):
+        self._settings = settings
+        self._pool = WorkerPool(LIMITS, 1, WAITING, "frames", COUNTS["recordings"])
+
+    def ask(self, recording: Recording, number: int, width: int | None) -> PoolTask:
+        """Have a frame decoded; the future has a JPEG, or the errors of ``read_jpeg``.
+
+        Args:
+            recording: Of which recording.
+            number: Of the frame, from 0.
+            width: Wanted width in pixels; never enlarged. None: as it is.
+
+        Raises:
+            ConflictError: The recording cannot be read.
+            OverloadedError: Too many wait.
+        """
+        sha256 = recording.require_readable()
+
+        def explain(error: WorkerEnded) -> ReviewError:
+            return refused_picture(f"frame {number} of {recording.name}", error)
+
+        asked = (recording.path, sha256, number, width, self._settings)
+        return self._pool.submit(read_jpeg, *asked, explain=explain)
+
+    def ask_ahead(self, recording: Recording, number: int) -> None:
+        """Have the frames behind one decoded, as far as nobody else waits for any."""
+        if self._pool.tasks == 0 and recording.sha256 is not None:
+            asked = (recording.path, recording.sha256, number, self._settings)
+            with suppress(OverloadedError):
+                self._pool.submit(read_ahead, *asked)
+
+    def close(self) -> None:
+        """End the process."""
+        self._pool.close()
+
+
+@dataclass
+class _Open:
+    """A recording that the process keeps open; the frame that was asked for last, and which way that was."""
+
+    reader: RecordingReader
+    last: int = -1
+    way: int = 1
+
+
+_OPEN: OrderedDict[tuple[str, str], _Open] = OrderedDict()
+"""By path and sha256."""
+
+
+def read_jpeg(path: Path, sha256: str, number: int, width: int | None, settings: Settings) -> bytes:
+    """A frame as JPEG, in a worker process.
+
+    Raises:
+        ConflictError: The index of the recording is gone.
+        ImageError: The frame cannot be decoded.
+        NotFoundError: There is no frame of that number.
+    """
+    key = digest_of(repr((sha256, number, width, JPEG_QUALITY)).encode())
+    place = settings.cache / "frames" / key[:2] / f"{key[2:]}.jpg"
+    is_small = width is not None and width <= THUMBNAIL
+    if is_small:
+        with suppress(OSError):
+            return place.read_bytes()
+    data = _encoded(_read(path, sha256, number, settings), width)
+    if is_small:
+        # A full disk costs the cache and no picture.
+        with suppress(OSError):
+            place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            replace_file(place, data, durable=False)
+    return data
+
+
+def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> None:
+    """Decode what is asked for next, if it goes on as it did; it is kept for whoever asks."""
+    with suppress(ConflictError, ImageError):
+        found = _opened(path, sha256, settings)
+        if found.way > 0:
+            found.reader.prefetch(number, AHEAD)
+        elif not found.reader.has(before := max(number - BEHIND // 2, 0)):
+            _read_up_to(found.reader, before)
+
+
+def _read(path: Path, sha256: str, number: int, settings: Settings) -> Image:
+    found = _opened(path, sha256, settings)
+    follows = 0 < number - found.last <= 2 * AHEAD
+    if not follows and not found.reader.has(number):
+        _read_up_to(found.reader, number)
+    found.way = 1 if number >= found.last else -1
+    found.last = number
+    return found.reader.read(number)
+
+
+def _read_up_to(reader: RecordingReader, number: int) -> None:
+    """Decode a frame with those before it, which costs little more than to find that one."""
+    for before in range(max(number - BEHIND, 0), number + 1):
+        reader.read(before)
+
+
+def _opened(path: Path, sha256: str, settings: Settings) -> _Open:
+    key = (str(path), sha256)
+    if key not in _OPEN:
+        _OPEN[key] = _Open(RecordingReader(path, read_index(settings, sha256), KEPT_BYTES))
+        while len(_OPEN) > MOST_OPEN:
+            _, oldest = _OPEN.popitem(last=False)
+            oldest.reader.close()
+    _OPEN.move_to_end(key)
+    return _OPEN[key]
+
+
+def _encoded(image: Image, width: int | None) -> bytes:
+    height, present = image.shape[:2]
+    if width is not None and width < present:
+        size = (max(width, 1), max(round(height * width / present), 1))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    done, data = cv2.imencode(".jpg", image[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    if not done:
+        raise ImageError("the frame cannot be encoded as JPEG")
+    return bytes(data)

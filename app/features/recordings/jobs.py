@@ -1,0 +1,204 @@
+"""Recordings as jobs: indexed and cut into shots, and groups made of their instants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from app.config import Settings
+from app.db.database_worker import SILENCE, run_in_worker
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.errors import TooLargeError
+from app.features.imports.folders import resolve_folder
+from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
+from app.features.jobs.queries import Job
+from app.features.jobs.run import JobProgress, left_to_next_server
+from app.features.jobs.service import Jobs
+from app.features.paint.jobs import PROPOSALS
+from app.features.recordings.instants import require_instants, take_instants
+from app.features.recordings.service import (
+    Recording,
+    add_recording,
+    find_again,
+    get_recording,
+    has_index,
+    index_now,
+    require_video,
+)
+from app.features.solve.jobs import request_solve
+from app.plural import plural
+from app.progress import TellProgress
+from app.worker_process import WorkerEnded, WorkerLimits
+
+INDEX, INSTANTS = "recording", "instants"
+
+
+def request_recording(
+    jobs: Jobs,
+    store: Store,
+    settings: Settings,
+    dataset: str,
+    source: Mapping[str, str],
+    *,
+    actor: str,
+) -> Job:
+    """Bring a recording into a dataset, which is made where there is none of that name, and index it.
+
+    Args:
+        jobs: Carries it out.
+        store: The database.
+        settings: Where uploads lie, and which folders may be read.
+        dataset: Name of the dataset.
+        source: ``{"upload": id}`` or ``{"folder": path}`` of the file.
+        actor: Who wants it.
+
+    Raises:
+        InputError: It is no file of a video's name, or the name of the dataset cannot be one.
+        NotFoundError: There is no such upload or file.
+    """
+    path = _path_of(settings, source)
+    if "upload" in source:
+        # It is read where it is, so it stays.
+        keep_upload(settings, source["upload"])
+    recording = add_recording(store, dataset, path, actor=actor)
+    return request_index(jobs, store, recording, actor=actor)
+
+
+def _path_of(settings: Settings, source: Mapping[str, str]) -> Path:
+    if "upload" in source:
+        upload = get_upload(settings, source["upload"])
+        return require_video(upload_path(settings, upload.id).absolute())
+    found = resolve_folder(settings, source["folder"])
+    if not isinstance(found, Path):
+        raise TooLargeError(
+            "a recording is not read from an object store",
+            hint="Copy it into a folder that the operator allows, or upload it.",
+            pointer="/source/folder",
+        )
+    return require_video(found.absolute())
+
+
+def request_index(
+    jobs: Jobs, store: Store, recording: Recording, *, shots: bool = False, actor: str
+) -> Job:
+    """Index a recording, soon; ``shots``: where its index fits, its shots alone are found anew."""
+    return jobs.submit(
+        INDEX,
+        f"Find the shots of {recording.name}" if shots else f"Index {recording.name}",
+        partial(index_work, store),
+        dataset_id=recording.dataset_id,
+        actor=actor,
+        request={"recording": recording.id, "shots": shots},
+    )
+
+
+def index_work(store: Store, progress: JobProgress) -> Json:
+    """The work itself; its result is what was found."""
+    recording_id = progress.job.request["recording"]
+    recording = get_recording(store, recording_id)
+    name = recording.name
+    progress(0, None, f"Reading {name}.")
+
+    def step(done: int, total: int | None = None, sentence: str = "") -> None:
+        progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
+
+    with left_to_next_server(progress):
+        if progress.job.request["shots"] and has_index(store, recording):
+            actor = progress.job.actor
+            find_again(store, recording_id, actor=actor, progress=step, stop=progress.check)
+            found = get_recording(store, recording_id)
+        else:
+            found = index_now(store, recording_id, progress=step, stop=progress.check)
+    return {
+        "recording": found.id,
+        "name": found.name,
+        "frames": found.frames,
+        "shots": found.shots,
+    }
+
+
+def request_instants(
+    jobs: Jobs, store: Store, recording_id: int, frames: Sequence[int], propose: bool, *, actor: str
+) -> Job:
+    """Make groups of instants, soon.
+
+    Args:
+        jobs: Carries it out.
+        store: The database.
+        recording_id: Which recording.
+        frames: Numbers of its frames.
+        propose: Whether cameras are proposed for the new groups afterwards.
+        actor: Who wants it.
+
+    Raises:
+        NotFoundError, ConflictError, InputError: As ``instants.require_instants``.
+    """
+    recording = get_recording(store, recording_id)
+    numbers = require_instants(recording, frames)
+    return jobs.submit(
+        INSTANTS,
+        f"Make {plural(len(numbers), 'group')} of {recording.name}",
+        partial(instants_work, jobs, store),
+        dataset_id=recording.dataset_id,
+        actor=actor,
+        request={"recording": recording_id, "frames": numbers, "propose": propose},
+    )
+
+
+def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
+    """The work itself; its result counts groups, and names the jobs that follow."""
+    asked, actor = progress.job.request, progress.job.actor
+    recording = get_recording(store, asked["recording"])
+
+    def step(done: int, total: int | None = None, _: str = "") -> None:
+        progress(done, total, f"{plural(done, 'instant')} of {recording.name} taken.")
+
+    with left_to_next_server(progress):
+        taken = take_in_worker(
+            store, recording, asked["frames"], actor=actor, progress=step, stop=progress.check
+        )
+    solve = proposals = None
+    if taken["new"]:
+        solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id
+        if asked["propose"]:
+            number, match = recording.dataset_id, recording.name
+            proposals = PROPOSALS.request(jobs, store, number, match, actor=actor).id
+    return {**taken, "solve_job": solve, "proposals_job": proposals}
+
+
+def take_in_worker(
+    store: Store,
+    recording: Recording,
+    frames: Sequence[int],
+    *,
+    actor: str,
+    progress: TellProgress,
+    stop: Any,
+) -> dict[str, Any]:
+    """``instants.take_instants`` in a worker process, within the limits of imports."""
+    limits = WorkerLimits(store.settings.import_memory, store.settings.import_seconds, SILENCE)
+    try:
+        taken = run_in_worker(
+            store,
+            "recordings",
+            take_instants,
+            recording.id,
+            frames,
+            actor,
+            limits=limits,
+            progress=progress,
+            stop=stop,
+        )
+    except WorkerEnded as error:
+        raise TooLargeError(f"{recording.name} {error}") from error
+    return asdict(taken)
+
+
+def resume_recordings(jobs: Jobs, store: Store) -> None:
+    """Let what an earlier server was at go on; what is done stays as it is."""
+    jobs.resumes(INDEX, partial(index_work, store))
+    jobs.resumes(INSTANTS, partial(instants_work, jobs, store))

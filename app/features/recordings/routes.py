@@ -1,0 +1,203 @@
+"""Recordings: brought in, shown frame by frame, cut into shots, made groups of."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from anyio import to_thread
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from app.canonical import digest_of
+from app.features.datasets.service import dataset_id
+from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, clamp_width
+from app.features.jobs.queries import Job
+from app.features.recordings.jobs import request_index, request_instants, request_recording
+from app.features.recordings.schemas import (
+    InstantsRequest,
+    NewRecording,
+    RecordingDocument,
+    RecordingList,
+    ShotList,
+    ShotsEdit,
+)
+from app.features.recordings.service import (
+    Recording,
+    RecordingShots,
+    get_recording,
+    get_shots,
+    list_recordings,
+    put_shots,
+    remove_recording,
+)
+from app.finite import MAX_ID
+from app.http.conflicts import current_state
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch, SeesWhole, etag_matches
+from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, Where, may
+from app.http.problem import responses
+from app.http.request_limits import IMAGES, limit
+from app.http.respond import document, no_content, responds
+from app.http.route import Route
+from app.media.images import JPEG
+
+router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
+
+TAGGED = {
+    "headers": {"ETag": {"description": "Of the list of shots.", "schema": {"type": "string"}}}
+}
+Frame = Annotated[int, Path(ge=0, le=MAX_ID, description="Number of the frame, from 0.")]
+Width = Annotated[
+    int | None, Query(ge=1, le=100_000, description="Wanted width in pixels; never enlarged.")
+]
+OfDataset = Annotated[
+    str | None, Query(max_length=200, description="Name or id of the dataset; default: all.")
+]
+
+
+@router.get("", operation_id="listRecordings", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
+@paged()
+def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None) -> RecordingList:
+    """Recordings of a dataset, or of all that one sees."""
+    found = list_recordings(store, None if dataset is None else dataset_id(store, dataset))
+    return RecordingList(items=[one for one in found if sight.sees(one.dataset_id)])
+
+
+@router.post("", operation_id="addRecording", **by_job(404, 413, 415, 503))
+@may(
+    Action.LEAD,
+    body={
+        "dataset": OwnedKind.NEW_DATASET,
+        "source/upload": OwnedKind.UPLOAD,
+        "source/folder": OwnedKind.FOLDER,
+    },
+)
+@responds(job_answer)
+def add_recording(wanted: NewRecording, services: AppServices, actor: Actor) -> Job:
+    """Bring a video file into a dataset; the job indexes it, and finds its shots.
+
+    The file stays where it is. The same file again is the same recording, indexed anew.
+    """
+    return request_recording(
+        services.jobs,
+        services.store,
+        services.settings,
+        wanted.dataset,
+        wanted.source.values(),
+        actor=actor,
+    )
+
+
+@router.get(
+    "/{recording}",
+    operation_id="getRecording",
+    response_model=RecordingDocument,
+    responses=responses(404),
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+def get_one(recording: Id, store: AppStore) -> Recording:
+    """One recording: how long it is, how many shots it has, whether it can be read."""
+    return get_recording(store, recording)
+
+
+@router.delete(
+    "/{recording}",
+    operation_id="deleteRecording",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404), 204: {"description": "It is gone."}},
+)
+@may(Action.LEAD, recording=OwnedKind.RECORDING)
+@responds(no_content)
+def delete_one(recording: Id, store: AppStore, actor: Actor) -> None:
+    """Forget a recording and its shots; its file stays, and so do the groups made of it."""
+    remove_recording(store, recording, actor=actor)
+
+
+@router.get(
+    "/{recording}/frames/{frame}",
+    operation_id="getRecordingFrame",
+    response_class=Response,
+    responses={**responses(404, 409, 413, 503), **FRAME},
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+@limit(IMAGES)
+async def get_frame(
+    recording: Id, frame: Frame, services: AppServices, request: Request, width: Width = None
+) -> Response:
+    """A frame as JPEG, scaled down when a width is given; exactly the one of that number."""
+    found = await to_thread.run_sync(get_recording, services.store, recording)
+    sha256, wide = found.require_readable(), clamp_width(width)
+    etag = f'"{digest_of(f"{sha256} {frame} {wide}".encode())}"'
+    headers = {"ETag": etag, "Cache-Control": f"private, max-age={SECONDS}"}
+    if etag_matches(request, etag):
+        return Response(status_code=304, headers=headers)
+    task = services.recordings.ask(found, frame, wide)
+    data = await task.result_unless(request.is_disconnected)
+    if data is None:
+        return Response(status_code=CLIENT_GONE)
+    services.recordings.ask_ahead(found, frame)
+    return Response(data, media_type=JPEG, headers=headers)
+
+
+def _tagged(found: RecordingShots) -> Response:
+    return document(ShotList.of(found), 200, {"ETag": found.etag})
+
+
+@router.get(
+    "/{recording}/shots",
+    operation_id="listShots",
+    responses={**responses(404, 409), 200: TAGGED},
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+@paged()
+def list_shots(recording: Id, store: AppStore, response: Response) -> ShotList:
+    """The shots of a recording in their order, with their times."""
+    found = ShotList.of(get_shots(store, recording))
+    response.headers["ETag"] = found.etag
+    return found
+
+
+@router.put(
+    "/{recording}/shots",
+    operation_id="setShots",
+    response_model=ShotList,
+    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@responds(_tagged)
+def set_shots(
+    recording: Id, wanted: ShotsEdit, store: AppStore, actor: Actor, if_match: IfMatch
+) -> RecordingShots:
+    """Replace the list of shots: split, merged, of another kind, kept or dropped."""
+    with current_state(lambda: ShotList.of(get_shots(store, recording))):
+        return put_shots(store, recording, wanted.values(), if_match, actor=actor)
+
+
+@router.post("/{recording}/shots", operation_id="findShots", **by_job(404))
+@may(Action.LEAD, recording=OwnedKind.RECORDING)
+@responds(job_answer)
+def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
+    """Find the shots of a recording anew, in place of the list that it has.
+
+    A file that has changed, or whose index is gone or of an older version, is indexed again; the list stays if it is the
+    same file.
+    """
+    found = get_recording(services.store, recording)
+    return request_index(services.jobs, services.store, found, shots=True, actor=actor)
+
+
+@router.post("/{recording}/groups", operation_id="takeInstants", **by_job(404, 409, 413, 415))
+@may(Action.LEAD, recording=OwnedKind.RECORDING)
+@responds(job_answer)
+def take_instants(
+    recording: Id, wanted: InstantsRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Make a group of one view of each of these frames, which are kept without loss.
+
+    A frame that is a group already stays as it is. The recording may be gone afterwards.
+    """
+    return request_instants(
+        services.jobs, services.store, recording, wanted.frames, wanted.propose, actor=actor
+    )

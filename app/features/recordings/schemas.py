@@ -1,0 +1,131 @@
+"""Documents of recordings, their shots, and what becomes groups."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool
+
+from app.features.imports.schemas import ImportPlace
+from app.features.recordings.instants import MOST_AT_ONCE
+from app.features.recordings.service import MAX_SHOTS, RecordingShots, Shot
+from app.finite import MAX_ID
+from app.http.documents import Document, ListDocument
+from app.soccer.choices import ShotKind, ShotStart
+
+Frame = Annotated[int, Field(ge=0, le=MAX_ID)]
+
+
+class NewRecording(BaseModel):
+    """A file that becomes a recording of a dataset."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"dataset": "cup", "source": {"folder": "films/final.mp4"}}]
+        },
+    )
+
+    dataset: Annotated[str, Field(min_length=1, max_length=200)] = Field(
+        description="Name; a dataset is made where there is none of that name."
+    )
+    source: ImportPlace
+
+
+class RecordingDocument(Document):
+    """A recording; its numbers are null until it is indexed."""
+
+    id: int
+    dataset: str
+    name: str = Field(description="Unique in its dataset; its groups have it as their match.")
+    indexed: bool = Field(description="Whether its frames are known.")
+    sha256: str | None = Field(description="Of the file.")
+    bytes: int | None
+    frames: int | None = Field(description="How many frames there are.")
+    fps: float | None = Field(description="Frames a second; the mean of a variable rate.")
+    variable: bool | None = Field(description="Whether its rate varies.")
+    seconds: float | None = Field(description="Length.")
+    width: int | None = Field(description="Of a frame, upright with square pixels.")
+    height: int | None = Field(description="Of a frame, upright with square pixels.")
+    rotation: int | None = Field(description="Degrees by which the file turns its frames.")
+    interlaced: bool | None = Field(description="Null: that cannot be told.")
+    shots: int = Field(description="How many shots it has.")
+    groups: int = Field(description="How many groups were taken from it.")
+    problem: str | None = Field(description="Why its frames cannot be read now.")
+    created: datetime
+    by: str = Field(validation_alias="actor")
+
+
+class RecordingList(ListDocument[RecordingDocument]):
+    """Recordings, the newest first."""
+
+
+class ShotEdit(BaseModel):
+    """A shot as it shall be."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    first: Frame = Field(description="Number of its first frame, from 0.")
+    last: Frame = Field(description="Number of its last frame.")
+    kind: ShotKind
+    entered_by: ShotStart = "cut"
+    kept: StrictBool | None = Field(
+        default=None, description="Whether somebody wants to work on it; null: nobody said."
+    )
+
+
+class ShotsEdit(BaseModel):
+    """All shots of a recording, in their order."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"shots": [{"first": 0, "last": 249, "kind": "main", "kept": True}]}]
+        },
+    )
+
+    shots: Annotated[list[ShotEdit], Field(max_length=MAX_SHOTS)]
+
+    def values(self) -> list[Shot]:
+        """The shots."""
+        return [Shot(**shot.model_dump()) for shot in self.shots]
+
+
+class ShotDocument(Document, shows=Shot):
+    """A shot; frames of a soft transition belong to neither of two."""
+
+    first: int = Field(description="Number of its first frame, from 0.")
+    last: int = Field(description="Number of its last frame.")
+    kept: bool | None = Field(description="Whether somebody wants to work on it.")
+    start_s: float = Field(description="When its first frame is shown, seconds.")
+    end_s: float = Field(description="When its last frame is shown, seconds.")
+
+
+class ShotList(ListDocument[ShotDocument]):
+    """The shots of a recording."""
+
+    recording: int
+    etag: str
+
+    @staticmethod
+    def of(found: RecordingShots) -> ShotList:
+        """The document of a list."""
+        items = [
+            ShotDocument(**vars(shot), start_s=start, end_s=end)
+            for shot, (start, end) in zip(found.items, found.times, strict=True)
+        ]
+        return ShotList(items=items, recording=found.recording.id, etag=found.etag)
+
+
+class InstantsRequest(BaseModel):
+    """Frames that become groups."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"frames": [100, 125, 150]}]}
+    )
+
+    frames: Annotated[list[Frame], Field(min_length=1, max_length=MOST_AT_ONCE)]
+    propose: StrictBool = Field(
+        default=True, description="Whether a job proposes cameras for them afterwards."
+    )

@@ -1,0 +1,60 @@
+// @ts-check
+/** Instants: frames that become groups, chosen one by one or every so many of a shot. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { postInstants } from '../../api/recordings.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { withForm, withTick } from '../../lib/field.js';
+import { plural } from '../../lib/format.js';
+import { follow, isOver } from '../../state/jobs.js';
+import { queueAddress } from '../../state/navigation.js';
+import { wanted } from '../../state/playback.js';
+import { everyOf } from '../../state/shots.js';
+import { FormError } from '../form_error.js';
+import { JobProgress } from '../job_progress.js';
+
+/** @import {JobJson} from '../../api/jobs.js' */
+/** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+
+/** @typedef {{chosen: ReadonlySet<number>, turn: (frame: number) => void, add: (frames: number[]) => void, clear: () => void}} Instants */
+
+/** @param {{one: RecordingJson, shot: Shot | undefined, instants: Instants}} props */
+export function InstantsCard({ one, shot, instants }) {
+	const [propose, setPropose] = useState(true);
+	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { error, attempt } = useAttempt();
+	const { chosen } = instants;
+	const busy = job !== null && !isOver(job);
+	const why = busy ? 'Groups are being made' : chosen.size === 0 ? 'Choose an instant first' : '';
+	const every = withForm((said) => { if (shot) instants.add(everyOf(shot, Number(said.get('step')))); });
+	function make() {
+		if (why) return;
+		attempt(postInstants(one.id, [...chosen], propose), async (begun) => {
+			const over = await follow(begun, setJob);
+			if (over.state === 'done') instants.clear();
+		});
+	}
+	const query = `match:"${one.name.replaceAll('"', '')}"`;
+	return html`
+		<section class="card form" aria-label="Instants">
+			<h2>Instants<span class="card__aside">${plural(chosen.size, 'frame')} chosen</span></h2>
+			<p class="buttons">
+				<button class="button" type="button" aria-pressed=${chosen.has(wanted.value)} onClick=${() => instants.turn(wanted.value)}>This frame <kbd>I</kbd></button>
+				<button class="button" type="button" aria-disabled=${chosen.size === 0} onClick=${instants.clear}>None</button>
+			</p>
+			<form class="buttons" onSubmit=${every}>
+				<label for="instants-step">Every</label>
+				<input class="field film__step" id="instants-step" name="step" type="number" min="1" max="100000" required value=${Math.round(one.fps ?? 25)} />
+				<span>frames</span>
+				<button class="button" type="submit">of this shot</button>
+			</form>
+			<label class="form__check"><input type="checkbox" checked=${propose} onChange=${withTick(setPropose)} />Propose cameras afterwards</label>
+			<p class="buttons"><button class="button button--primary" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${make}>Make ${plural(chosen.size, 'group')}</button></p>
+			${error ? html`<${FormError} error=${error} />` : null}
+			${job ? html`<${JobProgress} job=${job} />` : null}
+			${one.groups ? html`<p><a class="link" href=${queueAddress(one.dataset, query)}>${plural(one.groups, 'group')} of this recording</a></p>` : null}
+		</section>
+	`;
+}

@@ -1,0 +1,51 @@
+// @ts-check
+/** Keys of the page of a recording. */
+
+import { goTo, run, stand, stepBy, toggleRunning, wanted } from '../../state/playback.js';
+import { changedAt, mergedWithNext, SHOT_KINDS, shotAt, splitAt } from '../../state/shots.js';
+
+/** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+/** @import {Binding} from '../../lib/keys.js' */
+
+/** @typedef {{change: (items: Shot[] | null, told: string) => void, undo: () => void, turn: (frame: number) => void}} Doing */
+
+/**
+ * @param {RecordingJson} one
+ * @param {() => Shot[]} shots as they are when a key is pressed
+ * @param {{current: Doing}} doing
+ * @returns {Binding[]}
+ */
+export function keysOfRecording(one, shots, doing) {
+	const at = () => shotAt(shots(), wanted.value);
+	/** @param {number} step */
+	const shotBy = (step) => {
+		const all = shots();
+		const next = all[Math.min(Math.max(at() + step, 0), all.length - 1)];
+		if (next) goTo(next.first);
+	};
+	/** @param {Partial<Shot>} change @param {string} told */
+	const set = (change, told) => doing.current.change(changedAt(shots(), at(), change), told);
+	const second = Math.round(one.fps ?? 25);
+	const [look, edit] = ['Recording', 'Shots'];
+	return [
+		{ keys: [' '], label: 'Play, or stop', group: look, shown: 'Space', run: toggleRunning },
+		{ keys: ['l'], label: 'Play forwards; again: twice as fast', group: look, run: () => run(1) },
+		{ keys: ['k'], label: 'Stop', group: look, run: stand },
+		{ keys: ['j'], label: 'Play backwards; again: twice as fast', group: look, run: () => run(-1) },
+		{ keys: ['ArrowRight'], label: 'Next frame', group: look, run: () => { stepBy(1); } },
+		{ keys: ['ArrowLeft'], label: 'Frame before', group: look, run: () => { stepBy(-1); } },
+		{ keys: ['Shift+ArrowRight'], label: 'A second on', group: look, run: () => { stepBy(second); } },
+		{ keys: ['Shift+ArrowLeft'], label: 'A second back', group: look, run: () => { stepBy(-second); } },
+		{ keys: ['ArrowDown'], label: 'Next shot', group: look, run: () => shotBy(1) },
+		{ keys: ['ArrowUp'], label: 'Shot before', group: look, run: () => shotBy(-1) },
+		{ keys: ['s'], label: 'Split the shot at this frame', group: edit, needs: 'annotate', run: () => doing.current.change(splitAt(shots(), wanted.value), 'Split.') },
+		{ keys: ['m'], label: 'Merge the shot with the next one', group: edit, needs: 'annotate', run: () => doing.current.change(mergedWithNext(shots(), at()), 'Merged with the next shot.') },
+		...SHOT_KINDS.map(({ kind, label }, index) => /** @type {Binding} */ ({
+			keys: [String(index + 1)], label: `The shot is ${label === 'other' ? 'something else' : `a ${label}`}`, group: edit, needs: 'annotate', run: () => set({ kind }, `This shot: ${label}.`),
+		})),
+		{ keys: ['a'], label: 'Keep the shot', group: edit, needs: 'annotate', run: () => set({ kept: true }, 'The shot is kept.') },
+		{ keys: ['x'], label: 'Drop the shot', group: edit, needs: 'annotate', run: () => set({ kept: false }, 'The shot is dropped.') },
+		{ keys: ['Ctrl+z'], label: 'Take the last change of the shots back', group: edit, needs: 'annotate', run: () => doing.current.undo() },
+		{ keys: ['i'], label: 'Choose this frame as an instant, or not', group: edit, run: () => doing.current.turn(wanted.value) },
+	];
+}

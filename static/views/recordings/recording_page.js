@@ -1,0 +1,183 @@
+// @ts-check
+/** One recording: its frames, its shots as a strip, and the instants that become groups. */
+
+import { html } from 'htm/preact';
+import { useCallback, useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
+
+import { listen } from '../../api/events.js';
+import { getRecording, getShots, putShots } from '../../api/recordings.js';
+import { ApiError } from '../../api/problem.js';
+import { useKeys, useSize } from '../../lib/hooks.js';
+import { page } from '../../lib/router.js';
+import { useResource } from '../../lib/resource.js';
+import { isOver } from '../../state/jobs.js';
+import { announce, complain } from '../../state/notice.js';
+import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
+import { shotAt, timecode } from '../../state/shots.js';
+import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { InstantsCard } from './instants_card.js';
+import { keysOfRecording } from './recording_keys.js';
+import { FindAgain, ShotCard } from './shot_card.js';
+import { Strip } from './strip.js';
+import { factsOf } from './recordings_page.js';
+
+/** @import {JobJson} from '../../api/jobs.js' */
+/** @import {RecordingJson, Shot, TimedShot} from '../../api/recordings.js' */
+
+/** The list of shots, and what changes it: at once here, then on the server. @param {number} id */
+function useShots(id) {
+	const [list, setList] = useState(/** @type {{items: Shot[], etag: string} | null} */ (null));
+	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
+	const latest = useRef(list);
+	const before = useRef(/** @type {Shot[][]} */ ([]));
+	const sending = useRef(Promise.resolve());
+	/** @param {{items: Shot[], etag: string}} next */
+	function keep(next) {
+		latest.current = next;
+		setList(next);
+	}
+	const read = useCallback(async () => {
+		try {
+			keep(await getShots(id));
+			setError(null);
+		} catch (problem) {
+			if (!(problem instanceof ApiError)) throw problem;
+			setError(problem);
+		}
+	}, [id]);
+	useEffect(() => { before.current = []; read(); }, [id]);
+	/** @param {Shot[]} items */
+	function send(items) {
+		const present = latest.current;
+		if (!present) return;
+		keep({ items, etag: present.etag });
+		sending.current = sending.current.then(async () => {
+			try {
+				const saved = await putShots(id, items, latest.current?.etag ?? '');
+				// What was changed meanwhile is on its way.
+				const newest = latest.current;
+				if (newest) keep({ items: newest.items === items ? saved.items : newest.items, etag: saved.etag });
+			} catch (problem) {
+				if (!(problem instanceof ApiError)) throw problem;
+				complain(problem.status === 412 ? 'Somebody else has changed the shots: this is how they are now.' : problem.message);
+				before.current = [];
+				await read();
+			}
+		});
+	}
+	/** @param {Shot[] | null} items null: nothing can be done here @param {string} told */
+	function change(items, told) {
+		if (!items || !latest.current) return;
+		remember();
+		send(items);
+		announce(told);
+	}
+	const remember = () => { if (latest.current) before.current.push(latest.current.items); };
+	function undo() {
+		const last = before.current.pop();
+		if (!last) return;
+		send(last);
+		announce('Taken back.');
+	}
+	return { list, latest, error, read, change, undo, remember };
+}
+
+/** Which frames are chosen to become groups. */
+function useInstants() {
+	const [chosen, setChosen] = useState(/** @type {ReadonlySet<number>} */ (new Set()));
+	return {
+		chosen,
+		/** @param {number} frame */
+		turn: (frame) => setChosen((before) => {
+			const next = new Set(before);
+			if (!next.delete(frame)) next.add(frame);
+			announce(next.has(frame) ? `Frame ${frame} is chosen.` : `Frame ${frame} is not chosen any more.`);
+			return next;
+		}),
+		/** @param {number[]} frames */
+		add: (frames) => setChosen((before) => new Set([...before, ...frames])),
+		clear: () => setChosen(new Set()),
+	};
+}
+
+/** @param {{one: RecordingJson, seconds: (frame: number) => number}} props */
+function Stage({ one, seconds }) {
+	const [ref, size] = useSize();
+	useLayoutEffect(() => { if (size.width) showAt(size.width * Math.min(devicePixelRatio, 2)); }, [size.width]);
+	const { frame, address } = seen.value;
+	return html`
+		<section class="film__stage" aria-label="Frame" data-frame=${frame}>
+			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}</div>
+			<p class="film__time">
+				<button class="button" type="button" aria-pressed=${speed.value !== 0} onClick=${toggleRunning}>${speed.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
+				<strong class="mono" data-timecode>${timecode(seconds(wanted.value), one.fps ?? 25)}</strong>
+				<span>frame ${wanted.value} of ${(one.frames ?? 1) - 1}</span>
+				${Math.abs(speed.value) > 1 || speed.value < 0 ? html`<span>${speed.value} ×</span>` : null}
+				${playTrouble.value ? html`<span class="form__error" role="alert">${playTrouble.value}</span>` : null}
+			</p>
+		</section>
+	`;
+}
+
+/** When a frame is shown, by the times of the shots around it. @param {Shot[]} shots @param {RecordingJson} one */
+function clock(shots, one) {
+	const timed = /** @type {TimedShot[]} */ (shots.filter((shot) => 'start_s' in shot));
+	/** @param {number} frame */
+	return (frame) => {
+		const shot = timed[shotAt(timed, frame)];
+		if (!shot) return frame / (one.fps ?? 25);
+		const step = shot.last > shot.first ? (shot.end_s - shot.start_s) / (shot.last - shot.first) : 1 / (one.fps ?? 25);
+		return Math.max(0, shot.start_s + (frame - shot.first) * step);
+	};
+}
+
+/** @param {{one: RecordingJson, reload: () => void}} props */
+function Film({ one, reload }) {
+	const { list, latest, error, read, change, undo, remember } = useShots(one.id);
+	const instants = useInstants();
+	useEffect(() => openFilm({ id: one.id, frames: one.frames ?? 0, fps: one.fps ?? 25 }), [one.id, one.frames]);
+	useEffect(() => listen('job', (/** @type {JobJson} */ job) => {
+		if (isOver(job) && job.result?.recording === one.id) read();
+		if (isOver(job) && job.kind === 'instants') reload();
+	}), [one.id]);
+	const doing = useRef({ change, undo, turn: instants.turn });
+	doing.current = { change, undo, turn: instants.turn };
+	const keys = useMemo(() => keysOfRecording(one, () => latest.current?.items ?? [], doing), [one.id]);
+	useKeys(keys);
+	if (error) {
+		return html`
+			<${Trouble} title="The shots cannot be shown" error=${error} retry=${read} />
+			<section class="card" aria-label="Index"><${FindAgain} one=${one} label="Index it again" over=${() => { read(); reload(); }} /></section>
+		`;
+	}
+	if (!list) return html`<${Loading} what="shots" />`;
+	const at = shotAt(list.items, wanted.value);
+	return html`
+		<div class="film">
+			<${Stage} one=${one} seconds=${clock(list.items, one)} />
+			<div class="film__rail">
+				<${ShotCard} one=${one} shots=${list.items} at=${at} change=${change} remember=${remember} />
+				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} />
+			</div>
+			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} goTo=${goTo} />
+		</div>
+	`;
+}
+
+export function RecordingPage() {
+	const id = 'recording' in page.value ? page.value.recording : 0;
+	const found = useResource((signal) => getRecording(id, signal), [id]);
+	const one = found.value;
+	const why = one && (one.problem ?? (one.indexed ? null : 'It is not indexed yet.'));
+	return html`
+		<${PageFrame}
+			current="recordings" title=${one ? one.name : 'Recording'}
+			where=${html`<a href="/recordings">Recordings</a>${one ? html` / <strong>${one.name}</strong> <span class="film__facts">${factsOf(one)}</span>` : null}`}
+		>
+			${found.error ? html`<${Trouble} title="This recording cannot be shown" error=${found.error} retry=${found.reload} />` : null}
+			${!one && !found.error ? html`<${Loading} what="the recording" />` : null}
+			${why ? html`<section class="card empty" role="alert"><h2>Its frames cannot be read now</h2><p>${why}</p><p>Groups that were taken from it still work. Put the file back, or index it again as it is now; shots stay if it is the same.</p><${FindAgain} one=${one} label="Index it again" over=${found.reload} /></section>` : null}
+			${one && !why ? html`<${Film} key=${one.id} one=${one} reload=${found.reload} />` : null}
+		<//>
+	`;
+}

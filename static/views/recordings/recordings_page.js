@@ -1,0 +1,109 @@
+// @ts-check
+/** Every recording, and the way to bring one in. */
+
+import { html } from 'htm/preact';
+import { useEffect, useState } from 'preact/hooks';
+
+import { listen } from '../../api/events.js';
+import { deleteRecording, getRecordings, postRecording } from '../../api/recordings.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { withForm } from '../../lib/field.js';
+import { count, plural } from '../../lib/format.js';
+import { useResource } from '../../lib/resource.js';
+import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
+import { follow, isOver } from '../../state/jobs.js';
+import { lengthText } from '../../state/shots.js';
+import { FormError } from '../form_error.js';
+import { JobProgress } from '../job_progress.js';
+import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { SourceChoice } from '../source_choice.js';
+import { When } from '../when.js';
+
+/** @import {ImportSource} from '../../api/imports.js' */
+/** @import {JobJson} from '../../api/jobs.js' */
+/** @import {RecordingJson} from '../../api/recordings.js' */
+
+/** What is known of it, in words. @param {RecordingJson} one */
+export function factsOf({ width, height, fps, variable, interlaced, seconds, frames }) {
+	if (frames === null) return 'not indexed yet';
+	return [
+		`${width} × ${height}`, `${Number((fps ?? 0).toFixed(3))} frames a second${variable ? ' (variable)' : ''}`,
+		lengthText(seconds ?? 0), plural(frames, 'frame'), interlaced ? 'interlaced' : '',
+	].filter(Boolean).join(' · ');
+}
+
+/** @param {{one: RecordingJson, remove: () => void}} props */
+function Row({ one, remove }) {
+	return html`
+		<tr>
+			<th scope="row">${one.indexed ? html`<a href=${`/recordings/${one.id}`}>${one.name}</a>` : one.name}<small>${one.dataset}</small></th>
+			<td>${factsOf(one)}${one.problem ? html`<small class="form__error">${one.problem}</small>` : null}</td>
+			<td data-numeric="true">${count(one.shots)}</td>
+			<td data-numeric="true">${count(one.groups)}</td>
+			<td><${When} at=${one.created} /></td>
+			<td><span class="table__actions"><button class="button button--small" type="button" data-needs="lead" data-of=${one.dataset} title="Its file and its groups stay" onClick=${remove}>Remove<span class="hidden-text"> ${one.name}</span></button></span></td>
+		</tr>
+	`;
+}
+
+/** @param {{added: () => void}} props */
+function AddCard({ added }) {
+	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
+	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { error, attempt } = useAttempt();
+	const busy = job !== null && !isOver(job);
+	const why = busy ? 'A recording is being indexed' : source ? '' : 'Choose a file first';
+	const send = withForm((said) => {
+		if (why || !source) return;
+		attempt(postRecording({ dataset: String(said.get('dataset')).trim(), source }), async (begun) => {
+			await follow(begun, setJob);
+			added();
+		});
+	});
+	return html`
+		<section class="card" aria-labelledby="add-title">
+			<h2 id="add-title">Add a recording</h2>
+			<form class="form" onSubmit=${send}>
+				<div class="form__row">
+					<label for="recording-dataset">Dataset</label>
+					<input class="field" id="recording-dataset" name="dataset" list="recording-datasets" maxlength="100" autocomplete="off" required value=${dataset.value?.name ?? ''} />
+					<datalist id="recording-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
+					<small>A new name makes a new dataset. Groups that you take from the recording go there.</small>
+				</div>
+				<${SourceChoice} videos=${true} onSource=${setSource} guess=${() => {}} />
+				<p class="buttons"><button class="button button--primary" type="submit" data-needs="lead" data-of="" aria-disabled=${why !== ''} title=${why}>Add and find its shots</button></p>
+				${error ? html`<${FormError} error=${error} />` : null}
+				${job ? html`<${JobProgress} job=${job} />` : null}
+				${job?.state === 'done' ? html`<p><a class="button" href=${`/recordings/${job.result.recording}`}>Open ${job.result.name}</a></p>` : null}
+			</form>
+		</section>
+	`;
+}
+
+export function RecordingsPage() {
+	const found = useResource((signal) => getRecordings(signal), []);
+	const { error, attempt } = useAttempt();
+	useEffect(() => {
+		loadDatasets();
+		return listen('job', (/** @type {JobJson} */ job) => { if (['recording', 'instants'].includes(job.kind) && isOver(job)) found.reload(); }, found.reload);
+	}, []);
+	const items = found.value?.items ?? [];
+	return html`
+		<${PageFrame} current="recordings" title="Recordings" where=${html`<strong>Recordings</strong>`}>
+			${found.error ? html`<${Trouble} title="The recordings cannot be shown" error=${found.error} retry=${found.reload} />` : null}
+			${!found.value && !found.error ? html`<${Loading} what="recordings" />` : null}
+			${error ? html`<${FormError} error=${error} card=${true} />` : null}
+			${found.value && items.length === 0 ? html`<section class="card empty"><h2>No recording yet</h2><p>A recording is a video of a match. Its shots are found, you choose instants, and each becomes a group to review. The file stays where it is.</p></section>` : null}
+			${items.length ? html`
+				<section class="card card--flush" aria-label="Recordings">
+					<div class="table__scroll" tabindex="0" role="region" aria-label="Table of recordings">
+						<table class="table">
+							<thead><tr><th>recording and dataset</th><th>what it is</th><th data-numeric="true">shots</th><th data-numeric="true">groups</th><th>added</th><td></td></tr></thead>
+							<tbody>${items.map((one) => html`<${Row} key=${one.id} one=${one} remove=${() => attempt(deleteRecording(one.id), found.reload)} />`)}</tbody>
+						</table>
+					</div>
+				</section>` : null}
+			<${AddCard} added=${() => { found.reload(); loadDatasets(); }} />
+		<//>
+	`;
+}

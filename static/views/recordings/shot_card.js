@@ -1,0 +1,68 @@
+// @ts-check
+/** The shot that is shown: what it is, and what can be done with it. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { findShots } from '../../api/recordings.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { follow, isOver } from '../../state/jobs.js';
+import { lengthText, changedAt, mergedWithNext, SHOT_KINDS, splitAt } from '../../state/shots.js';
+import { wanted } from '../../state/playback.js';
+import { FormError } from '../form_error.js';
+import { JobProgress } from '../job_progress.js';
+
+/** @import {JobJson} from '../../api/jobs.js' */
+/** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+
+const ENTERED = { start: 'the beginning of the recording', cut: 'behind a cut', dissolve: 'behind a dissolve', wipe: 'behind a wipe', fade: 'behind a fade' };
+
+/** Finds all shots anew, and indexes what is not indexed as it is now. @param {{one: RecordingJson, label: string, before?: () => void, over?: () => void}} props */
+export function FindAgain({ one, label, before = () => {}, over = () => {} }) {
+	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { error, attempt } = useAttempt();
+	const busy = job !== null && !isOver(job);
+	function find() {
+		if (busy) return;
+		before();
+		attempt(findShots(one.id), async (begun) => {
+			await follow(begun, setJob);
+			over();
+		});
+	}
+	return html`
+		<p class="buttons"><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy} onClick=${find}>${label}</button></p>
+		${error ? html`<${FormError} error=${error} />` : null}
+		${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
+	`;
+}
+
+/** @param {{one: RecordingJson, shots: Shot[], at: number, change: (items: Shot[] | null, told: string) => void, remember: () => void}} props */
+export function ShotCard({ one, shots, at, change, remember }) {
+	const shot = shots[at];
+	if (!shot) return html`<section class="card" aria-label="Shot"><h2>Shot</h2><p class="empty-note">This recording has no shot.</p><${FindAgain} one=${one} label="Find all shots again" before=${remember} /></section>`;
+	const frame = wanted.value;
+	const split = splitAt(shots, frame) ? '' : 'Go to a frame within the shot first';
+	const merge = at + 1 < shots.length ? '' : 'This is the last shot';
+	/** @param {Partial<Shot>} what @param {string} told */
+	const set = (what, told) => change(changedAt(shots, at, what), told);
+	return html`
+		<section class="card" aria-label="Shot">
+			<h2>Shot ${at + 1} of ${shots.length}<span class="card__aside">${lengthText((shot.last - shot.first + 1) / (one.fps ?? 25))}</span></h2>
+			<p>Frames ${shot.first} to ${shot.last}, ${ENTERED[shot.entered_by]}. ${shot.kept === null ? '' : shot.kept ? 'Kept.' : 'Dropped.'}</p>
+			<div class="film__kinds" role="group" aria-label="Kind">
+				${SHOT_KINDS.map(({ kind, letter, label }, index) => html`
+					<button key=${kind} class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${shot.kind === kind} onClick=${() => set({ kind }, `This shot: ${label}.`)}>
+						<span class="film__letter" data-kind=${kind} aria-hidden="true">${letter}</span>${label} <kbd>${index + 1}</kbd>
+					</button>`)}
+			</div>
+			<div class="film__kinds" role="group" aria-label="Shot">
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${shot.kept === true} onClick=${() => set({ kept: true }, 'The shot is kept.')}>Keep <kbd>A</kbd></button>
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${shot.kept === false} onClick=${() => set({ kept: false }, 'The shot is dropped.')}>Drop <kbd>X</kbd></button>
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${split !== ''} title=${split} onClick=${() => change(splitAt(shots, frame), 'Split.')}>Split <kbd>S</kbd></button>
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${merge !== ''} title=${merge} onClick=${() => change(mergedWithNext(shots, at), 'Merged with the next shot.')}>Merge <kbd>M</kbd></button>
+			</div>
+			<${FindAgain} one=${one} label="Find all shots again" before=${remember} />
+		</section>
+	`;
+}

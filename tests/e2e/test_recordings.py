@@ -1,0 +1,288 @@
+"""A recording in the browser: added, watched, cut into shots, and made groups of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import httpx
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.screen import jobs_end, until
+from tests.e2e.service import delete_dataset
+from tests.e2e.test_access import (
+    BEYOND_ITS_FRAME,
+    NESTED_SCROLLERS,
+    SIZES,
+    resize,
+    serious_in_both,
+    soon,
+)
+from tests.e2e.test_pages import TOO_WIDE
+from tests.videos import write_pictures
+
+OpenPage = Callable[..., Page]
+SHOTS = ((40, 120, 40), (160, 90, 60), (60, 60, 150))
+"""Colours of three shots of forty frames, blue green red."""
+LONG = 40
+
+
+def pictures() -> Iterator[np.ndarray]:
+    """Frames that tell their number, in shots of one colour each."""
+    for shot, colour in enumerate(SHOTS):
+        for number in range(LONG):
+            picture = np.full((360, 640, 3), colour, np.uint8)
+            cv2.line(picture, (0, 60 * shot + 40), (640, 200 + shot * 40), (250, 250, 250), 4)
+            cv2.circle(picture, (40 + 12 * number, 180), 20, (230, 230, 230), -1)
+            text = str(shot * LONG + number)
+            cv2.putText(picture, text, (250, 330), cv2.FONT_HERSHEY_SIMPLEX, 2, (255, 255, 255), 3)
+            yield picture
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_pictures(tmp_path_factory.mktemp("film") / "cup final.mp4", "mp4v", pictures())
+
+
+@pytest.fixture
+def recording(film: Path, server: str) -> Iterator[int]:
+    """The film as a recording of the dataset *cup*, cut into its three shots; ask before the page."""
+    with httpx.Client(base_url=f"{server}/api/v1") as client:
+        sent = client.post(
+            f"/uploads?name={film.name}",
+            content=film.read_bytes(),
+            headers={"Content-Type": "application/octet-stream"},
+        ).json()
+        body = {"dataset": "cup", "source": {"upload": sent["id"]}}
+        job = client.post("/recordings", json=body).json()
+        while job["state"] not in ("done", "failed"):
+            job = client.get(f"/jobs/{job['id']}").json()
+        assert job["state"] == "done", job
+        number = job["result"]["recording"]
+        path = f"/recordings/{number}/shots"
+        starts = range(0, LONG * len(SHOTS), LONG)
+        shots = [{"first": at, "last": at + LONG - 1, "kind": "other"} for at in starts]
+        tag = {"If-Match": client.get(path).headers["etag"]}
+        assert client.put(path, json={"shots": shots}, headers=tag).status_code == 200
+    yield number
+    delete_dataset(server, "cup")
+
+
+def opened(open_page: OpenPage, recording: int, **more: Any) -> Page:
+    """The page of a recording, its first frame seen."""
+    page = open_page(f"/recordings/{recording}", **more)
+    shows(page, 0)
+    return page
+
+
+def shows(page: Page, frame: int) -> None:
+    """Wait until a frame is seen, and not only wanted."""
+    page.wait_for_selector(f'.film__stage[data-frame="{frame}"] img')
+
+
+def shots_of(page: Page, recording: int) -> list[dict[str, Any]]:
+    """The shots as the server has them."""
+    found: list[dict[str, Any]] = page.request.get(f"/api/v1/recordings/{recording}/shots").json()[
+        "items"
+    ]
+    return found
+
+
+class TestAdding:
+    def test_a_video_is_sent_indexed_and_opened(
+        self, film: Path, open_page: OpenPage, server: str
+    ) -> None:
+        page = open_page("/recordings")
+        page.get_by_label("Dataset", exact=True).fill("sent")
+        page.set_input_files("#import-file", film)
+        expect(page.get_by_text("is uploaded")).to_be_visible()
+        page.get_by_role("button", name="Add and find its shots").click()
+        page.get_by_role("link", name="Open cup final").click()
+        shows(page, 0)
+        expect(page.get_by_text("120 frames")).to_be_visible()
+        page.get_by_role("link", name="Recordings").first.click()
+        row = page.get_by_role("row", name="cup final")
+        expect(row).to_contain_text("640 × 360 · 25 frames a second")
+        row.get_by_role("button", name="Remove").click()
+        expect(row).to_have_count(0)
+        delete_dataset(server, "sent")
+
+    def test_a_picture_is_no_recording_and_a_video_no_import(
+        self, film: Path, tmp_path: Path, open_page: OpenPage
+    ) -> None:
+        cv2.imwrite(str(tmp_path / "a.png"), next(pictures()))
+        page = open_page("/recordings")
+        page.set_input_files("#import-file", tmp_path / "a.png")
+        expect(page.get_by_role("alert")).to_contain_text("Choose one video")
+        page.goto("/import")
+        page.set_input_files("#import-file", film)
+        expect(page.get_by_role("alert")).to_contain_text("Add it on the page Recordings")
+
+
+class TestWatching:
+    def test_keys_step_jump_and_play(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        for key, frame in (
+            ("ArrowRight", 1),
+            ("ArrowRight", 2),
+            ("ArrowLeft", 1),
+            ("Shift+ArrowRight", 26),
+            ("ArrowDown", 40),
+            ("ArrowDown", 80),
+            ("ArrowUp", 40),
+        ):
+            page.keyboard.press(key)
+            shows(page, frame)
+        expect(page.locator("[data-timecode]")).to_have_text("00:01.15")
+        page.keyboard.press("l")
+        until(page, lambda: int(page.locator(".film__stage").get_attribute("data-frame") or 0) > 44)
+        page.keyboard.press("k")
+        expect(page.get_by_role("button", name="Play Space")).to_be_visible()
+        page.keyboard.press("j")
+        until(page, lambda: int(page.locator(".film__stage").get_attribute("data-frame") or 0) < 40)
+        page.keyboard.press("Space")
+        expect(page.get_by_role("button", name="Play Space")).to_be_visible()
+
+    def test_the_strip_leads_to_its_shots(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        strip = page.get_by_role("region", name="Shots")
+        expect(strip.get_by_role("button")).to_have_count(3)
+        strip.get_by_role("button", name="Shot 3: other, 1.6 s").click()
+        shows(page, 80)
+        slider = page.get_by_role("slider", name="Frame")
+        slider.focus()
+        slider.press("End")
+        shows(page, 119)
+
+
+class TestCutting:
+    def test_shots_are_split_merged_named_and_dropped_by_keys(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, recording)
+
+        def has(*wanted: tuple[int, int, str, bool | None]) -> None:
+            until(
+                page,
+                lambda: (
+                    [
+                        (one["first"], one["last"], one["kind"], one["kept"])
+                        for one in shots_of(page, recording)
+                    ]
+                    == [*wanted]
+                ),
+            )
+
+        last = (80, 119, "other", None)
+        page.keyboard.press("1")
+        page.keyboard.press("a")
+        has((0, 39, "main", True), (40, 79, "other", None), last)
+        page.keyboard.press("ArrowDown")
+        shows(page, 40)
+        page.keyboard.press("Shift+ArrowRight")
+        shows(page, 65)
+        page.keyboard.press("s")
+        page.keyboard.press("2")
+        page.keyboard.press("x")
+        has((0, 39, "main", True), (40, 64, "other", None), (65, 79, "replay", False), last)
+        expect(page.get_by_role("button", name="Shot 3: replay, dropped, 0.6 s")).to_be_visible()
+        page.keyboard.press("m")
+        has((0, 39, "main", True), (40, 64, "other", None), (65, 119, "replay", False))
+        page.keyboard.press("Control+z")
+        has((0, 39, "main", True), (40, 64, "other", None), (65, 79, "replay", False), last)
+
+    def test_all_are_found_again_and_taken_back(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        mine = [(one["first"], one["kind"]) for one in shots_of(page, recording)]
+        page.keyboard.press("m")
+        strip = page.get_by_role("region", name="Shots").get_by_role("button")
+        expect(strip).to_have_count(2)
+        page.get_by_role("button", name="Find all shots again").click()
+        expect(strip).to_have_count(3)
+        page.keyboard.press("Control+z")
+        expect(strip).to_have_count(2)
+        page.keyboard.press("Control+z")
+        expect(strip).to_have_count(3)
+        until(
+            page, lambda: [(one["first"], one["kind"]) for one in shots_of(page, recording)] == mine
+        )
+
+    def test_a_file_that_has_changed_is_indexed_again(
+        self, recording: int, open_page: OpenPage, home: Path
+    ) -> None:
+        for film in (home / "uploads").glob("*/content/cup final.mp4"):
+            film.touch()
+        page = open_page(f"/recordings/{recording}")
+        expect(page.get_by_role("alert")).to_contain_text("has changed since it was indexed")
+        page.get_by_role("button", name="Index it again").click()
+        expect(page.get_by_role("region", name="Shots").get_by_role("button")).to_have_count(3)
+
+    def test_what_somebody_else_changed_is_not_overwritten(
+        self, recording: int, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("412 (Precondition Failed)")
+        page = opened(open_page, recording)
+        path = f"/api/v1/recordings/{recording}/shots"
+        tag = page.request.get(path).headers["etag"]
+        theirs = {"shots": [{"first": 0, "last": 119, "kind": "closeup"}]}
+        assert page.request.put(path, data=theirs, headers={"If-Match": tag}).ok
+        page.keyboard.press("1")
+        expect(page.get_by_text("Somebody else has changed the shots")).to_be_visible()
+        expect(page.get_by_role("region", name="Shots").get_by_role("button")).to_have_count(1)
+        assert shots_of(page, recording)[0]["kind"] == "closeup"
+
+
+class TestInstants:
+    def test_chosen_frames_become_groups(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        page.keyboard.press("i")
+        card = page.get_by_role("region", name="Instants")
+        expect(card).to_contain_text("1 frame chosen")
+        page.keyboard.press("ArrowDown")
+        shows(page, 40)
+        card.get_by_label("Every").fill("20")
+        card.get_by_role("button", name="of this shot").click()
+        expect(card).to_contain_text("3 frames chosen")
+        card.get_by_label("Propose cameras afterwards").uncheck()
+        card.get_by_role("button", name="Make 3 groups").click()
+        card.get_by_role("link", name="3 groups of this recording").click()
+        # With their heading.
+        expect(page.locator(".queue-row")).to_have_count(4)
+        jobs_end(page)
+        rows = page.request.get("/api/v1/groups?dataset=cup").json()["items"]
+        assert [row["key"] for row in rows] == [f"cup final/{n}.png" for n in (0, 40, 60)]
+
+
+class TestPages:
+    def test_they_are_usable_by_everybody_and_fit(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, recording)
+        for path, waited in (
+            (f"/recordings/{recording}", ".film__shot img"),
+            ("/recordings", ".table tbody tr"),
+        ):
+            page.goto(path)
+            page.wait_for_selector(waited)
+            found = {"axe": serious_in_both(page)}
+            for width, height in SIZES:
+                resize(page, width, height)
+                found[f"too wide at {width}"] = soon(page, TOO_WIDE)
+                found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
+                found[f"cut off at {width}"] = soon(page, BEYOND_ITS_FRAME)
+            assert {name: what for name, what in found.items() if what} == {}, path
+
+    def test_their_keys_stand_in_the_help(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        page.keyboard.press("?")
+        expect(page.get_by_role("dialog")).to_contain_text("Split the shot at this frame")
+        expect(page.get_by_role("dialog")).to_contain_text("Play forwards; again: twice as fast")
+
+    def test_a_recording_that_is_gone_says_so(self, open_page: OpenPage, console: Any) -> None:
+        console.expect("404 (Not Found)")
+        page = open_page("/recordings/999")
+        expect(page.get_by_role("alert")).to_contain_text("There is no recording 999")

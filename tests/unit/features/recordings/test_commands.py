@@ -1,0 +1,41 @@
+"""Recordings brought in on the command line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.videos import write_video
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+class TestImportVideo:
+    def test_files_become_recordings_of_a_dataset(self, tmp_path: Path, touchline: Run) -> None:
+        films = [write_video(tmp_path / f"{name}.mp4", "mp4v", 30) for name in ("one", "two")]
+        code, told, _ = touchline("import", "video", *films, "--dataset", "cup", "--json")
+        rows = json.loads(told)
+        assert code == 0
+        assert [(row["id"], row["name"], row["frames"]) for row in rows] == [
+            (1, "one", 30),
+            (2, "two", 30),
+        ]
+        again = json.loads(touchline("import", "video", films[1], "--dataset", "cup", "--json")[1])
+        assert again == rows[1:]
+
+    def test_what_is_no_video_is_refused_before_anything_is_kept(
+        self, tmp_path: Path, touchline: Run
+    ) -> None:
+        notes = tmp_path / "notes.txt"
+        notes.write_text("x")
+        film = write_video(tmp_path / "one.mp4", "mp4v", 30)
+        code, _, complaint = touchline("import", "video", film, notes, "--dataset", "cup")
+        assert (code, "notes.txt is no video" in complaint) == (1, True)
+        assert "cup" not in touchline("datasets", "list")[1]
+
+    def test_options_of_other_formats_are_refused(self, tmp_path: Path, touchline: Run) -> None:
+        film = write_video(tmp_path / "one.mp4", "mp4v", 5)
+        for option in ("--dry-run", "--no-propose", "--flip=2"):
+            assert touchline("import", "video", film, "--dataset", "cup", option)[0] == 2
+        assert touchline("import", "coco", film, film, "--dataset", "cup")[0] == 2

@@ -1,0 +1,248 @@
+"""Recordings over HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from app.db.log import read_log
+from app.features.datasets.service import get_dataset
+from app.features.imports.cameras import ingest_cameras
+from app.features.recordings import service as module
+from app.soccer.frames import ImageSize
+from app.soccer.policy import TOUCHLINE
+from tests.cameras import looking
+from tests.films import Join, KnownShot, join, rendered, write_film
+from tests.unit.features.recordings.conftest import FRAMES
+from tests.videos import HEIGHT, WIDTH, number_of, write_video
+
+API = "/api/v1/recordings"
+Finished = Callable[[Any], Any]
+
+
+def picture_of(answer: Any) -> np.ndarray:
+    """The pixels of an answer."""
+    picture = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    return picture
+
+
+class TestAddRecording:
+    def test_a_file_of_an_allowed_folder_is_indexed_by_a_job(
+        self, app, api, recording: str
+    ) -> None:
+        found = api.get(recording).json()
+        assert (found["dataset"], found["name"], found["indexed"]) == ("cup", "final", True)
+        assert (found["frames"], found["fps"], found["seconds"]) == (FRAMES, 25.0, FRAMES / 25)
+        assert (found["width"], found["height"], found["problem"]) == (WIDTH, HEIGHT, None)
+        assert (found["variable"], found["groups"], found["by"]) == (False, 0, "local")
+        assert get_dataset(app.state.services.store, "cup").policy == TOUCHLINE
+        listed = api.get(API, params={"dataset": "cup"}).json()["items"]
+        assert listed == api.get(API).json()["items"] == [found]
+        assert api.get(API, params={"dataset": "broadcast"}).json()["items"] == []
+
+    def test_the_same_file_again_is_the_same_recording(
+        self, api, recording: str, finished: Finished
+    ) -> None:
+        body = {"dataset": "cup", "source": {"folder": "films/final.mp4"}}
+        shots = api.get(f"{recording}/shots")
+        job = finished(api.post(API, json=body))
+        assert f"{API}/{job.result['recording']}" == recording
+        assert api.get(f"{recording}/shots").headers["etag"] == shots.headers["etag"]
+
+    def test_another_file_of_its_name_gets_a_name_of_its_own(
+        self, api, film: Path, recording: str, finished: Finished
+    ) -> None:
+        (film.parent / "b").mkdir()
+        write_video(film.parent / "b" / "final.mp4", "mp4v", 30)
+        body = {"dataset": "cup", "source": {"folder": "films/b/final.mp4"}}
+        assert finished(api.post(API, json=body)).result["name"] == "final-2"
+
+    def test_a_file_that_is_sent_stays(self, api, film: Path, finished: Finished) -> None:
+        kind = {"content-type": "application/octet-stream"}
+        url = "/api/v1/uploads?name=final.mp4"
+        sent = api.post(url, content=film.read_bytes(), headers=kind).json()
+        body = {"dataset": "cup", "source": {"upload": sent["id"]}}
+        assert finished(api.post(API, json=body)).result["frames"] == FRAMES
+        assert api.get(f"/api/v1/uploads/{sent['id']}").json()["kept"]
+
+    @pytest.mark.parametrize(
+        ("content", "problem"),
+        [(b"", "final.mp4 is empty"), (b"no video at all", "is no video that can be read")],
+    )
+    def test_what_is_no_video_is_one_message(
+        self, api, film: Path, finished: Finished, content: bytes, problem: str
+    ) -> None:
+        film.write_bytes(content)
+        body = {"dataset": "cup", "source": {"folder": "films/final.mp4"}}
+        job = finished(api.post(API, json=body))
+        assert (job.state, problem in job.problem["detail"]) == ("failed", True)
+        (listed,) = api.get(API).json()["items"]
+        assert (listed["indexed"], listed["frames"]) == (False, None)
+        assert api.get(f"{API}/{listed['id']}/frames/0").status_code == 409
+
+    def test_what_has_no_name_of_a_video_is_refused_at_once(self, api, film: Path) -> None:
+        (film.parent / "notes.txt").write_text("x")
+        for inside in ("films/notes.txt", "films"):
+            body = {"dataset": "cup", "source": {"folder": inside}}
+            assert api.post(API, json=body).status_code == 400
+
+
+class TestGetFrame:
+    def test_each_number_is_exactly_its_frame(self, api, recording: str) -> None:
+        for number in (0, 1, 2, 40, 39, 38, 59, 7):
+            answer = api.get(f"{recording}/frames/{number}")
+            assert (answer.status_code, answer.headers["content-type"]) == (200, "image/jpeg")
+            assert number_of(picture_of(answer)) == number
+
+    def test_it_is_made_narrower_and_asked_for_once(self, api, recording: str) -> None:
+        answer = api.get(f"{recording}/frames/5", params={"width": 80})
+        assert picture_of(answer).shape[:2] == (HEIGHT // 2, WIDTH // 2)
+        tag = {"If-None-Match": answer.headers["etag"]}
+        again = api.get(f"{recording}/frames/5", params={"width": 80}, headers=tag)
+        assert (again.status_code, again.content) == (304, b"")
+
+    def test_a_frame_that_is_not_there_is_said_to_be(self, api, recording: str) -> None:
+        answer = api.get(f"{recording}/frames/{FRAMES}")
+        assert (answer.status_code, "has no frame 60" in answer.text) == (404, True)
+
+    def test_of_a_file_that_changed_or_is_gone_nothing_is_shown(
+        self, api, film: Path, recording: str, finished: Finished
+    ) -> None:
+        write_video(film, "mp4v", 30)
+        answer = api.get(f"{recording}/frames/0")
+        assert answer.status_code == 409
+        assert "final.mp4 has changed since it was indexed" in answer.text
+        assert "Index it again" in answer.json()["hint"]
+        assert finished(api.post(f"{recording}/shots")).result["frames"] == 30
+        assert number_of(picture_of(api.get(f"{recording}/frames/29"))) == 29
+        film.unlink()
+        assert "not where it was imported from" in api.get(recording).json()["problem"]
+        assert api.get(f"{recording}/frames/0").status_code == 409
+        assert str(film.parent) not in api.get(f"{recording}/frames/0").text
+
+
+class TestShots:
+    def test_the_list_is_replaced_under_its_etag(self, app, api, recording: str) -> None:
+        answer = api.get(f"{recording}/shots")
+        tag = answer.headers["etag"]
+        first = answer.json()["items"][0]
+        assert (first["first"], first["entered_by"], first["start_s"]) == (0, "start", 0.0)
+        shots = [
+            {"first": 0, "last": 9, "kind": "main", "entered_by": "start", "kept": True},
+            {"first": 12, "last": 59, "kind": "replay", "entered_by": "wipe", "kept": False},
+        ]
+        assert api.put(f"{recording}/shots", json={"shots": shots}).status_code == 428
+        changed = api.put(f"{recording}/shots", json={"shots": shots}, headers={"If-Match": tag})
+        assert changed.status_code == 200
+        assert [{key: one[key] for key in shots[0]} for one in changed.json()["items"]] == shots
+        assert changed.json()["items"][1]["start_s"] == pytest.approx(12 / 25)
+        late = api.put(f"{recording}/shots", json={"shots": []}, headers={"If-Match": tag})
+        assert (late.status_code, late.json()["current"]["items"]) == (412, changed.json()["items"])
+        with app.state.services.store.read() as session:
+            (told,) = [e for e in read_log(session) if e.body.get("did") == "shots changed"]
+        assert (told.actor, told.body["shots"]) == ("local", 2)
+
+    @pytest.mark.parametrize("places", [[(5, 4)], [(0, 60)], [(0, 9), (9, 20)], [(10, 20), (0, 5)]])
+    def test_shots_that_cannot_be_are_refused(
+        self, api, recording: str, places: list[tuple[int, int]]
+    ) -> None:
+        tag = {"If-Match": api.get(f"{recording}/shots").headers["etag"]}
+        shots = [{"first": one, "last": two, "kind": "main"} for one, two in places]
+        answer = api.put(f"{recording}/shots", json={"shots": shots}, headers=tag)
+        assert (answer.status_code, answer.json()["pointer"][:7]) == (400, "/shots/")
+
+    def test_they_are_found_anew(self, api, recording: str, finished: Finished) -> None:
+        tag = {"If-Match": api.get(f"{recording}/shots").headers["etag"]}
+        found = api.get(f"{recording}/shots").json()["items"]
+        api.put(f"{recording}/shots", json={"shots": []}, headers=tag)
+        assert api.get(f"{recording}/shots").json()["items"] == []
+        assert finished(api.post(f"{recording}/shots")).result["shots"] == len(found) > 0
+        assert api.get(f"{recording}/shots").json()["items"] == found
+
+    def test_a_recording_whose_index_is_gone_is_indexed_again_and_keeps_its_shots(
+        self, app, api, recording: str, finished: Finished
+    ) -> None:
+        shots = api.get(f"{recording}/shots").json()
+        for index in app.state.services.settings.recordings.glob("*.npz"):
+            index.write_bytes(b"of another version")
+        module._seconds.cache_clear()
+        assert api.get(f"{recording}/shots").status_code == 409
+        assert finished(api.post(f"{recording}/shots")).state == "done"
+        assert api.get(f"{recording}/shots").json() == shots
+
+    def test_cuts_of_a_film_are_found_when_it_is_added(
+        self, api, film: Path, finished: Finished
+    ) -> None:
+        pictures, known = join([rendered(seed, 30) for seed in (1, 2, 3)], [Join("cut")] * 2)
+        write_film(film.parent / "cuts.mp4", pictures)
+        body = {"dataset": "cup", "source": {"folder": "films/cuts.mp4"}}
+        job = finished(api.post(API, json=body))
+        shots = api.get(f"{API}/{job.result['recording']}/shots").json()["items"]
+        told = [KnownShot(shot["first"], shot["last"], shot["entered_by"]) for shot in shots]
+        assert told == known
+
+
+class TestTakeInstants:
+    def test_frames_become_groups_that_outlive_their_recording(
+        self, app, api, film: Path, recording: str, finished: Finished
+    ) -> None:
+        body = {"frames": [40, 3, 40], "propose": False}
+        job = finished(api.post(f"{recording}/groups", json=body))
+        assert (job.state, job.result["new"], job.result["unchanged"]) == ("done", 2, 0)
+        assert job.result["proposals_job"] is None
+        assert api.get(recording).json()["groups"] == 2
+        again = finished(api.post(f"{recording}/groups", json={"frames": [3]}))
+        assert (again.result["new"], again.result["unchanged"]) == (0, 1)
+        film.unlink()
+        assert api.delete(recording).status_code == 204
+        assert api.get(recording).status_code == 404
+        rows = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"]
+        assert [row["key"] for row in rows] == ["final/3.png", "final/40.png"]
+        group = api.get(f"/api/v1/groups/{rows[1]['id']}").json()
+        picture = picture_of(api.get(f"/api/v1/views/{group['views'][0]['id']}/image"))
+        assert (number_of(picture), picture.shape) == (40, (HEIGHT, WIDTH, 3))
+
+    def test_where_a_group_is_from_goes_out_with_it(
+        self, app, api, recording: str, finished: Finished
+    ) -> None:
+        finished(api.post(f"{recording}/groups", json={"frames": [12], "propose": False}))
+        with app.state.services.store.read() as session:
+            entries = [entry for entry in read_log(session) if entry.kind == "import"]
+        (view,) = entries[-1].body["group"]["views"]
+        told = view["extras"]["metadata"]["recording"]
+        sha256 = api.get(recording).json()["sha256"]
+        assert (told["name"], told["sha256"], told["frame"]) == ("final", sha256, 12)
+        over, under = map(int, told["time_base"].split("/"))
+        assert told["timestamp"] * over / under == pytest.approx(told["seconds"]) == 12 / 25
+
+    def test_cameras_are_proposed_for_them(
+        self, app, api, recording: str, finished: Finished
+    ) -> None:
+        job = finished(api.post(f"{recording}/groups", json={"frames": [0]}))
+        sought = app.state.services.jobs.get(job.result["proposals_job"])
+        assert (sought.kind, sought.dataset) == ("proposals", "cup")
+        assert sought.request["match"] == "final"
+
+    def test_cameras_of_a_track_are_given_to_them(
+        self, app, api, recording: str, finished: Finished
+    ) -> None:
+        finished(api.post(f"{recording}/groups", json={"frames": [3, 40], "propose": False}))
+        store, camera = (
+            app.state.services.store,
+            looking((0, 60, -15), (0, 0, 0), 160, size=ImageSize(WIDTH, HEIGHT)),
+        )
+        found = ingest_cameras(store, "cup", {"40": camera}, source="camera_40.json", actor="ann")
+        assert (found.changed, found.problems) == (1, [])
+        number = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"][1]["id"]
+        (view,) = api.get(f"/api/v1/groups/{number}").json()["views"]
+        assert (view["key"], view["station"]["has_given"]) == ("40.png", True)
+
+    def test_a_frame_that_is_not_there_is_refused(self, api, recording: str) -> None:
+        answer = api.post(f"{recording}/groups", json={"frames": [FRAMES]})
+        assert (answer.status_code, answer.json()["pointer"]) == (400, "/frames")

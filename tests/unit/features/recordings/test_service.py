@@ -1,0 +1,146 @@
+"""Recordings in the database, without a server."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.db.store import Store
+from app.errors import ConflictError, ImageError, InputError, JobCancelled, NotFoundError
+from app.features.datasets.orphan_queries import unread_uploads, unused_frames
+from app.features.imports.upload_queries import UploadWriter, keep_upload, upload_path
+from app.features.jobs.service import Jobs
+from app.features.recordings import jobs as module
+from app.features.recordings import service
+from app.features.recordings.jobs import request_index, request_instants, resume_recordings
+from app.features.recordings.service import (
+    Recording,
+    Shot,
+    add_recording,
+    get_recording,
+    get_shots,
+    index_now,
+    put_shots,
+    remove_recording,
+    require_video,
+)
+from tests.unit.features.jobs.steps import stopped_at_its_first_step
+from tests.videos import write_video
+from tests.waiting import SECONDS
+
+
+@pytest.fixture
+def film(tmp_path: Path) -> Path:
+    return write_video(tmp_path / "final.mp4", "mp4v", 60)
+
+
+def indexed(store: Store, film: Path) -> Recording:
+    recording = add_recording(store, "cup", film, actor="ann")
+    return index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+
+
+class TestIndexNow:
+    def test_shots_of_people_stay_unless_the_file_is_another(
+        self, store: Store, film: Path
+    ) -> None:
+        recording = indexed(store, film)
+        mine = [Shot(0, 9, "main", "start", True)]
+        put_shots(store, recording.id, mine, None, actor="ann")
+        indexed(store, film)
+        assert list(get_shots(store, recording.id).items) == mine
+        write_video(film, "mp4v", 30)
+        assert indexed(store, film).id == recording.id
+        assert list(get_shots(store, recording.id).items) != mine
+
+    def test_it_ends_when_its_job_is_cancelled_and_keeps_nothing(
+        self, store: Store, film: Path
+    ) -> None:
+        def cancelled() -> None:
+            raise JobCancelled
+
+        recording = add_recording(store, "cup", film, actor="ann")
+        with pytest.raises(JobCancelled):
+            index_now(store, recording.id, progress=lambda *_: None, stop=cancelled)
+        assert not get_recording(store, recording.id).indexed
+
+    def test_a_file_that_changes_meanwhile_is_refused(
+        self, store: Store, film: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        plain = service._in_worker
+
+        def slowly(path: Path, *rest: Any, **more: Any) -> Any:
+            found = plain(path, *rest, **more)
+            path.touch()
+            return found
+
+        monkeypatch.setattr(service, "_in_worker", slowly)
+        with pytest.raises(ImageError, match="changed while it was read"):
+            indexed(store, film)
+
+    def test_a_part_of_a_file_is_said_to_be_one(self, store: Store, film: Path) -> None:
+        film.write_bytes(film.read_bytes()[:-100])
+        with pytest.raises(ImageError, match=r"final\.mp4"):
+            indexed(store, film)
+        recording = add_recording(store, "cup", film, actor="ann")
+        with pytest.raises(ConflictError, match="not indexed yet"):
+            recording.require_readable()
+        film.unlink()
+        with pytest.raises(NotFoundError, match="not where it was imported from"):
+            indexed(store, film)
+
+    def test_a_link_is_not_followed(self, store: Store, film: Path, tmp_path: Path) -> None:
+        (tmp_path / "link.mp4").symlink_to(film)
+        with pytest.raises(NotFoundError):
+            indexed(store, tmp_path / "link.mp4")
+
+
+class TestRequireVideo:
+    @pytest.mark.parametrize("name", ["notes.txt", "films", "film.zip"])
+    def test_what_is_no_file_of_a_video_is_refused(self, tmp_path: Path, name: str) -> None:
+        (tmp_path / "films").mkdir()
+        (tmp_path / "notes.txt").write_text("x")
+        with pytest.raises(InputError, match="is no video"):
+            require_video(tmp_path / name)
+
+
+class TestUnused:
+    def test_what_no_recording_and_no_group_uses_is_named(self, store: Store, film: Path) -> None:
+        recording = indexed(store, film)
+        index = f"{recording.sha256}.npz"
+        with store.read() as session:
+            assert index not in unused_frames(session, store.settings)
+        remove_recording(store, recording.id, actor="ann")
+        with store.read() as session:
+            assert index in unused_frames(session, store.settings)
+
+    def test_the_upload_of_a_recording_is_read(self, store: Store, film: Path) -> None:
+        writer = UploadWriter(store.settings, film.name)
+        writer.write(film.read_bytes())
+        upload = writer.finish()
+        keep_upload(store.settings, upload.id)
+        with store.read() as session:
+            assert upload.id in unread_uploads(session, store.settings)
+        add_recording(store, "cup", upload_path(store.settings, upload.id), actor="ann")
+        with store.read() as session:
+            assert upload.id not in unread_uploads(session, store.settings)
+
+
+class TestJobs:
+    def test_a_server_that_stops_leaves_them_to_the_next_one(
+        self, store: Store, film: Path
+    ) -> None:
+        # So long that it tells how far it is.
+        write_video(film, "mp4v", 120)
+        recording = add_recording(store, "cup", film, actor="ann")
+        first = Jobs(store)
+        with stopped_at_its_first_step(module, "index_now", first):
+            number = request_index(first, store, recording, actor="ann").id
+        with closing(Jobs(store)) as second:
+            resume_recordings(second, store)
+            second.start()
+            assert second.wait(number, SECONDS).state == "done"
+            job = request_instants(second, store, recording.id, [1, 2], False, actor="ann")
+            assert second.wait(job.id, SECONDS).result["new"] == 2
