@@ -27,6 +27,7 @@ BROAD = (
     "tests/integration/test_openapi.py::TestOperations",
     "tests/integration/test_torture.py",
     "tests/integration/test_web_processes.py::TestMetrics",
+    "tests/real/test_shots.py",
     "tests/unit/db/test_migrate.py::TestOldHomes",
     "tests/unit/features/integrity/test_upgrades.py",
     "tests/unit/http/test_web_processes.py::TestServeWith",

@@ -46,10 +46,10 @@ GRID = (6, 4)
 ANGLE_SIGMA = np.radians(4.0)
 """By which a camera changes from frame to frame beside what the background says."""
 FOCAL_SIGMA, KAPPA_SIGMA = 0.05, 0.001
-LEAST_SUPPORTED, LEAST_OF_USUAL, LEAST_WEAKEST = 0.30, 0.6, 0.15
+LEAST_SUPPORTED, LEAST_OF_USUAL, LEAST_WEAKEST = 0.30, 0.6, 0.25
 """A camera has this share of its markings on paint, of what frames before had, and of each marking."""
 MOST_ERROR_PX = 0.6
-PATCHY_WEAKEST, PATCHY_OF_USUAL, PATCHY_PX, RATHER = 0.5, 0.9, 0.3, 1.03
+PATCHY_WEAKEST, PATCHY_OF_USUAL, PATCHY_PX, RATHER = 0.5, 0.9, 0.3, 1.1
 """Where less has paint another camera is looked for, and how much better that has to agree."""
 SAID_ONCE = 4.0
 """How many places on the grass the background tells."""
@@ -116,8 +116,8 @@ class Reach:
 
 
 REACHES = (
-    Reach((6.0, 4.0, 3.0, 3.0), 0.3, 0.03, np.radians(0.02), 3.0),
-    Reach((14.0, 10.0, 7.0, 5.0, 4.0, 3.0, 3.0), 4.0, 1.0, np.radians(0.1), 10.0),
+    Reach((6.0, 4.0, 3.0, 3.0), 0.6, 0.07, np.radians(0.02), 3.0),
+    Reach((14.0, 10.0, 7.0, 5.0, 4.0, 3.0, 3.0), 4.0, 1.0, np.radians(0.03), 10.0),
 )
 
 
@@ -259,7 +259,7 @@ class Follower:
                 weakest = weakest_marking(picture.reading, snapped, self.pitch)
             most = reach.most_moved_px * unit * float(np.sqrt(1 + self.age))
             why = self._why_not(snapped, seen, weakest, unit, most)
-            score = seen.product * (1.0 if why is None else 0.5)
+            score = seen.product * (1.0 if why is None else 0.5) * min(1.0, 0.5 + weakest)
             if score > best_score * (1.0 if best is None else RATHER):
                 outcome = TRACKED if why is None else BRIDGED
                 best_score, told = score, why

@@ -15,12 +15,14 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.paint.propose import propose
+from app.paint.snap import WINDOWS, snap_reading
+from app.soccer.paint_evidence import NO_PAINT
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.clip import Clip
 from app.tracking.follow import BRIDGED, LOST, MOST_BRIDGED, TRACKED, Follower, TrackedFrame
 from app.tracking.motion import BackgroundMatches, match_background, rotate_camera
-from app.tracking.picture import Picture, read_frames
+from app.tracking.picture import Picture, read_frame, read_frames
 
 TRIALS, ASKED = 2, 4
 """Likely cameras that are followed where none is certain, and frames in which each is asked for again."""
@@ -30,6 +32,10 @@ CHUNK = 32
 """Frames in memory while a clip is followed backwards."""
 TIED_PX, TIED_PX_A_FRAME, FARTHEST_M = 4.0, 0.3, 150.0
 """At 960 wide: how far the ends of a bridge may lie from each other."""
+
+SAME_STAND_M = 3.0
+"""Two searches for one tripod agree within so much: no pitch is quite the plan."""
+UNTIED = "the background does not tie it to a frame whose camera is known"
 
 Tell = Callable[[int], None]
 
@@ -98,6 +104,7 @@ def _follow_both_ways(
         if end < len(shot.frames):
             _follow_back(clip, shot, start, end, pitch, policy)
     _bridge(shot.frames, shot.matches)
+    _drop_unconfirmed(clip, shot.frames, pitch, policy)
     return shot, follower
 
 
@@ -205,8 +212,51 @@ def _bridge(frames: list[TrackedFrame], matches: Sequence[BackgroundMatches | No
             if tied:
                 camera = frame.camera or cameras[number - start]
                 frames[number] = replace(frame, outcome=BRIDGED, camera=camera)
-            elif inner or frame.age > MOST_BRIDGED // 4:
+            elif inner or frame.reason != NO_PAINT or frame.age > MOST_BRIDGED // 4:
                 frames[number] = replace(frame, outcome=LOST, camera=None, snapped=None)
+
+
+def _drop_unconfirmed(
+    clip: Clip, frames: list[TrackedFrame], pitch: Pitch, policy: CalibrationPolicy
+) -> None:
+    """Take the cameras of runs that tie to no key frame, unless their own paint says the same."""
+    keys = [frame.camera for frame in frames if frame.is_key and frame.camera is not None]
+    held = [frame.outcome != LOST for frame in frames]
+    edges = np.flatnonzero(np.diff([False, *held, False]))
+    for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        run = frames[start:end]
+        if any(frame.is_key for frame in run):
+            continue
+        asked = [frame for frame in run if frame.outcome == TRACKED]
+        for frame in asked[len(asked) // (2 * ASKED) :: max(len(asked) // ASKED, 1)]:
+            if _stands_there(clip, frame, keys, pitch, policy):
+                frames[frame.number] = replace(frame, is_key=True)
+                break
+        else:
+            for number in range(start, end):
+                frames[number] = replace(
+                    frames[number], outcome=LOST, camera=None, snapped=None, reason=UNTIED
+                )
+
+
+def _stands_there(
+    clip: Clip,
+    frame: TrackedFrame,
+    keys: Sequence[Camera],
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+) -> bool:
+    """Whether the paint of a frame alone puts its camera where those of key frames stand."""
+    if frame.camera is None:
+        return False
+    picture = read_frame(next(clip.frames(frame.number, frame.number + 1)))
+    snapped = snap_reading(
+        picture.reading, frame.camera, pitch, WINDOWS, policy, circles_count_twice=True
+    )
+    if snapped.reason is not None or not _shows_the_same(snapped.camera, frame.camera, 0):
+        return False
+    away = [float(np.linalg.norm(snapped.camera.position - key.position)) for key in keys]
+    return min(away, default=np.inf) < SAME_STAND_M
 
 
 def _carried(

@@ -33,6 +33,7 @@ from tests.bench.requests import bench_requests
 from tests.bench.rigs import bench_rigs
 from tests.bench.shipped import bench_shipped
 from tests.bench.shots import bench_shots
+from tests.bench.track import bench_track
 from tests.bench.truth import bench_truth
 
 REAL_DATA = Path(
@@ -67,6 +68,7 @@ def main() -> None:
     bench_clips(REAL_DATA)
     bench_propose(REAL_DATA)
     bench_shots(REAL_DATA)
+    bench_track(REAL_DATA)
     bench_link(REAL_DATA)
     bench_requests()
     bench_listeners()

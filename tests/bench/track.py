@@ -11,9 +11,10 @@ import json
 import os
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.stats import chi2
@@ -31,26 +32,38 @@ from app.tracking.clip import Clip
 from app.tracking.picture import read_frames
 from app.tracking.track import FrameCamera, track_clip
 from tests.bench.table import print_table
+from tests.tripod_films import render_film
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 MEETS = float(chi2.ppf(0.95, 3))
 NEAR = 0.005
 PAIRS_EVERY = 5
+RENDERED = 24
 HEADER = (
     "clip", "annotated", "frames", "tracked %", "bridged", "lost", "paint px", "p95", "clicked met",
     "sigma m", "pairs meet %", "frames/s", "cpu ms", "x decoding",
 )  # fmt: skip
 
 
-def bench_track(clips: list[Path], lines: Path) -> None:
-    """Print the table: each clip with no annotated frame, and with one of each."""
+def bench_track(data: Path, names: Sequence[str] = ()) -> None:
+    """Print the table: each real clip with no annotated frame, and with one of each; without them a rendered film."""
+    folder = data / "broadcast"
+    files = [
+        *sorted((folder / "clips").glob("*.mp4")),
+        *sorted((data / "replays").glob("*_clip_0.mp4")),
+    ]
     rows = []
-    for file in clips:
-        known = clicked(Clip.open(file), file.stem, lines)
+    for file in files:
+        if names and file.stem not in names:
+            continue
+        known = clicked(Clip.open(file), file.stem, folder / "lines")
         middle = sorted(known)[len(known) // 2 : len(known) // 2 + 1]
         for chosen in ([], middle) if middle else ([],):
             rows.append(measure(file, known, chosen))
-    print_table("Cameras over time on real clips", HEADER, rows)
+    if not files:
+        with TemporaryDirectory() as place:
+            rows.append(measure(render_film(RENDERED).write(Path(place)), {}, []))
+    print_table("Cameras over time", HEADER, rows)
 
 
 def measure(file: Path, known: Mapping[int, Lines], chosen: list[int]) -> list[object]:
@@ -70,9 +83,10 @@ def measure(file: Path, known: Mapping[int, Lines], chosen: list[int]) -> list[o
     return [
         file.stem, ",".join(map(str, chosen)) or "none", count,
         f"{100 * outcomes.count('tracked') / count:.1f}", outcomes.count("bridged"),
-        outcomes.count("lost"), float(np.median(paint)), float(np.percentile(paint, 95)),
+        outcomes.count("lost"), *(np.percentile(paint, [50, 95]).tolist() if paint else [None, None]),
         f"{np.mean(met):.2f} of {len(met)}" if met else None,
-        float(np.median([sigma_m(frame) for frame in tracked])), 100 * float(np.mean(pairs)),
+        float(np.median([sigma_m(frame) for frame in tracked])) if tracked else None,
+        100 * float(np.mean(pairs)) if pairs else None,
         f"{count / wall:.0f}", f"{1000 * cpu / count:.0f}", f"{cpu / decoding:.1f}",
     ]  # fmt: skip
 
@@ -139,9 +153,4 @@ def meet(one: FrameCamera, other: FrameCamera) -> bool:
 
 
 if __name__ == "__main__":
-    folder = DATA / "broadcast" / "clips"
-    files = [*sorted(folder.glob("*.mp4")), *sorted((DATA / "replays").glob("*_clip_0.mp4"))]
-    names = sys.argv[1:]
-    bench_track(
-        [file for file in files if not names or file.stem in names], DATA / "broadcast" / "lines"
-    )
+    bench_track(DATA, sys.argv[1:])

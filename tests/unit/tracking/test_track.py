@@ -14,7 +14,7 @@ from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.jaccard import project_markings
 from app.tracking.track import FrameCamera, track_clip
-from tests.unit.tracking.conftest import Film
+from tests.tripod_films import Film
 
 
 def outcomes(found: list[FrameCamera]) -> list[str]:
