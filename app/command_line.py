@@ -42,7 +42,7 @@ from app.features.versions import commands as versions
 from app.finite import quoted
 from app.terminal.options import act_as
 from app.terminal.server import work_at
-from app.terminal.terminal import complain, harmless, spell_out
+from app.terminal.terminal import allow_any_text, escape_controls, print_error
 from app.workers import commands as cluster
 
 READER_GONE = 141
@@ -63,7 +63,7 @@ class _Commands(typer.core.TyperGroup):
             return super().invoke(ctx)
         except typer.BadParameter as error:
             # What its parser of choices raised, without the words that tell it from other errors.
-            error.message = harmless(error.message.removeprefix("Value error, "))
+            error.message = escape_controls(error.message.removeprefix("Value error, "))
             raise
 
 
@@ -104,8 +104,8 @@ app.add_typer(policy.commands, name="policy")
 app.add_typer(users.commands, name="users")
 
 
-def _tell_version(asked: bool) -> None:
-    if asked:
+def _print_version(wanted: bool) -> None:
+    if wanted:
         from app.formats.manifest import SOFTWARE, software_version
 
         typer.echo(f"{SOFTWARE} {software_version()}")
@@ -141,7 +141,7 @@ def options(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", help="Tell the version and end.", callback=_tell_version, is_eager=True
+            "--version", help="Tell the version and end.", callback=_print_version, is_eager=True
         ),
     ] = False,
 ) -> None:
@@ -156,7 +156,7 @@ def options(
 
 def run() -> None:
     """Carry out a command line: what a caller can cause is one sentence on stderr and exit code 1."""
-    spell_out()
+    allow_any_text()
     gc.set_threshold(YOUNG)
     try:
         app()
@@ -167,31 +167,31 @@ def run() -> None:
         raise
     except ReviewError as error:
         near = error.nearest() if isinstance(error, NotFoundError) else None
-        complain(error.message, error.hint or near)
+        print_error(error.message, error.hint or near)
         sys.exit(1)
     except OSError as error:
         if error.filename is None:
             raise
         name = quoted(str(error.filename), SHOWN)
         if isinstance(error, PermissionError):
-            complain(
+            print_error(
                 f"this user may not look at {name}",
                 "Give this user access (chmod, chown), or run the command as another user.",
             )
         else:
-            complain(f"{name} cannot be used: {error.strerror}")
+            print_error(f"{name} cannot be used: {error.strerror}")
         sys.exit(1)
     except UnicodeEncodeError as error:
         # What stands for bytes of the command line that are no UTF-8.
         if "surrogates" not in error.reason:
             raise
-        complain(f"{quoted(error.object, SHOWN)} has letters that are no text in UTF-8")
+        print_error(f"{quoted(error.object, SHOWN)} has letters that are no text in UTF-8")
         sys.exit(1)
     except RuntimeError as error:
         # numba's words when it finds no folder to write to; it has no class of its own for them.
         if "cannot cache function" not in str(error):
             raise
-        complain(
+        print_error(
             "this user can write neither to the installation nor to a cache of its own, where the"
             " compiled solver is kept",
             "Point NUMBA_CACHE_DIR at a folder that this user alone can write.",

@@ -210,16 +210,16 @@ def read_mail_server(settings: Settings) -> MailServer | None:
     )
 
 
-def checked_address(said: str, *, pointer: str | None = None) -> str:
+def checked_address(text: str, *, pointer: str | None = None) -> str:
     """A mail address of one mailbox, in ASCII, without a name beside it.
 
     Raises:
         InputError: It cannot be one.
     """
-    address = said.strip()
+    address = text.strip()
     if len(address) > LONGEST_ADDRESS or not _ADDRESS.fullmatch(address):
         raise InputError(
-            f"{quoted(said)} is no mail address",
+            f"{quoted(text)} is no mail address",
             hint="Write it as anna@example.org, in plain letters, without a name or brackets.",
             pointer=pointer,
         )
@@ -242,7 +242,7 @@ def _refused(code: int, text: bytes | str) -> str:
     return f"the mail server refuses the letter ({code}: {_text(text)})"
 
 
-def _text(said: bytes | str) -> str:
+def _text(response: bytes | str) -> str:
     """What a mail server answered, short and in one line."""
-    text = said.decode("utf-8", "replace") if isinstance(said, bytes) else said
+    text = response.decode("utf-8", "replace") if isinstance(response, bytes) else response
     return "".join(c if c.isprintable() else " " for c in text)[:200]

@@ -59,7 +59,7 @@ from app.http.metrics import SharedNumbers, install_metrics
 from app.http.openapi import describe
 from app.http.origin import KnownHosts, SameOrigin
 from app.http.pages import install_pages
-from app.http.request_limits import THREADS, Doors
+from app.http.request_limits import THREADS, ClassLimiters
 from app.http.request_log import RequestLog
 from app.http.requests import HeadAsGet, OneLength, OneRange
 from app.http.route import Gate, Route, nothing_here, require_permissions
@@ -109,7 +109,7 @@ ROUTERS = (
     saved_views.router,
     queue.query_fields_router,
     queue.statistics_router,
-    independent_annotations.takes_router,
+    independent_annotations.annotations_router,
     practice.router,
     people_sign_on.router,
     people_login.passkeys_router,
@@ -159,7 +159,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     app.state.gate = Gate(
         None if team is None else Access(team, services.store),
         Idempotency(),
-        Doors(shared, settings.solves_apart),
+        ClassLimiters(shared, settings.solves_apart),
         min(MAX_JSON_BYTES, settings.max_upload_bytes),
     )
     install_handlers(app)

@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 Item = TypeVar("Item")
 
 
-class TellProgress(Protocol):
+class ReportProgress(Protocol):
     """Called every now and then with how much is done.
 
     It may raise (``errors.JobCancelled``) to end the work there.
@@ -24,9 +24,9 @@ class TellProgress(Protocol):
         """
 
 
-def telling(
-    progress: TellProgress, sentence: str, *, start: int = 0, total: int | None = None
-) -> TellProgress:
+def partial_progress(
+    progress: ReportProgress, sentence: str, *, start: int = 0, total: int | None = None
+) -> ReportProgress:
     """A progress for one part of some work: its counts go on from ``start``, under a sentence.
 
     Args:
@@ -43,7 +43,7 @@ def telling(
 
 
 def told(
-    items: Iterable[Item], total: int, progress: TellProgress | None, sentence: str
+    items: Iterable[Item], total: int, progress: ReportProgress | None, sentence: str
 ) -> Iterator[Item]:
     """The same items, each of which is told as it comes.
 

@@ -205,7 +205,7 @@ class WorkerPool:
             self._tasks.discard(task)
 
 
-class WarmWorker(WorkerPool):
+class ReadyWorker(WorkerPool):
     """One worker that is asked only once it is ready; until then the server does the work itself.
 
     Args:
@@ -236,10 +236,10 @@ class WarmWorker(WorkerPool):
             self.is_ready = self._begun = False
         if not self._begun:
             self._begun = True
-            self.submit(*self._prepare, bounded=False).future.add_done_callback(self._note)
+            self.submit(*self._prepare, bounded=False).future.add_done_callback(self._on_prepared)
         return self.is_ready
 
-    def _note(self, prepared: Future[None]) -> None:
+    def _on_prepared(self, prepared: Future[None]) -> None:
         if prepared.cancelled():
             return
         error = prepared.exception()
@@ -248,7 +248,7 @@ class WarmWorker(WorkerPool):
             log.warning(f"there is no process for {self._what}", error=str(error))
 
 
-def least_busy(workers: Sequence[WarmWorker]) -> WarmWorker | None:
+def least_busy(workers: Sequence[ReadyWorker]) -> ReadyWorker | None:
     """The ready worker that has fewest tasks; the workers are started one after the other."""
-    ready = list(takewhile(WarmWorker.begin, workers))
+    ready = list(takewhile(ReadyWorker.begin, workers))
     return min(ready, key=lambda worker: worker.tasks, default=None)

@@ -13,11 +13,11 @@ import { draft } from './state/group.js';
 import { startInsight } from './state/insight.js';
 import { startLeases } from './state/leases.js';
 import { startLive } from './state/live.js';
-import { askWhoIsThere, isTeam, me, startRights } from './state/me.js';
+import { loadSession, isTeam, me, startRights } from './state/me.js';
 import { startMaintenance } from './state/maintenance.js';
-import { startMends } from './state/mends.js';
+import { startSuggestions } from './state/suggestions.js';
 import { lasting, outbox } from './state/outbox.js';
-import { startBell } from './state/bell.js';
+import { startNotifications } from './state/notifications.js';
 import { startThreads } from './state/threads.js';
 import { startSending } from './state/sending.js';
 import { refuses } from './state/rights.js';
@@ -35,10 +35,10 @@ function startWork() {
 	startLeases();
 	startSending();
 	startInsight();
-	startMends();
+	startSuggestions();
 	startLive();
 	startThreads();
-	startBell();
+	startNotifications();
 	startRights();
 	startMaintenance();
 }
@@ -47,7 +47,7 @@ startRouter();
 startKeys((needs) => refuses(needs, datasetHere()));
 startNeeds();
 if (isTeam) {
-	beginsAt((await askWhoIsThere())?.moment);
+	beginsAt((await loadSession())?.moment);
 	let begun = false;
 	effect(() => {
 		if (!me.value || me.value.enrol || begun) return;

@@ -36,7 +36,7 @@ _GONE = {
 
 
 @dataclass
-class Door:
+class ClassLimiter:
     """What stands before the server.
 
     Attributes:
@@ -65,7 +65,7 @@ class Door:
 
 
 @contextmanager
-def moto_server(*more: str) -> Iterator[Door]:
+def moto_server(*more: str) -> Iterator[ClassLimiter]:
     """A server with an empty bucket ``soccer-data``, and ``more``, behind a door."""
     if not (MOTO / "ready").is_file():
         pytest.fail("The S3 server of the tests is missing: run 'make moto'.", pytrace=False)
@@ -86,7 +86,7 @@ def moto_server(*more: str) -> Iterator[Door]:
         process.wait()
 
 
-def store_settings(door: Door, **more: object) -> StoreSettings:
+def store_settings(door: ClassLimiter, **more: object) -> StoreSettings:
     """The store ``soccer-data/frames`` behind a door, that gives up within seconds."""
     values: dict[str, object] = {
         "url": "s3://soccer-data/frames",
@@ -99,7 +99,7 @@ def store_settings(door: Door, **more: object) -> StoreSettings:
     return StoreSettings.model_validate({**values, **more})
 
 
-def stored_settings(home: Path, door: Door, **more: object) -> Settings:
+def stored_settings(home: Path, door: ClassLimiter, **more: object) -> Settings:
     """Settings of a home that has the store ``frames``."""
     return Settings(home=home, stores={"frames": store_settings(door, **more)})
 
@@ -133,10 +133,10 @@ def _make_bucket(port: int, name: str) -> None:
 
 
 @contextmanager
-def _door(behind: int) -> Iterator[Door]:
+def _door(behind: int) -> Iterator[ClassLimiter]:
     server = ThreadingHTTPServer(("127.0.0.1", 0), _Passing)
     server.daemon_threads = True
-    door = Door(server.server_address[1])
+    door = ClassLimiter(server.server_address[1])
     server.door, server.behind = door, behind  # type: ignore[attr-defined]
     thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
     thread.start()
@@ -161,7 +161,7 @@ class _Passing(BaseHTTPRequestHandler):
             super().handle_one_request()
 
     def _pass(self) -> None:
-        door: Door = self.server.door  # type: ignore[attr-defined]
+        door: ClassLimiter = self.server.door  # type: ignore[attr-defined]
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
         door.asked.append(f"{self.command} {self.path}")
         mode = door.mode
@@ -187,7 +187,7 @@ class _Passing(BaseHTTPRequestHandler):
         if self.command != "HEAD":
             self.wfile.write(text)
 
-    def _forward(self, door: Door, body: bytes, *, cut: bool) -> None:
+    def _forward(self, door: ClassLimiter, body: bytes, *, cut: bool) -> None:
         line = http.client.HTTPConnection("127.0.0.1", self.server.behind, timeout=SECONDS)  # type: ignore[attr-defined]
         dropped = ("host", "if-match") if door.mode == "unconditional" else ("host",)
         headers = {n: value for n, value in self.headers.items() if n.lower() not in dropped}

@@ -43,35 +43,35 @@ def compared(name: str, whole: str, apart: Sequence[str], wrong: str, mend: str)
     return Check(name, False, f"{len(apart):,} {wrong}: {shown}", mend)
 
 
-def spelt(key: object) -> str:
+def record_name(key: object) -> str:
     """What a record is called: its key, or the parts of it."""
     if isinstance(key, tuple):
         return " ".join(str(part) for part in key if part is not None)
     return str(key)
 
 
-def _equal(said: Any, present: Any) -> bool:
+def _equal(logged: Any, present: Any) -> bool:
     """Whether two values are the same, but for U+0000, which is read from the log as U+FFFD."""
-    return bool(said == present) or repr(said) == repr(present).replace(r"\x00", "\ufffd")
+    return bool(logged == present) or repr(logged) == repr(present).replace(r"\x00", "\ufffd")
 
 
-def as_logged(
-    name: str, said: Any, present: Any, mend: str, call: Callable[[Any], str] = spelt
+def compare_with_log(
+    name: str, logged: Any, present: Any, advice: str, call: Callable[[Any], str] = record_name
 ) -> Check:
     """What came of comparing a table with what the log says of it.
 
     Args:
         name: What was looked at.
-        said: By the log: values by key, or a set.
+        logged: By the log: values by key, or a set.
         present: The same as it is.
-        mend: What to do where they are not the same.
+        advice: What to do where they are not the same.
         call: What a key is called.
     """
-    if isinstance(said, Mapping):
-        keys = sorted(said.keys() | present)
-        names = [call(key) for key in keys if not _equal(said.get(key), present.get(key))]
+    if isinstance(logged, Mapping):
+        keys = sorted(logged.keys() | present)
+        names = [call(key) for key in keys if not _equal(logged.get(key), present.get(key))]
     else:
         # Parts of what is in a set may be missing, and missing parts have no order.
-        names = sorted(map(call, said ^ present))
+        names = sorted(map(call, logged ^ present))
     whole = f"{len(present):,}, as the log says"
-    return compared(name, whole, names, "not as the log says", mend)
+    return compared(name, whole, names, "not as the log says", advice)

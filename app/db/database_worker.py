@@ -20,7 +20,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import DamagedError, JobCancelled, ReviewError
 from app.log import log_to_stderr
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.worker_process import COUNTS, WorkerLimits, WorkerProcess
 
 SILENCE = 900.0
@@ -44,7 +44,7 @@ def no_answer(_question: Any) -> None:
 
 
 class Caller:
-    """The server, as the work sees it; it is a ``TellProgress`` and a context that is a turn to write."""
+    """The server, as the work sees it; it is a ``ReportProgress`` and a context that is a turn to write."""
 
     def __init__(self, send: Callable[[Message], Answer]):
         self._send = send
@@ -97,7 +97,7 @@ def run_in_worker(
     work: Callable[..., Result],
     *arguments: Any,
     limits: WorkerLimits = NO_LIMIT,
-    progress: TellProgress,
+    progress: ReportProgress,
     stop: Callable[[], None],
     answer: Callable[[Any], Any] = no_answer,
 ) -> Result:
@@ -129,7 +129,7 @@ def run_in_worker(
                     turn.enter_context(store.turn)
                 elif kind == "written":
                     turn.close()
-                    store.tell_listeners()
+                    store.notify_listeners()
                 elif kind == "step":
                     progress(*value)
                 else:
@@ -152,7 +152,7 @@ def run_here(
     store: Store,
     work: Callable[..., Result],
     *arguments: Any,
-    progress: TellProgress,
+    progress: ReportProgress,
     answer: Callable[[Any], Any] = no_answer,
 ) -> Result:
     """The same in this thread, for work that is done before a process would have started."""

@@ -23,7 +23,7 @@ class AttemptModel(Base):
     at: Mapped[float]
 
 
-class BegunModel(Base):
+class PendingActionModel(Base):
     """What somebody has begun and finishes within minutes, maybe at another process.
 
     ``name`` is a hash, ``value`` is encrypted with a key of the home.
@@ -39,14 +39,14 @@ class BegunModel(Base):
 
 KEPT_SECONDS = 3600.0
 """No limit looks back further."""
-_BEGUN = cast(Table, BegunModel.__table__)
+_BEGUN = cast(Table, PendingActionModel.__table__)
 
 
 def oldest_attempt(session: Session, whose: str, since: float, most: int) -> float | None:
     """When the oldest try since a time was (both: seconds since 1970), where there are too many."""
     mine = (AttemptModel.whose == whose, AttemptModel.at > since)
-    asked = select(func.count(), func.min(AttemptModel.at)).where(*mine)
-    count, oldest = session.execute(asked).one()
+    statement = select(func.count(), func.min(AttemptModel.at)).where(*mine)
+    count, oldest = session.execute(statement).one()
     return float(oldest) if count >= most else None
 
 
@@ -66,18 +66,24 @@ def put_begun(session: Session, name: str, value: bytes, ends: str, at: str, mos
         ends: Until when it is good, and ``at``, what time it is, as ISO text in UTC.
         most: So many are kept; beyond it the oldest makes room.
     """
-    session.execute(delete(BegunModel).where(BegunModel.ends <= at))
-    count = session.scalar(select(func.count()).select_from(BegunModel)) or 0
+    session.execute(delete(PendingActionModel).where(PendingActionModel.ends <= at))
+    count = session.scalar(select(func.count()).select_from(PendingActionModel)) or 0
     if count >= most:
-        oldest = select(BegunModel.name).order_by(BegunModel.ends).limit(count - most + 1)
-        session.execute(delete(BegunModel).where(BegunModel.name.in_(oldest)))
+        oldest = (
+            select(PendingActionModel.name)
+            .order_by(PendingActionModel.ends)
+            .limit(count - most + 1)
+        )
+        session.execute(delete(PendingActionModel).where(PendingActionModel.name.in_(oldest)))
     new = insert_or_update(_BEGUN).values(name=name, value=value, ends=ends)
     same = {"value": new.excluded.value, "ends": new.excluded.ends}
     session.execute(new.on_conflict_do_update(index_elements=[_BEGUN.c.name], set_=same))
 
 
-def take_begun(session: Session, name: str, at: str) -> bytes | None:
+def take_pending(session: Session, name: str, at: str) -> bytes | None:
     """What was begun under a name, which is gone then; None where nothing is that is good."""
-    gone = delete(BegunModel).where(BegunModel.name == name)
-    row = session.execute(gone.returning(BegunModel.value, BegunModel.ends)).one_or_none()
+    gone = delete(PendingActionModel).where(PendingActionModel.name == name)
+    row = session.execute(
+        gone.returning(PendingActionModel.value, PendingActionModel.ends)
+    ).one_or_none()
     return None if row is None or row.ends <= at else bytes(row.value)

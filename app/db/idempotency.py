@@ -152,7 +152,7 @@ def find_stored(
     Raises:
         BusyError: There was something to wait for.
     """
-    with store.peek() if at_once else store.glance() as session:
+    with store.read_without_waiting() if at_once else store.read_one() as session:
         return find_response(session, key, actor)
 
 
@@ -162,12 +162,12 @@ def claim(store: Store, key: str, actor: str) -> bool:
     Raises:
         StorageError: The database cannot be asked.
     """
-    return store.sharing.take(_claim(key, actor))
+    return store.sharing.claim(_claim(key, actor))
 
 
 def end_claim(store: Store, key: str, actor: str) -> None:
     """Let others respond under it: what they find is stored by now."""
-    store.sharing.give_back(_claim(key, actor))
+    store.sharing.release(_claim(key, actor))
 
 
 def _claim(key: str, actor: str) -> str:

@@ -15,7 +15,7 @@ from app.errors import BusyError, StorageError
 
 AGAIN_S = 0.005
 """Between two looks whether a lock is free."""
-TOLD_S = 0.1
+NOTICE_SECONDS = 0.1
 """Between two words that somebody still waits."""
 OPENING_SECONDS = 60.0
 """So long who opens the database waits for another process that does, and may be migrating it."""
@@ -133,7 +133,7 @@ def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[N
     """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
     handle = _open(make_home(settings) / PRACTICE_LOCK)
     try:
-        while not lock_within(handle, TOLD_S):
+        while not lock_within(handle, NOTICE_SECONDS):
             waiting()
         yield
     finally:

@@ -151,8 +151,8 @@ def group_steps(session: Session, group_ids: Sequence[int], kinds: Iterable[str]
 
 def newest_steps(session: Session, group_id: int, kinds: Iterable[str], most: int) -> Sequence[Any]:
     """Rows (id, kind) of the newest entries of some kinds about a group, the newest first."""
-    asked = {"group": group_id, "kinds": list(kinds), "most": most}
-    return session.execute(_NEWEST_STEPS, asked).all()
+    parameters = {"group": group_id, "kinds": list(kinds), "most": most}
+    return session.execute(_NEWEST_STEPS, parameters).all()
 
 
 def station_steps(session: Session, station_id: int, kinds: Iterable[str]) -> Sequence[Any]:

@@ -105,8 +105,8 @@ class Session(Connection):
     def commit(self) -> None:
         """Keep what was written."""
         super().commit()
-        told, self._then = self._then, []
-        for tell in told:
+        pending, self._then = self._then, []
+        for tell in pending:
             tell()
 
 

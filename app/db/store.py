@@ -91,8 +91,8 @@ class Store:
         self._engine = engine
         self._reader = dialect_of(settings).reading(engine)
         self._writer = engine.execution_options(**WRITE)
-        self._glancer = dialect_of(settings).glancing(engine)
-        self._peeker = dialect_of(settings).peeking(settings)
+        self._glancer = dialect_of(settings).autocommit_engine(engine)
+        self._peeker = dialect_of(settings).nonblocking_engine(settings)
         # Connections of its own: one that waits for no disk must never carry what was promised.
         self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
         self.sharing = dialect_of(settings).sharing(engine, lambda: reported(settings))
@@ -135,29 +135,29 @@ class Store:
     @contextmanager
     def read(self) -> Iterator[Session]:
         """A session on one consistent snapshot; nothing that it changes is kept."""
-        with self._watched(), Session(self._reader) as session:
+        with self._noting_damage(), Session(self._reader) as session:
             yield session
 
     @contextmanager
-    def glance(self) -> Iterator[Session]:
+    def read_one(self) -> Iterator[Session]:
         """A session for one statement, which is a snapshot by itself and needs no transaction.
 
         For what every request asks.
         """
-        with self._watched(), Session(self._glancer) as session:
+        with self._noting_damage(), Session(self._glancer) as session:
             yield session
 
     @contextmanager
-    def peek(self) -> Iterator[Session]:
-        """A session like that of ``glance`` for whoever may wait for nothing, as the event loop.
+    def read_without_waiting(self) -> Iterator[Session]:
+        """A session like that of ``read_one`` for whoever may wait for nothing, as the event loop.
 
         Raises:
-            BusyError: There would be something to wait for; ``glance`` waits for it.
+            BusyError: There would be something to wait for; ``read_one`` waits for it.
         """
         if self._peeker is None:
             raise BusyError("the database cannot answer without waiting")
         try:
-            with self._watched(), Session(self._peeker) as session:
+            with self._noting_damage(), Session(self._peeker) as session:
                 yield session
         except NoConnectionError as error:
             raise BusyError("another thread is using the connection that never waits") from error
@@ -177,7 +177,7 @@ class Store:
         """
         self.require_undamaged()
         writer = self._writer if lasting else self._passing
-        with self.turn, self._remembered(), self._watched(), Session(writer) as session:
+        with self.turn, self._remembered(), self._noting_damage(), Session(writer) as session:
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.begin()
@@ -190,12 +190,12 @@ class Store:
                 self._file.require_there()
                 self._file.require_log()
             if lasting:
-                self.sharing.tell(session, COMMITTED)
+                self.sharing.publish(session, COMMITTED)
                 release_admission()
             session.commit()
             self._refused = None
             self._anchored(session)
-        self.tell_listeners()
+        self.notify_listeners()
 
     def require_writable(self) -> None:
         """Raise StorageError while changes are refused, as on a full disk.
@@ -218,7 +218,7 @@ class Store:
                 self._refused = error
             raise
 
-    def tell_listeners(self) -> None:
+    def notify_listeners(self) -> None:
         """Call all who listen: this process has committed, or another one that works for it."""
         for listener in self._listeners:
             try:
@@ -240,7 +240,7 @@ class Store:
             message, hint = self._damage
             raise DamagedError(f"nothing can be changed now: {message}", hint=hint)
         if self._file is not None:
-            with self._watched():
+            with self._noting_damage():
                 self._file.require_there()
 
     def require_whole(self, wanted: Callable[[], bool] = lambda: True) -> None:
@@ -257,7 +257,7 @@ class Store:
                 raise DamagedError(f"{file.name} is damaged", hint=EXAMINE)
 
     @contextmanager
-    def _watched(self) -> Iterator[None]:
+    def _noting_damage(self) -> Iterator[None]:
         try:
             with reported(self.settings):
                 yield
@@ -282,10 +282,10 @@ class Store:
         # One that was taken away is meant to be.
         if there is None:
             return
-        said = max(there.entries, self._anchor.entries)
-        if session.log_before < said:
+        expected = max(there.entries, self._anchor.entries)
+        if session.log_before < expected:
             raise DamagedError(
-                f"the log ends after {session.log_before:,} entries, but this home has noted {said:,}",
+                f"the log ends after {session.log_before:,} entries, but this home has noted {expected:,}",
                 hint=EXAMINE,
             )
 
@@ -307,24 +307,24 @@ class Store:
     def listen(self, listener: Callable[[], None]) -> None:
         """Call a function after each commit of this process; it must be quick.
 
-        Once ``follow`` was called, after those of others on the same server of databases, too.
+        Once ``subscribe`` was called, after those of others on the same server of databases, too.
         """
         self._listeners.append(listener)
 
-    def follow(self) -> None:
+    def subscribe(self) -> None:
         """Hear of what other processes commit, where the database tells."""
-        self.sharing.hear(self._hear)
+        self.sharing.subscribe(self._receive)
         self.sharing.listen()
 
-    def say(self, word: str) -> None:
+    def publish(self, word: str) -> None:
         """Say a word to the other processes, where there may be some; see ``sharing``."""
         if self.sharing.is_shared:
-            with self.glance() as session:
-                self.sharing.tell(session, word)
+            with self.read_one() as session:
+                self.sharing.publish(session, word)
 
-    def _hear(self, word: str) -> None:
+    def _receive(self, word: str) -> None:
         if word in (COMMITTED, AGAIN):
-            self.tell_listeners()
+            self.notify_listeners()
 
     def close(self) -> None:
         """Close all connections."""

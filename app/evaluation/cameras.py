@@ -13,7 +13,7 @@ from app.evaluation.frame import Frame
 from app.evaluation.table import Cell, Column, FrameRange, Row, Table
 from app.geometry.camera import Camera
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.score import SHARE_ABOVE, FrameScore, score, score_frame
 
@@ -31,7 +31,7 @@ Scores = dict[int, FrameScore | None]
 
 
 def score_cameras(
-    frames: Sequence[Frame], cameras: Mapping[int, Camera], progress: TellProgress | None = None
+    frames: Sequence[Frame], cameras: Mapping[int, Camera], progress: ReportProgress | None = None
 ) -> Scores:
     """Every frame with lines against its camera; a static camera's same lines are measured once."""
     scores: Scores = {}

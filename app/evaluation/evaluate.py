@@ -10,14 +10,14 @@ from app.evaluation.average_precision import detection_summary, precision_recall
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
-from app.evaluation.careful import boxes_figure, boxes_table, comparable
 from app.evaluation.figure import Figure
 from app.evaluation.frame import Detection, Frame, JudgedFrame, iou, judge
 from app.evaluation.localization import localization_table, measure_frame, precision_distance
+from app.evaluation.reference_boxes import boxes_figure, boxes_table, comparable
 from app.evaluation.result import Evaluation, FrameResult
 from app.evaluation.table import Table
 from app.geometry.camera import Camera
-from app.progress import TellProgress, telling
+from app.progress import ReportProgress, partial_progress
 from app.soccer.frames import Box
 
 
@@ -61,7 +61,7 @@ def evaluate(
     frames: Sequence[Frame],
     inputs: Inputs,
     options: Options,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> Evaluation:
     """Every table and figure that the inputs allow.
 
@@ -106,7 +106,7 @@ def evaluate(
 
 
 def _score(
-    frames: Sequence[Frame], inputs: Inputs, say: TellProgress
+    frames: Sequence[Frame], inputs: Inputs, say: ReportProgress
 ) -> tuple[Scores, Scores] | None:
     """Predicted cameras and the dataset's own against the lines."""
     if inputs.cameras is None:
@@ -114,8 +114,8 @@ def _score(
     own = {frame.id: frame.camera for frame in frames if frame.camera is not None}
     total = 2 * len(frames)
     sentence = "Measuring cameras"
-    first = telling(say, sentence, total=total)
-    second = telling(say, sentence, start=len(frames), total=total)
+    first = partial_progress(say, sentence, total=total)
+    second = partial_progress(say, sentence, start=len(frames), total=total)
     predicted = score_cameras(frames, inputs.cameras, first)
     oracle = score_cameras(frames, own, second)
     return predicted, oracle

@@ -44,7 +44,7 @@ class Series:
         count: Items behind each place; empty where that says nothing.
         color: Value that the colour stands for (see ``Panel.color``), or None.
         group_id: The group behind a whole series, or None.
-        frames: The frames behind each place; empty where no number of theirs was kept.
+        frames: The frames behind each place; empty where none of its numbers was kept.
     """
 
     name: str
@@ -127,13 +127,13 @@ def _rows(panel: Panel) -> Iterator[list[Value]]:
                 series.kind,
                 series.x[place],
                 series.y[place],
-                *(_at(series, name, place) for name in ("low", "high", "count")),
+                *(_value_at(series, name, place) for name in ("low", "high", "count")),
                 series.color,
                 series.group_id,
             ]
 
 
-def _at(series: Series, name: str, place: int) -> Value:
+def _value_at(series: Series, name: str, place: int) -> Value:
     values: tuple[float, ...] = getattr(series, name)
     return values[place] if values else None
 

@@ -62,7 +62,7 @@ def figure_png(figure: Figure) -> bytes:
 
 
 def _draw(axes: Axes, panel: Panel, title: str) -> None:
-    axes.set(title=title, xlabel=_words(panel.x), ylabel=_words(panel.y))
+    axes.set(title=title, xlabel=_axis_label(panel.x), ylabel=_axis_label(panel.y))
     colors = [item.color for item in panel.series if item.color is not None]
     scale = _color_scale(axes, colors, panel.color) if colors else None
     for index, item in enumerate(panel.series):
@@ -99,7 +99,7 @@ def _color_scale(axes: Axes, colors: list[float], meaning: Axis | None) -> Any:
     scale = ScalarMappable(Normalize(min(colors), max(colors)), shades)
     figure = axes.get_figure()
     assert figure is not None, "the axes are those of a figure"
-    figure.colorbar(scale, ax=axes, label=_words(meaning) if meaning else "")
+    figure.colorbar(scale, ax=axes, label=_axis_label(meaning) if meaning else "")
     return scale
 
 
@@ -126,5 +126,5 @@ def _mark(axes: Axes, mark: Mark) -> None:
     )  # fmt: skip
 
 
-def _words(axis: Axis) -> str:
+def _axis_label(axis: Axis) -> str:
     return f"{axis.label} [{axis.unit}]" if axis.unit else axis.label

@@ -81,7 +81,7 @@ class FrameNames:
         for frame in known.values():
             if frame.station:
                 stations.setdefault(frame.station, []).append(frame.id)
-            own = _telling(frame)
+            own = _distinguishing_names(frame)
             telling |= own
             for name in own | _short(frame):
                 other = index.setdefault(name, frame.id)
@@ -91,7 +91,7 @@ class FrameNames:
                 if numbered.setdefault(number, frame.id) != frame.id:
                     numbered[number] = _SEVERAL
             if not frame.station:
-                views.setdefault(_bare(frame.view), []).append(frame.id)
+                views.setdefault(_without_ending(frame.view), []).append(frame.id)
         by_station = {key: tuple(ids) for key, ids in stations.items()}
         rigs = {
             key: tuple(ids)
@@ -131,17 +131,21 @@ class FrameNames:
         """Why ``find`` found nothing, in words."""
         if self._lookup(name) == _SEVERAL:
             return "fits several frames of the dataset; name its match, too"
-        if _bare(name).rsplit("/", 1)[-1] in self._index:
+        if _without_ending(name).rsplit("/", 1)[-1] in self._index:
             return "is no frame of the dataset: its folders name none of the matches"
         return "is no frame of the dataset"
 
     def of_station(self, name: str) -> tuple[int, ...]:
         """Ids of all frames of a camera of a rig: a static one, or views of one match called alike."""
-        last = _bare(name).rsplit("/", 1)[-1]
-        return self.stations.get(last) or self._views.get(_bare(name)) or self._views.get(last, ())
+        last = _without_ending(name).rsplit("/", 1)[-1]
+        return (
+            self.stations.get(last)
+            or self._views.get(_without_ending(name))
+            or self._views.get(last, ())
+        )
 
     def _lookup(self, name: str) -> int | None:
-        parts = _bare(name).split("/")
+        parts = _without_ending(name).split("/")
         for start in range(len(parts)):
             known = "/".join(parts[start:])
             # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
@@ -158,13 +162,17 @@ def _number(text: str) -> int | None:
     return int(found[0]) if found else None
 
 
-def _bare(name: str) -> str:
+def _without_ending(name: str) -> str:
     return _SUFFIX.sub("", name.replace("\\", "/").strip().strip("/"))
 
 
-def _telling(frame: NamedFrame) -> set[str]:
+def _distinguishing_names(frame: NamedFrame) -> set[str]:
     """Names that tell the match of a frame, or the group where it has no match."""
-    view, group, match = _bare(frame.view), _bare(frame.group), _bare(frame.match)
+    view, group, match = (
+        _without_ending(frame.view),
+        _without_ending(frame.group),
+        _without_ending(frame.match),
+    )
     last = match.rsplit("/", 1)[-1]
     places = {match, last} if _MATCH in last else {match}
     within = _within(frame)
@@ -177,15 +185,18 @@ def _telling(frame: NamedFrame) -> set[str]:
 
 def _short(frame: NamedFrame) -> set[str]:
     """Names that another match could have as well."""
-    last = _bare(frame.match).rsplit("/", 1)[-1]
+    last = _without_ending(frame.match).rsplit("/", 1)[-1]
     within = _within(frame)
-    pictures = {_bare(frame.picture), _bare(frame.picture).rsplit("/", 1)[-1]} - {""}
+    pictures = {
+        _without_ending(frame.picture),
+        _without_ending(frame.picture).rsplit("/", 1)[-1],
+    } - {""}
     return pictures | _glued(within | ({f"{last}/{name}" for name in within} if last else set()))
 
 
 def _within(frame: NamedFrame) -> set[str]:
     """Names of a frame within its match."""
-    view, group = _bare(frame.view), _bare(frame.group)
+    view, group = _without_ending(frame.view), _without_ending(frame.group)
     return {f"{view}/{group}", f"{group}/{view}"} if frame.station else {view}
 
 
@@ -195,9 +206,9 @@ def _glued(names: set[str]) -> set[str]:
 
 def _numbers(frame: NamedFrame) -> set[int]:
     """Numbers that a frame's view, picture or (static camera) group is called by."""
-    names = {_bare(name).rsplit("/", 1)[-1] for name in (frame.view, frame.picture)}
+    names = {_without_ending(name).rsplit("/", 1)[-1] for name in (frame.view, frame.picture)}
     if frame.station:
-        names = {_bare(frame.group)}
+        names = {_without_ending(frame.group)}
     found = (_NUMBER.fullmatch(name) for name in names)
     return {int(match[1]) for match in found if match}
 
@@ -209,12 +220,12 @@ def _exported(frame: NamedFrame) -> Iterator[str]:
     group = Group(frame.group, (view,), match=frame.match)
     in_group, flat = (named(view, key_in_group(group, view, glue)) for glue in "/_")
     for called in (view, in_group):
-        yield _bare(match_frame(group, called, "", ".jpg"))
+        yield _without_ending(match_frame(group, called, "", ".jpg"))
     for called in (view, flat):
-        yield _bare(sequence_frame(group, called, "", ".jpg").split("/", 1)[-1])
-    yield _bare(flat_frame(group, view, "", ".jpg").rsplit("/", 1)[-1])
+        yield _without_ending(sequence_frame(group, called, "", ".jpg").split("/", 1)[-1])
+    yield _without_ending(flat_frame(group, view, "", ".jpg").rsplit("/", 1)[-1])
     for called in (view, in_group):
-        lines = _bare(line_frame(group, called, "", ".jpg").rsplit("/", 1)[-1])
+        lines = _without_ending(line_frame(group, called, "", ".jpg").rsplit("/", 1)[-1])
         # A plain number tells no match, and a static camera has one file of lines.
-        if not frame.station and lines != _bare(frame.view).rsplit("/", 1)[-1]:
+        if not frame.station and lines != _without_ending(frame.view).rsplit("/", 1)[-1]:
             yield lines

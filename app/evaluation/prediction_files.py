@@ -107,7 +107,7 @@ def read_predictions(
             f'"{format}" is not a format of predictions; formats are {", ".join(FORMATS)} and {AUTO}',
             pointer="/format",
         )
-    kind = _told_by_endings(path, limits) if format == AUTO else format
+    kind = _kind_by_ending(path, limits) if format == AUTO else format
     run = PredictionRun(names, category, size)
     with opened_tree(path, run.found.report, limits) as tree:
         if tree is None:
@@ -134,7 +134,7 @@ def _unused(option: str, what: str, kind: str) -> InputError:
     )
 
 
-def _told_by_endings(path: Path, limits: Limits) -> str:
+def _kind_by_ending(path: Path, limits: Limits) -> str:
     """The format of predictions by the endings of their files; ``coco`` where none tells it."""
     # What is wrong is reported by whoever reads them then.
     with opened_tree(path, Report(), limits) as tree:
@@ -182,11 +182,11 @@ def read_predicted_cameras(
             annotated = names.frames[identity].size
             made_for = sizes.get(name) or size
             if (other := other_size(camera, made_for or annotated)) is not None:
-                told = (
+                message = (
                     f"was made for {other.width} x {other.height}: its principal point is the middle of "
                     f"that; say so (--cameras-size {other.width}x{other.height})"
                 )
-                found.report.note(path.name, name, "principal_point", told)
+                found.report.note(path.name, name, "principal_point", message)
             found.cameras[identity] = _sized(camera, made_for, annotated)
     return found
 
@@ -379,12 +379,12 @@ def _contradiction(
     other = run.names.find(named or identity)
     if other is None or other.id == frame.id:
         return None
-    said = (
+    found = (
         f'image {identity} of the COCO document is "{named}"'
         if named
         else f'image_id is "{identity}"'
     )
-    return f'is "{own}", but {said}: two frames'
+    return f'is "{own}", but {found}: two frames'
 
 
 def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:

@@ -168,8 +168,8 @@ def _counts(rated: Rated) -> FloatArray:
     """How often each item was given each category, shape (N, K)."""
     names = _categories(rated)
     counts = np.zeros((len(rated), len(names)))
-    for row, said in enumerate(rated):
-        for value in said:
+    for row, ratings in enumerate(rated):
+        for value in ratings:
             if value is not None:
                 counts[row, names[value]] += 1
     return counts

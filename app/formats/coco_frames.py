@@ -136,7 +136,7 @@ def _find_pictures(file: FrameFile, finder: PictureFinder, report: Report) -> No
     found = own_pictures({parts: _find(parts, file.home, finder) for parts in first})
     for frame in file.frames:
         frame.place = found[frame.parts].place
-    _tell_pictures(file, found, first, finder, report)
+    _report_pictures(file, found, first, finder, report)
 
 
 def _find(parts: tuple[str, ...], home: Home, finder: PictureFinder) -> Found:
@@ -147,7 +147,7 @@ def _find(parts: tuple[str, ...], home: Home, finder: PictureFinder) -> Found:
     return found
 
 
-def _tell_pictures(
+def _report_pictures(
     file: FrameFile,
     found: Mapping[tuple[str, ...], Found],
     first: Mapping[tuple[str, ...], Frame],
@@ -287,11 +287,11 @@ def _grouped(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, lis
         groups.setdefault(frame.key if frame.group is None else frame.group, []).append(frame)
     taken = set(groups)
     for key, members in groups.items():
-        _tell_apart(members)
+        _number_frames(members)
         views = Counter(frame.view for frame in members)
         scopes = list(dict.fromkeys(frame.scope for frame in members))
         if max(views.values()) == 1 or len(scopes) == 1:
-            yield key, _apart(key, members, report)
+            yield key, _unique_frames(key, members, report)
             continue
         # The views of one name are of different sets, so that their groups are, too.
         for scope in scopes:
@@ -300,10 +300,10 @@ def _grouped(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, lis
             while name != key and name in taken:
                 name = f"{scope}/{name}"
             taken.add(name)
-            yield name, _apart(name, own, report)
+            yield name, _unique_frames(name, own, report)
 
 
-def _tell_apart(frames: Sequence[Frame]) -> None:
+def _number_frames(frames: Sequence[Frame]) -> None:
     """Give views that no file names, and whose files have one name, their folders as well."""
     if len({frame.split for frame in frames}) > 1:
         return
@@ -314,7 +314,7 @@ def _tell_apart(frames: Sequence[Frame]) -> None:
                 frame.view = long(frame).strip("/")
 
 
-def _apart(key: str, frames: Sequence[Frame], report: Report) -> list[Frame]:
+def _unique_frames(key: str, frames: Sequence[Frame], report: Report) -> list[Frame]:
     """The frames of a group, one of each name."""
     views: dict[str, Frame] = {}
     for frame in frames:

@@ -100,7 +100,7 @@ def read_coco(
         yield from groups.rest()
         foreign = [file.frames for file in files if file.frames.frames]
         yield from groups_of(foreign, tree, names, calibration, report)
-        _tell_balls(files, report)
+        _report_balls(files, report)
         if not files:
             report.note(str(root), None, None, "holds no COCO file (images and annotations)")
 
@@ -123,7 +123,7 @@ def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[st
     return None
 
 
-def _tell_balls(files: list[_File], report: Report) -> None:
+def _report_balls(files: list[_File], report: Report) -> None:
     """Which category of each foreign file was taken for the ball, or that it brought none."""
     some = any(file.categories.balls for file in files)
     foreign = [file for file in files if file.frames.frames]
@@ -188,7 +188,7 @@ class _File:
                 if STATE in image.value:
                     yield self._ours(image, index)
                 else:
-                    self.frames.frames.append(self._theirs(image, index))
+                    self.frames.frames.append(self._foreign_frame(image, index))
             except DatasetFormatError as error:
                 self._report.skip(self._with_annotations(error, index))
 
@@ -267,7 +267,7 @@ class _File:
         place = self._finder.find(picture_parts(name), self._home).place
         return None if place is None else self._tree.media(place)
 
-    def _theirs(self, image: StateReader, index: int) -> Frame:
+    def _foreign_frame(self, image: StateReader, index: int) -> Frame:
         parts = picture_parts(image.text("file_name"))
         key = self._key(image, parts)
         group, view = self._placed(image, key)

@@ -77,7 +77,7 @@ class WriteOptions:
         boxes: Which ball box is written.
         every_view: Whether training data hold views in which the 3D ball does not hold.
         provenance: Where the groups come from, by the names of ``parquet.PROVENANCE``.
-        spare: People of frames that are no view of a group.
+        unassigned: People of frames that are no view of a group.
     """
 
     format: str
@@ -85,7 +85,7 @@ class WriteOptions:
     boxes: str = "optimized"
     every_view: bool = False
     provenance: Mapping[str, str | None] = field(default_factory=dict)
-    spare: Iterable[FramePersons] = ()
+    unassigned: Iterable[FramePersons] = ()
 
 
 def write_format(
@@ -119,7 +119,7 @@ def write_format(
         case "issia-3d":
             return write_issia_3d(root, records, everything=everything)
         case "issia":
-            return write_issia(root, groups, options.spare)
+            return write_issia(root, groups, options.unassigned)
         case "cameras":
             return write_camera_files(root, records, put)
         case "sn-calibration":

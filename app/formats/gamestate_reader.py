@@ -96,9 +96,9 @@ class _Sequence:
     def _key(self) -> str:
         folders = PurePosixPath(self._folder).parts
         info = self._value.get("info")
-        said = info.get("name") if isinstance(info, dict) else None
+        named = info.get("name") if isinstance(info, dict) else None
         root = self._tree.path
-        name = folders[-1] if folders else said or (root.name if root.is_dir() else root.stem)
+        name = folders[-1] if folders else named or (root.name if root.is_dir() else root.stem)
         try:
             return check_name(str(name)).replace("/", "_")
         except UnsafePathError as error:
@@ -257,9 +257,13 @@ def _ball(item: Mapping[str, Any]) -> BallAnnotation:
 def _box(item: Mapping[str, Any]) -> Mapping[str, Any]:
     """A person in the shape that all datasets show, with the annotation as it was."""
     attributes = item.get("attributes")
-    said = attributes if isinstance(attributes, dict) else {}
-    role = " ".join(str(said[name]) for name in ("role", "team") if said.get(name))
-    value: dict[str, Any] = {"class": role or None, "ID": said.get("jersey"), METADATA: dict(item)}
+    details = attributes if isinstance(attributes, dict) else {}
+    role = " ".join(str(details[name]) for name in ("role", "team") if details.get(name))
+    value: dict[str, Any] = {
+        "class": role or None,
+        "ID": details.get("jersey"),
+        METADATA: dict(item),
+    }
     try:
         box = _corner_box(item)
     except ValueError:

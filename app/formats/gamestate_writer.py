@@ -184,7 +184,7 @@ def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) 
     image = _image(file, record, view, camera, people)
     file.images.append(_text(image))
     identity = str(image.get("image_id", image.get("id")))
-    annotations = [*people, *_balls(file, record, view), *_rest(view, camera)]
+    annotations = [*people, *_balls(file, record, view), *_other_annotations(view, camera)]
     if annotations:
         found = [
             {"id": f"{identity}{number:03d}", "image_id": identity, **annotation}
@@ -238,7 +238,7 @@ def _people(file: _File, group: Group, view: View, camera: Camera | None) -> lis
         person = _person(box)
         if person is None:
             continue
-        track = file.track(_who(box, group, view, index))
+        track = file.track(_owner_of(box, group, view, index))
         if track in seen:
             track = file.track((group.key, view.key, index))
         seen.add(track)
@@ -251,7 +251,7 @@ def _people(file: _File, group: Group, view: View, camera: Camera | None) -> lis
     return people
 
 
-def _who(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
+def _owner_of(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
     """Whose box it is: a shirt number is the same all match long, another tag in its group."""
     # A class that is no text is kept as it came, like all that datasets bring.
     name, tag = str(box.get("class")), box.get("ID")
@@ -307,7 +307,7 @@ def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     return _pitch_box([round(value, _PLACE_DIGITS) for value in edge])
 
 
-def _rest(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
+def _other_annotations(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
     """The lines, the camera, and what else there was."""
     kept = kept_of(view)
     if view.station.lines or view.extras.lines or "pitch" in kept:

@@ -79,19 +79,19 @@ class FrameGroups:
             )
         return number
 
-    def camera(self, group: Group, view: View, said: object) -> int:
+    def camera(self, group: Group, view: View, given: object) -> int:
         """Number of the camera of a view.
 
         Args:
             group: The group of the view.
             view: The view.
-            said: What the files hold of the camera, which stands still.
+            given: What the files hold of the camera, which stands still.
 
         Raises:
             InputError: It is not from ISSIA, or a view has its number that says otherwise.
         """
         number, whose = view_camera(group, view), f"{group.key}, {view.key}"
-        station = view.station.key if view.station.shared else said
+        station = view.station.key if view.station.shared else given
         first, known = self._cameras.setdefault(number, (whose, station))
         if known != station:
             raise InputError(

@@ -65,14 +65,14 @@ def _read_table(
                 report.note(shown, record, "frame", f"is a second row of frame {frame}")
                 continue
             if not seen:
-                _tell_halves(cells, shown, report)
+                _report_halves(cells, shown, report)
             seen.add(frame)
             _read_row(cells, frame, found, DatasetFormatError(shown, record, None, ""), report)
     except DatasetFormatError as error:
         report.skip(error)
 
 
-def _tell_halves(columns: Mapping[str, str], shown: str, report: Report) -> None:
+def _report_halves(columns: Mapping[str, str], shown: str, report: Report) -> None:
     """Name each column of x without one of y, or the other way round: nothing is read of it."""
     there = {(found[1], found[2]) for name in columns if (found := _AXIS.fullmatch(name))}
     for axis, camera in sorted(there):

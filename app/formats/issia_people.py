@@ -47,7 +47,7 @@ def mirrored_people(
         name = PurePosixPath(track.source.replace("\\", "/")).stem
         if not track.persons:
             continue
-        apart = _apart(number, tracks, given, widths[number])
+        apart = _median_distance(number, tracks, given, widths[number])
         if len(apart) >= LEAST_PAIRS:
             written, turned = np.median(apart, axis=0)
             is_mirrored = bool(turned < written)
@@ -73,7 +73,7 @@ def turned(track: ViperTrack, width: int) -> ViperTrack:
     )
 
 
-def _apart(
+def _median_distance(
     number: int, tracks: Mapping[int, ViperTrack], given: Mapping[int, Camera], width: int
 ) -> FloatArray:
     """How far the same person lies from where another camera puts it, as written and turned, metres,

@@ -174,11 +174,11 @@ def complete(
     drawn = set[int]()
     for index, size in enumerate(dict.fromkeys(sizes.values())):
         # Each file is read for the size of its own camera; what is wrong with it is told once.
-        told = Report() if index else report
+        own_report = Report() if index else report
         if options.lines is None:
-            read = _own_lines(tree, names, size, told)
+            read = _own_lines(tree, names, size, own_report)
         else:
-            read = _read_lines(options.lines, size, told, limits)
+            read = _read_lines(options.lines, size, own_report, limits)
         drawn |= read.keys()
         lines |= {camera: file for camera, file in read.items() if sizes.get(camera) == size}
     for camera, size in sizes.items():
@@ -193,10 +193,12 @@ def complete(
             f"People of {' and '.join(f'cam{camera}' for camera in mirrored)} are turned left to "
             "right: ISSIA's files hold them mirrored, and the balls as the cameras see them."
         )
-    _tell_unused(found, {"camera": list(given), "line file": list(drawn)}, report)
+    _report_unused(found, {"camera": list(given), "line file": list(drawn)}, report)
 
 
-def _tell_unused(found: IssiaFolder, brought: Mapping[str, Sequence[int]], report: Report) -> None:
+def _report_unused(
+    found: IssiaFolder, brought: Mapping[str, Sequence[int]], report: Report
+) -> None:
     """Say which numbers of cameras came without ground truth of that camera."""
     for what, numbers in brought.items():
         unused = sorted(set(numbers) - found.tracks.keys())

@@ -45,7 +45,7 @@ _TAIL = """    </sourcefile>
 
 
 def write_issia(
-    root: Path, groups: Iterable[Group], spare: Iterable[FramePersons] = ()
+    root: Path, groups: Iterable[Group], unassigned: Iterable[FramePersons] = ()
 ) -> dict[str, int]:
     """Write ``ground_truth_<n>.xgtf`` per camera, and what belongs to the cameras.
 
@@ -56,7 +56,7 @@ def write_issia(
     Args:
         root: Existing folder.
         groups: Groups of ISSIA, in any order.
-        spare: People of frames that no group's view holds.
+        unassigned: People of frames that no group's view holds.
 
     Returns:
         Counts: ``groups``, ``annotated_balls``, ``persons``, ``cameras`` (files).
@@ -76,7 +76,7 @@ def write_issia(
                 stations.setdefault(camera, view.station)
                 _add_balls(spill, camera, frame, view, counts)
                 _add_persons(spill, camera, frame, view.extras.boxes, counts)
-        for item in spare:
+        for item in unassigned:
             camera = int(item.camera.removeprefix("cam"))
             _add_persons(spill, camera, item.frame + DEFAULT_OFFSET, item.boxes, counts)
         for camera, items in groupby(spill.items(), key=lambda item: item[0][0]):

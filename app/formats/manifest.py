@@ -12,7 +12,7 @@ from typing import Any
 
 from app.finite import json_text
 from app.formats.view_files import GatheredFiles
-from app.progress import TellProgress, told
+from app.progress import ReportProgress, told
 
 MANIFEST = "manifest.json"
 SOFTWARE = "touchline"
@@ -70,7 +70,7 @@ def software_version() -> str:
         return "unknown"
 
 
-def write_manifest(root: Path, manifest: Manifest, progress: TellProgress | None = None) -> Path:
+def write_manifest(root: Path, manifest: Manifest, progress: ReportProgress | None = None) -> Path:
     """Write ``manifest.json`` with size and sha256 of every other file below ``root``."""
     value = {
         "dataset": manifest.dataset,
@@ -92,7 +92,7 @@ def write_manifest(root: Path, manifest: Manifest, progress: TellProgress | None
     return path
 
 
-def _files(root: Path, progress: TellProgress | None) -> Iterator[dict[str, Any]]:
+def _files(root: Path, progress: ReportProgress | None) -> Iterator[dict[str, Any]]:
     files = GatheredFiles(root)
     for name, file in told(files, len(files), progress, "Reading the files' checksums."):
         if name == MANIFEST:

@@ -16,7 +16,7 @@ from app.durable import PARTIAL, sync
 from app.errors import InputError, StorageError
 from app.formats.manifest import MANIFEST, SOFTWARE
 from app.formats.view_files import GatheredFiles
-from app.progress import TellProgress, told
+from app.progress import ReportProgress, told
 
 MAX_MANIFEST = 1 << 30
 """Bytes of a manifest that is read; that of a hundred thousand frames has a tenth of it."""
@@ -30,7 +30,7 @@ _DATE = (1980, 1, 1, 0, 0, 0)
 
 @contextmanager
 def output_tree(
-    out: Path, beside: Path | None = None, progress: TellProgress | None = None
+    out: Path, beside: Path | None = None, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
     """A folder to write into, which becomes ``out`` when the block ends without an error.
 
@@ -119,7 +119,7 @@ def listed(manifest: bytes) -> set[str]:
         return set()
 
 
-def _publish_zip(staging: Path, out: Path, prefix: str, progress: TellProgress | None) -> None:
+def _publish_zip(staging: Path, out: Path, prefix: str, progress: ReportProgress | None) -> None:
     handle, name = tempfile.mkstemp(prefix=prefix, suffix=PARTIAL, dir=out.parent)
     partial = Path(name)
     try:
@@ -134,7 +134,7 @@ def _publish_zip(staging: Path, out: Path, prefix: str, progress: TellProgress |
     sync(out.parent)
 
 
-def write_zip(root: Path, file: object, progress: TellProgress | None = None) -> None:
+def write_zip(root: Path, file: object, progress: ReportProgress | None = None) -> None:
     """All files of an export below ``root`` into a zip: sorted names, dated 1980-01-01."""
     files = GatheredFiles(root)
     zip_files(told(files, len(files), progress, "Packing the files."), file)

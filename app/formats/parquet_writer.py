@@ -39,7 +39,7 @@ class ViewRow:
     provenance: Mapping[str, str | None]
 
     @cached_property
-    def said(self) -> dict[str, Any]:
+    def annotated(self) -> dict[str, Any]:
         """Everything that was said of the view."""
         return view_to_json(self.view)
 
@@ -212,20 +212,20 @@ def _fits_pixels(row: ViewRow) -> Any:
     return None if point is None else [float(point.x), float(point.y)]
 
 
-def _said(name: str) -> Getter:
-    return lambda row: row.said[name]
+def _annotated_value(name: str) -> Getter:
+    return lambda row: row.annotated[name]
 
 
 def _left_out(name: str) -> Getter:
     return lambda row: None if row.view.left_out is None else getattr(row.view.left_out, name)
 
 
-def _said_json(name: str) -> Getter:
-    return lambda row: json_text(row.said[name])
+def _annotated_json(name: str) -> Getter:
+    return lambda row: json_text(row.annotated[name])
 
 
-def _if_said(name: str) -> Getter:
-    return lambda row: json_text(row.said[name]) if name in row.said else None
+def _if_annotated(name: str) -> Getter:
+    return lambda row: json_text(row.annotated[name]) if name in row.annotated else None
 
 
 _SIDES = ("x", "y", "width", "height")
@@ -247,13 +247,13 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("frame_present", FLAG, lambda row: row.view.key in row.record.frames),
     ("width", WHOLE, lambda row: row.view.size.width),
     ("height", WHOLE, lambda row: row.view.size.height),
-    ("included", FLAG, _said("included")),
+    ("included", FLAG, _annotated_value("included")),
     ("left_out_reason", TEXT, _left_out("reason")),
     ("left_out_note", TEXT, _left_out("note")),
-    ("station", TEXT, _said("station")),
-    ("shared", FLAG, _said("shared")),
-    ("flipped", FLAG, _said("flipped")),
-    ("calibration", TEXT, _said("calibration")),
+    ("station", TEXT, _annotated_value("station")),
+    ("shared", FLAG, _annotated_value("shared")),
+    ("flipped", FLAG, _annotated_value("flipped")),
+    ("calibration", TEXT, _annotated_value("calibration")),
     ("calibrated_by", TEXT, _solved(lambda solved: solved.calibration.source)),
     ("pan_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[0])),
     ("tilt_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[1])),
@@ -302,12 +302,12 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("group_failed", TEXT, _failing),
     ("verdict", TEXT, lambda row: row.record.verdict),
     ("reason", TEXT, lambda row: row.record.reason),
-    ("lines", TEXT, _said_json("lines")),
-    ("balls", TEXT, _said_json("balls")),
-    ("given", TEXT, _said_json("given")),
-    ("given_covariance", LIST, lambda row: row.said.get("given_covariance")),
-    ("picture", TEXT, _if_said("picture")),
-    ("proposed", TEXT, _if_said("proposed")),
+    ("lines", TEXT, _annotated_json("lines")),
+    ("balls", TEXT, _annotated_json("balls")),
+    ("given", TEXT, _annotated_json("given")),
+    ("given_covariance", LIST, lambda row: row.annotated.get("given_covariance")),
+    ("picture", TEXT, _if_annotated("picture")),
+    ("proposed", TEXT, _if_annotated("proposed")),
     ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
     ("solver_version", TEXT, lambda row: _solver(row)),

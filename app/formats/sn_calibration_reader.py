@@ -60,12 +60,12 @@ def read_line_files(
         names = tree.names()
         places = _places(read_match_info(tree, names, Report()))
         sizes = _sizes(map(_whole, names), path.stem) if by_folder else {}
-        ours = Ours(places, sizes, own_sizes=by_folder)
+        ours = OwnExport(places, sizes, own_sizes=by_folder)
         yield from line_files_of(tree, names, size, report, ours)
 
 
 @dataclass(frozen=True)
-class Ours:
+class OwnExport:
     """What one of our own exports says of its files, each by its path without the ending."""
 
     places: Mapping[str, str] = field(default_factory=dict)
@@ -75,11 +75,15 @@ class Ours:
     """Whether the size that a file says itself is that of its lines."""
 
 
-_NOTHING = Ours()
+_NOTHING = OwnExport()
 
 
 def line_files_of(
-    tree: FileTree, names: Sequence[str], size: ImageSize, report: Report, ours: Ours = _NOTHING
+    tree: FileTree,
+    names: Sequence[str],
+    size: ImageSize,
+    report: Report,
+    ours: OwnExport = _NOTHING,
 ) -> Iterator[LineFile]:
     """The line files among some files of a tree, with the images that lie beside them."""
     beside = _images(names)
@@ -92,7 +96,7 @@ def line_files_of(
     for name in ordered:
         whole, place = wholes[name], PurePosixPath(places[name])
         key = place.name if stems[place.name] == 1 else str(place)
-        said = ours.sizes.get(whole)
+        exported = ours.sizes.get(whole)
         for document in _documents(tree, name, report):
             named, where = key, whole
             if document.name is not None and document.name != place.name:
@@ -106,8 +110,8 @@ def line_files_of(
                 )
                 continue
             seen.add(named)
-            drawn = document.size or said or size
-            stays = said is not None or (ours.own_sizes and document.size is not None)
+            drawn = document.size or exported or size
+            stays = exported is not None or (ours.own_sizes and document.size is not None)
             made = drawn if stays else size
             shown = tree.shown(name)
             lines, others = lines_from_json(document.lines, made, shown, report, drawn)
@@ -125,8 +129,8 @@ def _places(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
 
 
 def _sizes(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
-    said = {whole: split_and_size(PurePosixPath(whole).parent.name or top) for whole in places}
-    return {whole: found[1] for whole, found in said.items() if found}
+    by_folder = {whole: split_and_size(PurePosixPath(whole).parent.name or top) for whole in places}
+    return {whole: found[1] for whole, found in by_folder.items() if found}
 
 
 def _documents(tree: FileTree, name: str, report: Report) -> list[LineDocument]:
@@ -298,7 +302,7 @@ def read_sn_calibration(
         names = tree.names()
         infos = read_match_info(tree, names, report)
         places = _places(infos)
-        ours = Ours(places, _sizes(places), own_sizes=True)
+        ours = OwnExport(places, _sizes(places), own_sizes=True)
         unused = dict.fromkeys(infos)
         for file in line_files_of(tree, names, size, report, ours):
             unused.pop(file.place, None)
@@ -324,5 +328,5 @@ def _group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group
 
 def _split(folder: str) -> str:
     """The split that a folder says, or nothing."""
-    said = split_and_size(folder)
-    return said[0] if said else folder if folder in SPLITS else ""
+    named = split_and_size(folder)
+    return named[0] if named else folder if folder in SPLITS else ""

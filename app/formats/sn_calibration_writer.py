@@ -139,8 +139,8 @@ def write_sn_calibration(
                 if not known:
                     lines, others = view.station.lines, view.extras.lines
                     put(f"{LINES}/{name}.json", line_file_text(lines, view.size, others))
-                    said = {**record_of(record.group, view), PLACE: place}
-                    info.add(f"{LINES}/{name}.jpg", said)
+                    origin = {**record_of(record.group, view), PLACE: place}
+                    info.add(f"{LINES}/{name}.jpg", origin)
                     counts["frames"] += 1
                 if camera is not None and name not in with_camera:
                     text = camera_text(camera, record.covariance(view), view.size)

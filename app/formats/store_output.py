@@ -20,7 +20,7 @@ from app.formats.file_tree import Root
 from app.formats.manifest import MANIFEST
 from app.formats.output import MAX_MANIFEST, foreign, listed, output_tree, write_zip
 from app.object_store.path import StoredPath
-from app.progress import TellProgress, told
+from app.progress import ReportProgress, told
 from app.zip_file import open_zip
 
 _CHUNK = 1024 * 1024
@@ -28,7 +28,7 @@ _CHUNK = 1024 * 1024
 
 @contextmanager
 def stored_output(
-    out: StoredPath, beside: Path, progress: TellProgress | None = None
+    out: StoredPath, beside: Path, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
     """A folder to write into, which becomes ``out`` when the block ends without an error.
 
@@ -62,7 +62,7 @@ def stored_output(
 
 @contextmanager
 def output_anywhere(
-    out: Root, exports: Path, beside: Path | None = None, progress: TellProgress | None = None
+    out: Root, exports: Path, beside: Path | None = None, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
     """``output_tree`` on a disk, ``stored_output`` in an object store.
 
@@ -144,7 +144,7 @@ def _is_earlier_export(out: StoredPath) -> bool:
         return False
 
 
-def _publish_folder(staging: Path, out: StoredPath, progress: TellProgress | None) -> None:
+def _publish_folder(staging: Path, out: StoredPath, progress: ReportProgress | None) -> None:
     """Put files in place, the manifest last; that of an earlier export goes first."""
     store, earlier = out.store, {item.key for item in out.store.below(out.key)}
     manifest = (out / MANIFEST).key

@@ -73,7 +73,7 @@ def view_to_json(view: View) -> dict[str, Any]:
         "given": None if given is None else camera_to_json(given),
         **({} if covariance is None else {"given_covariance": [*map(float, covariance)]}),
         **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
-        "lines": lines_to_json(station.said_lines),
+        "lines": lines_to_json(station.annotated_lines),
         **({"proposed": [*station.proposed]} if station.proposed else {}),
         "balls": [ball_to_json(ball) for ball in view.balls],
     }

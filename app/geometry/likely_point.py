@@ -149,12 +149,12 @@ def _settle_all(R, C, K, kind, fold, lens, pixels, chosen, noise, points, spans,
             sound = True
             for place in range(views):
                 view = chosen[row, place]
-                if not _look(R, C, K, kind, fold, lens, view, point, pixel, slope):
+                if not _project(R, C, K, kind, fold, lens, view, point, pixel, slope):
                     sound = False
                     break
                 offset[0] = pixels[view, 0] - pixel[0]
                 offset[1] = pixels[view, 1] - pixel[1]
-                distances[row, place] = _weigh(
+                distances[row, place] = _add_view(
                     noise[row, place], offset, slope, weighed, information, pull
                 )
             sound = sound and invert_symmetric(information, spans[row])
@@ -174,7 +174,7 @@ def _settle_all(R, C, K, kind, fold, lens, pixels, chosen, noise, points, spans,
 
 
 @compiled
-def _weigh(noise, offset, slope, weighed, information, pull):
+def _add_view(noise, offset, slope, weighed, information, pull):
     """Adds what a view knows to information and pull; its squared distance."""
     a, b, c, d = noise[0, 0], noise[0, 1], noise[1, 0], noise[1, 1]
     determinant = a * d - b * c
@@ -223,7 +223,7 @@ def invert_symmetric(matrix, inverse):
 
 
 @compiled
-def _look(R, C, K, kind, fold, lens, view, point, pixel, slope):
+def _project(R, C, K, kind, fold, lens, view, point, pixel, slope):
     """Writes the pixel of a point and its derivative by the point; False where there is none."""
     turned = np.empty(3)
     for i in range(3):

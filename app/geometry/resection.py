@@ -57,7 +57,7 @@ class Curves:
 
 
 @dataclass(frozen=True)
-class Sightings:
+class CurvePoints:
     """Image points that lie on the curves.
 
     Attributes:
@@ -119,7 +119,7 @@ def parameters_from_camera(camera: Camera, half_diagonal: float) -> FloatArray:
 def normal_equations(
     parameters: FloatArray,
     curves: Curves,
-    sightings: Sightings,
+    curve_points: CurvePoints,
     prior: Prior,
     scale_px: float,
     half_diagonal: float,
@@ -143,9 +143,9 @@ def normal_equations(
         np.ascontiguousarray(parameters),
         curves.kinds,
         curves.shapes,
-        sightings.pixels,
-        sightings.curve,
-        sightings.weight,
+        curve_points.pixels,
+        curve_points.curve,
+        curve_points.weight,
         prior.mean,
         prior.sigma,
         scale_px,
@@ -160,7 +160,7 @@ def normal_equations(
 def fit_curves(
     start: FloatArray,
     curves: Curves,
-    sightings: Sightings,
+    curve_points: CurvePoints,
     prior: Prior,
     scale_px: float,
     half_diagonal: float,
@@ -184,9 +184,9 @@ def fit_curves(
         parameters,
         curves.kinds,
         curves.shapes,
-        sightings.pixels,
-        sightings.curve,
-        sightings.weight,
+        curve_points.pixels,
+        curve_points.curve,
+        curve_points.weight,
         prior.mean,
         prior.sigma,
         scale_px,
@@ -206,20 +206,20 @@ def fit_curves(
 
 
 def distances(
-    parameters: FloatArray, curves: Curves, sightings: Sightings, half_diagonal: float
+    parameters: FloatArray, curves: Curves, curve_points: CurvePoints, half_diagonal: float
 ) -> FloatArray:
     """Distance of each point to its projected curve, pixels, shape (N,).
 
     Args:
         parameters: One camera, shape (8,).
     """
-    offsets, _ = residuals(parameters, curves, sightings, half_diagonal)
+    offsets, _ = residuals(parameters, curves, curve_points, half_diagonal)
     distance: FloatArray = np.hypot(offsets[:, 0], offsets[:, 1])
     return distance
 
 
 def residuals(
-    parameters: FloatArray, curves: Curves, sightings: Sightings, half_diagonal: float
+    parameters: FloatArray, curves: Curves, curve_points: CurvePoints, half_diagonal: float
 ) -> tuple[FloatArray, FloatArray]:
     """Offset of each point from its projected curve and its derivatives by the camera.
 
@@ -230,14 +230,14 @@ def residuals(
         Normal to the curve and along it (zero but beyond an end), pixels, shape (N, 2), and
         their derivatives, shape (N, 2, 8).
     """
-    offsets = np.empty((len(sightings.pixels), 2))
-    jacobians = np.empty((len(sightings.pixels), 2, PARAMETERS))
+    offsets = np.empty((len(curve_points.pixels), 2))
+    jacobians = np.empty((len(curve_points.pixels), 2, PARAMETERS))
     residual_rows(
         parameters,
         curves.kinds,
         curves.shapes,
-        sightings.pixels,
-        sightings.curve,
+        curve_points.pixels,
+        curve_points.curve,
         half_diagonal,
         offsets,
         jacobians,

@@ -33,7 +33,7 @@ def smallest_singular_vectors(matrices, vectors):
             largest = 0.0
             for p in range(3):
                 for q in range(p + 1, 4):
-                    largest = max(largest, _turn(A, V, p, q))
+                    largest = max(largest, _rotate_columns(A, V, p, q))
             if largest < _ORTHOGONAL:
                 break
         best, shortest = 0, np.inf
@@ -46,7 +46,7 @@ def smallest_singular_vectors(matrices, vectors):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _turn(A, V, p, q):
+def _rotate_columns(A, V, p, q):
     """Make columns p and q of A orthogonal; returns how far they were from it."""
     pp = qq = pq = 0.0
     for i in range(4):

@@ -22,15 +22,15 @@ from app.errors import AccessError, ForbiddenError, NotLoggedInError, StorageErr
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins
 from app.features.people.roles import DatasetRoles, require_scope
-from app.features.people.visibility_queries import EVERYTHING, READER, Sight
+from app.features.people.visibility_queries import EVERYTHING, READER, Visibility
 from app.http.headers import bearer_of, cookie_of
 from app.http.permissions import (
-    AskedAbout,
     OwnedMention,
+    RequestSubject,
     is_hidden,
     missing,
+    needs_database,
     require_allowed,
-    takes_looking,
 )
 from app.http.team import Team
 
@@ -58,16 +58,16 @@ def actor_of(scope: Mapping[str, Any], otherwise: str) -> str:
     return otherwise if login is None else login.actor
 
 
-def sight_of(scope: Mapping[str, Any]) -> Sight:
+def visibility_of(scope: Mapping[str, Any]) -> Visibility:
     """What whoever asks sees; everything on a server that somebody runs alone."""
     login = login_of(scope)
-    return EVERYTHING if login is None else login.sight
+    return EVERYTHING if login is None else login.visibility
 
 
-def sight_of_whole(scope: Mapping[str, Any]) -> Sight:
+def whole_visibility_of(scope: Mapping[str, Any]) -> Visibility:
     """The same without the datasets of which some groups are hidden from whoever asks."""
     login = login_of(scope)
-    return EVERYTHING if login is None else login.sight_of_whole
+    return EVERYTHING if login is None else login.whole_visibility
 
 
 class Access:
@@ -91,30 +91,30 @@ class Access:
             TooManyTriesError: Nobody's, with one of many tokens that are none.
         """
         if bearer_of(scope) is None and not cookie_of(scope, self._team.cookie):
-            raise _nobody()
+            raise _not_logged_in()
         login = self._login_at_once(scope)
         if login is None:
             login = await run_sync(self._look_up, scope, limiter=self._threads)
         scope[ASKS] = login.actor
         return login
 
-    async def allow(self, asked: AskedAbout, login: Login) -> list[OwnedMention]:
+    async def allow(self, subject: RequestSubject, login: Login) -> list[OwnedMention]:
         """Where everything is that a request names, as far as its reader may know.
 
         Raises:
             ForbiddenError: They see it, and may not do that.
         """
-        action = asked.permission.action
+        action = subject.permission.action
         if login.token is not None and action is not None:
             require_scope(login.token.scopes, action)
-        if login.must_enrol and not asked.permission.to_enrol:
+        if login.must_enrol and not subject.permission.to_enrol:
             raise ForbiddenError(
                 "everybody needs a second factor here, and you have none yet",
                 hint="Make one under Account, before anything else.",
             )
-        if not takes_looking(asked, login):
-            return require_allowed(self._store, asked, login)
-        return await run_sync(require_allowed, self._store, asked, login, limiter=self._threads)
+        if not needs_database(subject, login):
+            return require_allowed(self._store, subject, login)
+        return await run_sync(require_allowed, self._store, subject, login, limiter=self._threads)
 
     async def require_there(self, owned: list[OwnedMention]) -> None:
         """Raise NotFoundError where something is not there, or not for whoever asks."""
@@ -135,15 +135,15 @@ class Access:
         READER.set(login.reader)
         self._note_use(login)
 
-    def while_allowed(self, response: Response, asked: AskedAbout, login: Login) -> Response:
+    def while_allowed(self, response: Response, subject: RequestSubject, login: Login) -> Response:
         """An answer without an end, which ends when its reader is logged out, or has other rights."""
-        return _WhileAllowed(response, self, asked, login.roles)
+        return _WhileAllowed(response, self, subject, login.roles)
 
-    async def still_may(self, scope: Scope, asked: AskedAbout, roles: DatasetRoles) -> bool:
+    async def still_may(self, scope: Scope, subject: RequestSubject, roles: DatasetRoles) -> bool:
         """Whether somebody may go on reading, with the rights that they had when they began."""
         try:
             login = await self.log_in(scope)
-            await self.allow(asked, login)
+            await self.allow(subject, login)
         except AccessError:
             return False
         except StorageError:
@@ -168,13 +168,13 @@ class Access:
             return self._team.login_with(bearer, Request(scope))
         login = self._team.logins.find(cookie_of(scope, self._team.cookie) or "")
         if login is None:
-            raise _nobody()
+            raise _not_logged_in()
         return login
 
     def _note_use(self, login: Login) -> None:
         """Write down that a session or token is used, seldom and while nobody waits for it."""
         key = (login.token is not None, login.id)
-        if key in self._touching or not self._kind(login).is_stale(login):
+        if key in self._touching or not self._kind(login).is_use_unlogged(login):
             return
         task = asyncio.ensure_future(self._touch(login))
         self._touching[key] = task
@@ -194,8 +194,10 @@ class _WhileAllowed(Response):
     """A stream for as long as its reader may; whoever may read on comes back, and is told what they
     see from then on."""
 
-    def __init__(self, inner: Response, access: Access, asked: AskedAbout, roles: DatasetRoles):
-        self._inner, self._access, self._asked, self._roles = inner, access, asked, roles
+    def __init__(
+        self, inner: Response, access: Access, subject: RequestSubject, roles: DatasetRoles
+    ):
+        self._inner, self._access, self._asked, self._roles = inner, access, subject, roles
         self.status_code, self.background = inner.status_code, inner.background
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -241,5 +243,5 @@ class _WhileAllowed(Response):
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
 
-def _nobody() -> NotLoggedInError:
+def _not_logged_in() -> NotLoggedInError:
     return NotLoggedInError("you are not logged in", hint="Log in first.")

@@ -76,11 +76,11 @@ class Connection(H11Protocol):
             return
         super().connection_made(transport)
         self._used = self.loop.time()
-        self._owe("head", HEAD_SECONDS)
+        self._set_deadline("head", HEAD_SECONDS)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget what was owed."""
-        self._owe_nothing()
+        self._clear_deadline()
         if self in self.connections:
             super().connection_lost(exc)
 
@@ -94,19 +94,19 @@ class Connection(H11Protocol):
             self._refuse(431, f"the head of the request is longer than {HEAD_BYTES:,} bytes")
             return
         super().data_received(data)
-        self._see()
+        self._update_deadline()
 
     def on_response_complete(self) -> None:
         """Look at what is owed once an answer is sent."""
         super().on_response_complete()
-        self._see()
+        self._update_deadline()
 
     def shutdown(self) -> None:
         """Stop: a request that is still arriving has little time left."""
         super().shutdown()
         if self.conn.their_state is h11.SEND_BODY:
-            self._owe_nothing()
-            self._owe("rest", STOP_SECONDS)
+            self._clear_deadline()
+            self._set_deadline("rest", STOP_SECONDS)
 
     def send_400_response(self, msg: str) -> None:
         """Answer bytes that are no HTTP like every other mistake, and close."""
@@ -123,25 +123,25 @@ class Connection(H11Protocol):
         end = HEAD_END.search(arrived)
         return (end.end() if end else len(arrived)) > HEAD_BYTES
 
-    def _see(self) -> None:
+    def _update_deadline(self) -> None:
         """Set, keep or lift the deadline by the state of the request."""
         state = self.conn.their_state
         if state is h11.SEND_BODY:
             if self._owed != "rest" and (self._owed != "body" or self._received >= BODY_BYTES):
-                self._owe_nothing()
-                self._owe("body", BODY_SECONDS)
+                self._clear_deadline()
+                self._set_deadline("body", BODY_SECONDS)
         elif state is h11.IDLE and (self.cycle is None or self.conn.trailing_data[0]):
-            self._owe("head", HEAD_SECONDS)
+            self._set_deadline("head", HEAD_SECONDS)
         else:
             # Between two requests uvicorn's own timer runs.
-            self._owe_nothing()
+            self._clear_deadline()
 
-    def _owe(self, what: str, seconds: float) -> None:
+    def _set_deadline(self, what: str, seconds: float) -> None:
         if self._owed != what:
             self._owed, self._received = what, 0
             self._deadline = self.loop.call_later(seconds, self._overdue)
 
-    def _owe_nothing(self) -> None:
+    def _clear_deadline(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
         self._deadline, self._owed = None, ""
@@ -151,7 +151,7 @@ class Connection(H11Protocol):
         if self.transport.is_closing():
             return
         if what == "body" and self.flow.read_paused:
-            self._owe("body", BODY_SECONDS)
+            self._set_deadline("body", BODY_SECONDS)
             return
         self._refuse(408, f"the {'head' if what == 'head' else 'rest'} of the request did not come")
 
@@ -172,7 +172,7 @@ class Connection(H11Protocol):
             return False
         oldest = min(idle, key=lambda item: item._used)
         self.connections.discard(oldest)
-        oldest._owe_nothing()
+        oldest._clear_deadline()
         oldest.transport.abort()
         return True
 

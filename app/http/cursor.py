@@ -84,10 +84,12 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
     def decorate(route: Callable[P, Answer]) -> Callable[..., Answer]:
         whose = f"{route.__module__}.{route.__qualname__}"
 
-        def cut(whole: Any, limit: int | None, cursor: str | None, asked: Mapping[str, Any]) -> Any:
+        def cut(
+            whole: Any, limit: int | None, cursor: str | None, arguments: Mapping[str, Any]
+        ) -> Any:
             if not isinstance(whole, ListDocument):
                 return whole
-            items, following = page_of(whole.items, limit, cursor, _list_of(whose, asked))
+            items, following = page_of(whole.items, limit, cursor, _list_of(whose, arguments))
             return whole.model_copy(update={"items": items, "next": following})
 
         if inspect.iscoroutinefunction(route):
@@ -95,17 +97,17 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
 
             @wraps(route)
             async def page(
-                *args: Any, limit: int | None = None, cursor: str | None = None, **asked: Any
+                *args: Any, limit: int | None = None, cursor: str | None = None, **requested: Any
             ) -> Any:
-                return cut(await waiting(*args, **asked), limit, cursor, asked)
+                return cut(await waiting(*args, **requested), limit, cursor, requested)
         else:
             direct: Callable[..., Any] = route
 
             @wraps(route)
             def page(
-                *args: Any, limit: int | None = None, cursor: str | None = None, **asked: Any
+                *args: Any, limit: int | None = None, cursor: str | None = None, **requested: Any
             ) -> Any:
-                return cut(direct(*args, **asked), limit, cursor, asked)
+                return cut(direct(*args, **requested), limit, cursor, requested)
 
         page.__signature__ = _with_page(route, default)  # type: ignore[attr-defined]
         return page  # type: ignore[return-value]
@@ -153,10 +155,10 @@ def _identity(item: Any) -> str:
     return hashlib.sha256(json_text(value).encode()).hexdigest()[:12]
 
 
-def _list_of(route: str, asked: Mapping[str, Any]) -> str:
+def _list_of(route: str, arguments: Mapping[str, Any]) -> str:
     """Which list is asked for: the route, and what its address and query say."""
-    said = {name: value for name, value in asked.items() if isinstance(value, str | int)}
-    text = json_text([route, sorted(said.items())])
+    texts = {name: value for name, value in arguments.items() if isinstance(value, str | int)}
+    text = json_text([route, sorted(texts.items())])
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 

@@ -13,9 +13,9 @@ from fastapi import Depends, Header, Path, Query, Request
 
 from app.db.store import Store
 from app.errors import InputError
-from app.features.people.visibility_queries import Sight
+from app.features.people.visibility_queries import Visibility
 from app.finite import MAX_ID
-from app.http.access import login_of, sight_of, sight_of_whole
+from app.http.access import login_of, visibility_of, whole_visibility_of
 from app.http.errors import PreconditionRequiredError
 from app.http.services import Services
 from app.soccer.actors import LOCAL_USER, script_name
@@ -37,7 +37,7 @@ async def get_store(services: Annotated[Services, Depends(get_services)]) -> Sto
 
 async def get_actor(
     request: Request,
-    said: Annotated[
+    name: Annotated[
         str | None,
         Header(
             alias=ACTOR_HEADER,
@@ -58,24 +58,24 @@ async def get_actor(
     """
     login = login_of(request.scope)
     if login is not None:
-        if said is not None:
+        if name is not None:
             raise InputError(
                 f"{ACTOR_HEADER} is not accepted where people log in",
                 hint="Leave it out: the log names the logged-in person.",
                 pointer=f"/{ACTOR_HEADER}",
             )
         return login.actor
-    return LOCAL_USER if said is None else script_name(said, pointer=f"/{ACTOR_HEADER}")
+    return LOCAL_USER if name is None else script_name(name, pointer=f"/{ACTOR_HEADER}")
 
 
-async def get_sight(request: Request) -> Sight:
+async def get_visibility(request: Request) -> Visibility:
     """What whoever asks sees."""
-    return sight_of(request.scope)
+    return visibility_of(request.scope)
 
 
-async def get_sight_of_whole(request: Request) -> Sight:
+async def get_whole_visibility(request: Request) -> Visibility:
     """What whoever asks sees and nothing of which is hidden from them."""
-    return sight_of_whole(request.scope)
+    return whole_visibility_of(request.scope)
 
 
 async def require_if_match(
@@ -111,8 +111,8 @@ async def require_if_match(
 AppServices = Annotated[Services, Depends(get_services)]
 AppStore = Annotated[Store, Depends(get_store)]
 Actor = Annotated[str, Depends(get_actor)]
-Sees = Annotated[Sight, Depends(get_sight)]
-SeesWhole = Annotated[Sight, Depends(get_sight_of_whole)]
+Sees = Annotated[Visibility, Depends(get_visibility)]
+SeesWhole = Annotated[Visibility, Depends(get_whole_visibility)]
 IfMatch = Annotated[str, Depends(require_if_match)]
 Id = Annotated[int, Path(ge=1, le=MAX_ID)]
 DatasetPath = Annotated[str, Path(max_length=200, description="Name or id of the dataset.")]

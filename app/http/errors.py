@@ -31,7 +31,7 @@ from app.errors import (
     TooManyPointsError,
     TooManyTriesError,
 )
-from app.http.access import sight_of
+from app.http.access import visibility_of
 from app.http.event_schemas import PresenceDocument
 from app.http.headers import SCHEME as BEARER
 from app.http.headers import bearer_of
@@ -90,8 +90,8 @@ def status_of(error: ReviewError) -> int:
 def _is_full(error: StorageError) -> bool:
     """Whether the disk is full, rather than the database busy or damaged."""
     cause = error.__cause__
-    said = getattr(cause, "orig", None)
-    name = str(getattr(said, "sqlite_errorname", "") or getattr(said, "sqlstate", ""))
+    original = getattr(cause, "orig", None)
+    name = str(getattr(original, "sqlite_errorname", "") or getattr(original, "sqlstate", ""))
     full = getattr(cause, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
     return name.startswith(("SQLITE_FULL", "53100")) or full
 
@@ -108,7 +108,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
     status = status_of(error)
     hint = error.hint
     if isinstance(error, NotFoundError) and error.known:
-        hint = hint or error.nearest(sight_of(request.scope).sees)
+        hint = hint or error.nearest(visibility_of(request.scope).sees)
     problem = make_problem(
         status,
         error.message,

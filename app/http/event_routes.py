@@ -13,7 +13,7 @@ from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import reads_blind
 from app.http.deps import AppServices, SeesWhole
 from app.http.event_schemas import EVENTS
-from app.http.events import Feed, hello
+from app.http.events import Listener, first_event
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import STREAMS, limit
@@ -43,7 +43,7 @@ STREAM: Responses = {
 }
 
 
-async def where_room_is(services: AppServices) -> Services:
+async def admit_listener(services: AppServices) -> Services:
     """The services, unless as many listen as may: who is turned away costs the database nothing."""
     services.events.require_room()
     return services
@@ -54,7 +54,7 @@ class Start:
 
     def __init__(
         self,
-        services: Annotated[Services, Depends(where_room_is)],
+        services: Annotated[Services, Depends(admit_listener)],
         dataset: Annotated[
             str | None, Query(max_length=200, description="Name or id; default: all datasets.")
         ] = None,
@@ -96,14 +96,14 @@ class Start:
 
 
 async def begin(
-    services: AppServices, sight: SeesWhole, start: Annotated[Start, Depends()]
-) -> AsyncIterator[Feed]:
+    services: AppServices, visibility: SeesWhole, start: Annotated[Start, Depends()]
+) -> AsyncIterator[Listener]:
     """A feed for as long as the request lasts."""
     feed = services.events.subscribe(
         start.dataset_id,
         start.position,
         resumed=start.resumed,
-        sight=sight,
+        visibility=visibility,
         began=start.newest,
         numbered=start.numbered,
     )
@@ -115,12 +115,12 @@ async def begin(
 
 def under_way(
     services: AppServices,
-    sight: SeesWhole,
+    visibility: SeesWhole,
     start: Annotated[Start, Depends()],
-    feed: Annotated[Feed, Depends(begin)],
+    feed: Annotated[Listener, Depends(begin)],
 ) -> list[bytes]:
     """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
-    jobs = services.events.open_jobs(start.dataset_id, sight)
+    jobs = services.events.open_jobs(start.dataset_id, visibility)
     if start.solution is None:
         return jobs
     return [*services.events.solved_since(start.solution, feed), *jobs]
@@ -137,7 +137,7 @@ def under_way(
 async def listen(
     request: Request,
     start: Annotated[Start, Depends()],
-    feed: Annotated[Feed, Depends(begin)],
+    feed: Annotated[Listener, Depends(begin)],
     first: Annotated[list[bytes], Depends(under_way)],
 ) -> StreamingResponse:
     """What changes, as it changes: by anybody, in a browser or on the command line.
@@ -148,7 +148,7 @@ async def listen(
     """
 
     async def told() -> AsyncIterator[bytes]:
-        yield b"".join([hello(start.position), *first])
+        yield b"".join([first_event(start.position), *first])
         if is_head(request.scope):
             return
         async for events in feed.read():

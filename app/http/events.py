@@ -28,7 +28,7 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument
 from app.features.jobs.service import Jobs
 from app.features.maintenance.service import Banner, read_banner
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import (
     Change,
     read_moment,
@@ -77,13 +77,13 @@ class Counts:
     lost: int = 0
 
 
-class Feed:
+class Listener:
     """One listener: what it has not been told yet.
 
     Args:
         dataset_id: Tell of this dataset alone; None: of all.
         position: Id of the log entry up to which it knows everything.
-        sight: What its reader sees.
+        visibility: What its reader sees.
         began: Id of the newest log entry when it began to listen.
         numbered: Its events have the ids of their log entries; else they all have 0.
 
@@ -94,10 +94,15 @@ class Feed:
     """
 
     def __init__(
-        self, dataset_id: int | None, position: int, sight: Sight, began: int, numbered: bool = True
+        self,
+        dataset_id: int | None,
+        position: int,
+        visibility: Visibility,
+        began: int,
+        numbered: bool = True,
     ):
         self.dataset_id, self.position, self._numbered = dataset_id, position, numbered
-        self._sight, self._began = sight, began
+        self._sight, self._began = visibility, began
         self.lost, self.told = False, monotonic()
         self._events: list[bytes] = []
         self.loop = asyncio.get_running_loop()
@@ -131,9 +136,9 @@ class Feed:
         while not self._ended or self._events:
             await self._ready.wait()
             self._ready.clear()
-            told, self._events = self._events, []
-            if told:
-                yield b"".join(told)
+            events, self._events = self._events, []
+            if events:
+                yield b"".join(events)
 
 
 class Events:
@@ -141,16 +146,16 @@ class Events:
 
     def __init__(self, store: Store, jobs: Jobs):
         self._store, self._jobs = store, jobs
-        self._feeds: set[Feed] = set()
+        self._feeds: set[Listener] = set()
         self._lock = threading.Lock()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
         self._solutions = 0
         self._banner: Banner | None = None
         self._counts = Counts()
-        jobs.listen(self._tell_job)
+        jobs.listen(self._publish_job)
         store.listen(self._wake.set)
-        store.sharing.hear(self._hear_lease)
+        store.sharing.subscribe(self._receive_lease)
 
     def position(self) -> int:
         """Id of the newest entry of the log."""
@@ -165,7 +170,7 @@ class Events:
         banner = read_banner(self._store)
         return "" if banner is None else json_of(banner).decode()
 
-    def solved_since(self, solution: int, feed: Feed) -> list[bytes]:
+    def solved_since(self, solution: int, feed: Listener) -> list[bytes]:
         """Solutions that arrived after one, for a listener that has read what was there then."""
         found = read_solved_since(self._store, solution)
         return [_change_event(item) for item in found if feed.is_told(item)]
@@ -187,19 +192,21 @@ class Events:
         position: int,
         *,
         resumed: bool = False,
-        sight: Sight = EVERYTHING,
+        visibility: Visibility = EVERYTHING,
         began: int | None = None,
         numbered: bool = True,
-    ) -> Feed:
+    ) -> Listener:
         """Begin to listen, or go on where an earlier stream ended; on the event loop.
 
         ``began`` is the newest entry of the log by now, where that is not the position; ``numbered``
-        as ``Feed`` has it.
+        as ``Listener`` has it.
 
         Raises:
             OverloadedError: Too many listen, or the server stops.
         """
-        feed = Feed(dataset_id, position, sight, position if began is None else began, numbered)
+        feed = Listener(
+            dataset_id, position, visibility, position if began is None else began, numbered
+        )
         with self._lock:
             self.require_room()
             self._feeds.add(feed)
@@ -211,26 +218,26 @@ class Events:
         self._wake.set()
         return feed
 
-    def unsubscribe(self, feed: Feed) -> None:
+    def unsubscribe(self, feed: Listener) -> None:
         """Stop listening."""
         with self._lock:
             self._feeds.discard(feed)
             self._counts.lost += feed.lost
 
-    def open_jobs(self, dataset_id: int | None, sight: Sight) -> list[bytes]:
+    def open_jobs(self, dataset_id: int | None, visibility: Visibility) -> list[bytes]:
         """Jobs that are under way, for whoever begins to listen."""
-        return [_job_event(job) for job in self._jobs.under_way(dataset_id, sight)]
+        return [_job_event(job) for job in self._jobs.under_way(dataset_id, visibility)]
 
     def close(self) -> None:
         """End every feed, so that the server can stop; may be called twice."""
         self._closing.set()
         self._wake.set()
-        _tell({feed: [] for feed in self._listening()}, ended=True)
+        _deliver({feed: [] for feed in self._listening()}, ended=True)
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(5)
 
-    def _listening(self) -> list[Feed]:
+    def _listening(self) -> list[Listener]:
         with self._lock:
             return list(self._feeds)
 
@@ -239,85 +246,85 @@ class Events:
         while not self._closing.is_set():
             if feeds := self._listening():
                 try:
-                    self._look(feeds, first=not awake)
+                    self._publish_changes(feeds, first=not awake)
                     awake = True
                 except StorageError as error:
                     log.warning("the log could not be read", error=str(error))
                 except Exception:
                     log.exception("events could not be sent")
                 idle = monotonic() - PING_SECONDS
-                _tell({feed: [KEEPALIVE_COMMENT] for feed in feeds if feed.told < idle})
+                _deliver({feed: [KEEPALIVE_COMMENT] for feed in feeds if feed.told < idle})
                 self._closing.wait(PAUSE)
             else:
                 awake = False
             self._wake.wait(POLL if feeds else None)
             self._wake.clear()
 
-    def _look(self, feeds: list[Feed], *, first: bool) -> None:
+    def _publish_changes(self, feeds: list[Listener], *, first: bool) -> None:
         """Tell each listener what has happened since it was told last."""
         places = {feed.position for feed in feeds}
         self._look_for_banner(feeds, first=first)
         news = read_news(self._store, places, None if first else self._solutions)
         self._solutions = news.solution
         written = functools.cache(_change_event)
-        told: dict[Feed, list[bytes]] = {}
+        queued: dict[Listener, list[bytes]] = {}
         for feed in feeds:
             wanted = [*news.changes.get(feed.position, []), *news.solved]
             feed.position = max(feed.position, news.entry)
             if events := [written(item) for item in wanted if feed.is_told(item)]:
-                told[feed] = events
-        _tell(told)
+                queued[feed] = events
+        _deliver(queued)
 
-    def _look_for_banner(self, feeds: list[Feed], *, first: bool) -> None:
+    def _look_for_banner(self, feeds: list[Listener], *, first: bool) -> None:
         """Tell each listener of another notice of maintenance, whichever process has set it."""
         before, self._banner = self._banner, read_banner(self._store)
         if first or self._banner == before:
             return
         event = _event("maintenance", MaintenanceEvent(banner=self._banner))
-        _tell({feed: [event] for feed in feeds})
+        _deliver({feed: [event] for feed in feeds})
 
-    def tell_lease(self, lease: Lease) -> None:
+    def publish_lease(self, lease: Lease) -> None:
         """Tell who has a group of a batch open."""
         if lease.group is None:
             return
         here = [PresenceDocument.model_validate(one) for one in lease.here]
-        told = WorkEvent(
+        event = WorkEvent(
             batch=lease.batch.id, group=lease.group, dataset=lease.batch.dataset, here=here
         )
-        self._tell_work(lease.batch.dataset_id, told)
-        self._store.say(f"{_WORK} {lease.batch.dataset_id} {told.model_dump_json()}")
+        self._publish_work(lease.batch.dataset_id, event)
+        self._store.publish(f"{_WORK} {lease.batch.dataset_id} {event.model_dump_json()}")
 
-    def _hear_lease(self, word: str) -> None:
+    def _receive_lease(self, word: str) -> None:
         """Tell of a lease that another process has given."""
         kind, _, rest = word.partition(" ")
         if kind == _WORK:
-            dataset_id, _, told = rest.partition(" ")
-            self._tell_work(int(dataset_id), WorkEvent.model_validate_json(told))
+            dataset_id, _, text = rest.partition(" ")
+            self._publish_work(int(dataset_id), WorkEvent.model_validate_json(text))
 
-    def _tell_work(self, dataset_id: int, told: WorkEvent) -> None:
-        event = _event("work", told)
-        _tell({feed: [event] for feed in self._listening() if feed.wants(dataset_id)})
+    def _publish_work(self, dataset_id: int, document: WorkEvent) -> None:
+        event = _event("work", document)
+        _deliver({feed: [event] for feed in self._listening() if feed.wants(dataset_id)})
 
-    def _tell_job(self, job: Job) -> None:
+    def _publish_job(self, job: Job) -> None:
         event, feeds = _job_event(job), self._listening()
-        _tell({feed: [event] for feed in feeds if feed.wants(job.dataset_id, job.actor)})
+        _deliver({feed: [event] for feed in feeds if feed.wants(job.dataset_id, job.actor)})
 
 
-def _tell(told: Mapping[Feed, list[bytes]], *, ended: bool = False) -> None:
+def _deliver(queued: Mapping[Listener, list[bytes]], *, ended: bool = False) -> None:
     """Tell listeners of something, each loop by one call; from any thread."""
 
     def take(loop: asyncio.AbstractEventLoop) -> None:
-        for feed, events in told.items():
+        for feed, events in queued.items():
             if feed.loop is loop:
                 feed.take(events, ended=ended)
 
-    for loop in {feed.loop for feed in told}:
+    for loop in {feed.loop for feed in queued}:
         # One of a server that has stopped calls nothing any more.
         with suppress(RuntimeError):
             loop.call_soon_threadsafe(take, loop)
 
 
-def hello(position: int) -> bytes:
+def first_event(position: int) -> bytes:
     """What a listener gets first: where it stands, should it have to come back."""
     return format_sse_event(comment="listening", id=str(position), retry=RETRY_MS)
 
@@ -325,8 +332,8 @@ def hello(position: int) -> bytes:
 def _change_event(change: Change) -> bytes:
     identity = None if change.id is None else str(change.id)
     if change.group_id is None:
-        told = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)
-        return _event("dataset", told, identity)
+        document = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)
+        return _event("dataset", document, identity)
     group = GroupEvent(
         group=change.group_id,
         dataset=change.dataset,
@@ -341,5 +348,5 @@ def _job_event(job: Job) -> bytes:
     return _event("job", JobDocument.model_validate(job))
 
 
-def _event(kind: str, told: BaseModel, identity: str | None = None) -> bytes:
-    return format_sse_event(data_str=told.model_dump_json(), event=kind, id=identity)
+def _event(kind: str, document: BaseModel, identity: str | None = None) -> bytes:
+    return format_sse_event(data_str=document.model_dump_json(), event=kind, id=identity)

@@ -126,7 +126,7 @@ class Idempotency:
             problem = make_problem(400, f"{HEADER} must be 1 to 200 visible ASCII characters")
             return problem_response(problem)
         store: Store = request.app.state.services.store
-        async with self._alone(store, keys[0], actor):
+        async with self._respond_alone(store, keys[0], actor):
             known = await self._find(store, keys[0], actor)
             if known is None or await hidden():
                 return await self._carry_out(request, digest, keys[0], actor, work)
@@ -136,14 +136,14 @@ class Idempotency:
             return _replay(known, is_same=is_same)
 
     @asynccontextmanager
-    async def _alone(self, store: Store, key: str, actor: str) -> AsyncIterator[None]:
+    async def _respond_alone(self, store: Store, key: str, actor: str) -> AsyncIterator[None]:
         """Answer while nobody else answers a request of that key, in this process or another."""
         whose = (actor, key)
         try:
             while (first := self._under_way.get(whose)) is not None:
                 await asyncio.wait_for(first.wait(), PATIENCE)
         except TimeoutError:
-            raise _still() from None
+            raise _in_progress_error() from None
         done = self._under_way[whose] = asyncio.Event()
         try:
             if not store.sharing.is_shared:
@@ -164,7 +164,7 @@ class Idempotency:
         until = time.monotonic() + PATIENCE
         while not await run_sync(claim, store, key, actor, limiter=self._finding):
             if time.monotonic() > until:
-                raise _still()
+                raise _in_progress_error()
             await asyncio.sleep(AGAIN_SECONDS)
 
     async def _find(self, store: Store, key: str, actor: str) -> StoredResponse | None:
@@ -200,7 +200,7 @@ def _is_stored(response: Response) -> bool:
     return 200 <= response.status_code < 300 and body is not None and len(body) <= MAX_ANSWER_BYTES
 
 
-def _still() -> OverloadedError:
+def _in_progress_error() -> OverloadedError:
     return OverloadedError("the first request of this key is still being answered")
 
 

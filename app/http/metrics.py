@@ -23,7 +23,7 @@ from app.errors import StorageError
 from app.features.upkeep.service import Home, read_home
 from app.http.events import Counts
 from app.http.pages import ELSEWHERE
-from app.http.request_limits import Doors
+from app.http.request_limits import ClassLimiters
 from app.http.services import Services
 from app.worker_process import COUNTS
 
@@ -38,7 +38,7 @@ REFRESH_SECONDS = 1.0
 _NUMBER = re.compile(r"/[0-9]+(?=/|$)")
 
 
-def install_metrics(app: FastAPI, doors: Doors) -> None:
+def install_metrics(app: FastAPI, doors: ClassLimiters) -> None:
     """Count requests by route, each application for itself, and watch its services.
 
     Of several web processes each counts in a file that all of them read, and whichever answers adds
@@ -108,7 +108,7 @@ class DatabaseCollector(Collector):
 class ProcessCollector(Collector):
     """Reads the numbers of this process: its requests at work, its event streams, its worker processes."""
 
-    def __init__(self, app: FastAPI, doors: Doors):
+    def __init__(self, app: FastAPI, doors: ClassLimiters):
         self._app, self._doors = app, doors
 
     def describe(self) -> Iterator[Metric]:
@@ -118,15 +118,15 @@ class ProcessCollector(Collector):
     def collect(self) -> Iterator[Metric]:
         """Every number of this moment."""
         services: Services = self._app.state.services
-        yield from self._lanes()
+        yield from self._request_classes()
         yield from _streams(services.events.counts)
         yield from _workers()
 
-    def _lanes(self) -> Iterator[Metric]:
+    def _request_classes(self) -> Iterator[Metric]:
         doors = self._doors.all
-        busy = {door.lane.name: door.busy for door in doors}
+        busy = {limiter.lane.name: limiter.busy for limiter in doors}
         yield _gauges("lane_busy", "Requests at work, by kind.", "lane", busy)
-        waiting = {door.lane.name: door.waiting for door in doors}
+        waiting = {limiter.lane.name: limiter.waiting for limiter in doors}
         yield _gauges("lane_waiting", "Requests that wait for their turn.", "lane", waiting)
         refused = {door.lane.name: door.refused for door in doors}
         yield _counter("lane_refused", "Requests refused with Retry-After.", "lane", refused)

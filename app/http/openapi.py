@@ -160,7 +160,7 @@ TAGS = {
     "verdicts": "Many groups judged at once.",
     "queue": "Saved queries, and how much each person has reviewed.",
     "work": "Batches of groups that leads assign, and which person has which group open.",
-    "takes": "Independent annotations, gold groups whose true values are known, guidelines.",
+    "independent annotations": "Independent annotations, gold groups whose true values are known, guidelines.",
     "yield": "What a policy lets through, and what another one would.",
     "agreement": "Agreement of people who annotated the same frames.",
     "comments": "Comments on groups, and notifications.",
@@ -218,7 +218,7 @@ def _document(app: FastAPI) -> dict[str, Any]:
         tags=[{"name": name, "description": text} for name, text in TAGS.items()],
     )
     routes = dict(routes_of(app))
-    _mend_operations(document, routes)
+    _complete_operations(document, routes)
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
@@ -300,7 +300,7 @@ def _give_examples(document: dict[str, Any]) -> None:
                         content["example"] = example_of(content.get("schema", {}), schemas)
 
 
-def _mend_operations(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
+def _complete_operations(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
     """Say what the framework cannot know, and not what belongs to a newer OpenAPI."""
     for path, operations in document["paths"].items():
         for method, operation in operations.items():

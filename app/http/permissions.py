@@ -28,8 +28,8 @@ from app.features.people.ownership import (
 from app.features.people.ownership import OwnedKind as OwnedKind
 from app.features.people.roles import Action as Action
 from app.features.people.roles import DatasetRoles, Role, require
-from app.features.people.visibility_queries import EVERYTHING, Sight
-from app.features.queue.fields import asks_blind
+from app.features.people.visibility_queries import EVERYTHING, Visibility
+from app.features.queue.fields import reads_hidden_work
 from app.finite import MAX_ID, quoted
 
 E = TypeVar("E", bound=Callable[..., Any])
@@ -168,7 +168,7 @@ class OwnedMention:
 
 
 @dataclass(frozen=True)
-class AskedAbout:
+class RequestSubject:
     """A request as far as it says what it is about: its query and its JSON body, read already."""
 
     permission: Permission
@@ -179,20 +179,22 @@ class AskedAbout:
     @staticmethod
     def of(
         permission: Permission, path: Mapping[str, str], query_string: str, body: Any
-    ) -> AskedAbout:
+    ) -> RequestSubject:
         """What a request names, by the parameters of its path and the rest of it."""
         query = tuple(parse_qsl(query_string, keep_blank_values=True))
-        return AskedAbout(permission, query, body, tuple(_mentions(permission, path, query, body)))
+        return RequestSubject(
+            permission, query, body, tuple(_mentions(permission, path, query, body))
+        )
 
 
-def require_allowed(store: Store, asked: AskedAbout, login: Login) -> list[OwnedMention]:
+def require_allowed(store: Store, subject: RequestSubject, login: Login) -> list[OwnedMention]:
     """Where everything is that a request names, as far as its reader may know.
 
     Raises:
         ForbiddenError: They may not do that where they see what it names.
     """
-    owned = _owned(store, asked, login)
-    _require_roles(asked, owned, login)
+    owned = _owned(store, subject, login)
+    _require_roles(subject, owned, login)
     return owned
 
 
@@ -217,13 +219,13 @@ def is_hidden(store: Store, owned: list[OwnedMention]) -> bool:
     )
 
 
-def takes_looking(asked: AskedAbout, login: Login) -> bool:
+def needs_database(subject: RequestSubject, login: Login) -> bool:
     """Whether ``require_allowed`` has to ask the database."""
-    named = (mention.named for mention in asked.mentions)
-    return not login.roles.is_admin and any(_is_looked_for(one, login.roles) for one in named)
+    named = (mention.named for mention in subject.mentions)
+    return not login.roles.is_admin and any(_is_lookup(one, login.roles) for one in named)
 
 
-def _owned(store: Store, asked: AskedAbout, login: Login) -> list[OwnedMention]:
+def _owned(store: Store, subject: RequestSubject, login: Login) -> list[OwnedMention]:
     """Where everything is that a request mentions.
 
     Each is found by one indexed statement, and none is asked for where it decides nothing: an
@@ -232,28 +234,28 @@ def _owned(store: Store, asked: AskedAbout, login: Login) -> list[OwnedMention]:
     if login.roles.is_admin:
         return []
     found: list[OwnedMention] = []
-    sight = login.sight
+    visibility = login.visibility
     # What a query names comes first: it says which of the versions of a name is meant.
-    for mention in sorted(asked.mentions, key=lambda item: item.place != "query"):
-        ownership = _ownership(store, mention.named, login, sight)
+    for mention in sorted(subject.mentions, key=lambda item: item.place != "query"):
+        ownership = _ownership(store, mention.named, login, visibility)
         if mention.place == "query" and ownership is not None and ownership.dataset is not None:
-            sight = Sight(False, frozenset({ownership.dataset}), login.owner)
+            visibility = Visibility(False, frozenset({ownership.dataset}), login.owner)
         found.append(OwnedMention(mention, ownership))
     return found
 
 
-def _require_roles(asked: AskedAbout, owned: list[OwnedMention], login: Login) -> None:
-    roles, permission = login.roles, asked.permission
+def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Login) -> None:
+    roles, permission = login.roles, subject.permission
     action, where = permission.action, permission.where
     if roles.is_admin or action is None:
         return
-    if where is Where.EVERYWHERE or _names_what_is_nobodys(asked):
+    if where is Where.EVERYWHERE or _names_operator_folder(subject):
         require(roles.everywhere, action, ALL)
     elif where is Where.OWN and roles.limited:
         require(Role.NONE, action, ALL)
-    elif not asked.mentions and action is Action.ADMINISTER:
+    elif not subject.mentions and action is Action.ADMINISTER:
         require(roles.everywhere, action)
-    elif not asked.mentions and not (where is Where.SOMEWHERE and action is Action.READ):
+    elif not subject.mentions and not (where is Where.SOMEWHERE and action is Action.READ):
         require(roles.highest, action)
     for item in owned:
         if item.mention.named.kind is OwnedKind.NEW_DATASET:
@@ -262,7 +264,7 @@ def _require_roles(asked: AskedAbout, owned: list[OwnedMention], login: Login) -
             here = HERE if roles.single and item.ownership.dataset is not None else ""
             role = role_at(item.ownership, roles, login.owner)
             require(role, action, here)
-            if asks_what_is_blind(asked):
+            if reads_hidden_work_of(subject):
                 require(role, Action.REVIEW, here)
             whole = item.mention.named.kind in WHOLE or permission.whole
             if whole and item.ownership.dataset in roles.blind:
@@ -272,13 +274,13 @@ def _require_roles(asked: AskedAbout, owned: list[OwnedMention], login: Login) -
                 )
 
 
-def asks_what_is_blind(asked: AskedAbout) -> bool:
+def reads_hidden_work_of(subject: RequestSubject) -> bool:
     """Whether a query of groups asks what others made of them: annotators are not to know.
 
     Queries are parameters, and fields of bodies, named ``q`` or ``query``.
     """
-    texts = [value for name, value in asked.query if name in QUERIES]
-    return any(asks_blind(text) for text in (*texts, *_queries_in(asked.body)))
+    texts = [value for name, value in subject.query if name in QUERIES]
+    return any(reads_hidden_work(text) for text in (*texts, *_queries_in(subject.body)))
 
 
 def _queries_in(body: Any) -> Iterator[str]:
@@ -293,11 +295,11 @@ def _queries_in(body: Any) -> Iterator[str]:
             waiting.extend(value)
 
 
-def _names_what_is_nobodys(asked: AskedAbout) -> bool:
+def _names_operator_folder(subject: RequestSubject) -> bool:
     """Whether a body names a folder of the operator, which lies beside all datasets."""
     return any(
-        kind is OwnedKind.FOLDER and _field(asked.body, name) is not None
-        for name, kind in asked.permission.body.items()
+        kind is OwnedKind.FOLDER and _field(subject.body, name) is not None
+        for name, kind in subject.permission.body.items()
     )
 
 
@@ -313,11 +315,13 @@ def _require_new(present: Ownership | None, roles: DatasetRoles, action: Action)
     )
 
 
-def _ownership(store: Store, named: Named, login: Login, sight: Sight) -> Ownership | None:
+def _ownership(
+    store: Store, named: Named, login: Login, visibility: Visibility
+) -> Ownership | None:
     roles: DatasetRoles = login.roles
-    if not _is_looked_for(named, roles):
+    if not _is_lookup(named, roles):
         return None if roles.everywhere is Role.NONE else Ownership(None, frozenset({login.owner}))
-    found = find_ownership(store, named, sight)
+    found = find_ownership(store, named, visibility)
     if found is None or named.kind is OwnedKind.NEW_DATASET:
         return found
     hidden = role_at(found, roles, login.owner) is Role.NONE or is_hidden_from(
@@ -326,7 +330,7 @@ def _ownership(store: Store, named: Named, login: Login, sight: Sight) -> Owners
     return None if hidden else found
 
 
-def _is_looked_for(named: Named, roles: DatasetRoles) -> bool:
+def _is_lookup(named: Named, roles: DatasetRoles) -> bool:
     """Whether it matters where something is: who is the same everywhere is so there."""
     return bool(roles.single or roles.blind) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
 

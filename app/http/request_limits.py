@@ -43,7 +43,7 @@ BUSY_PAGE = f"""<!doctype html>
 
 
 @dataclass(frozen=True)
-class Lane:
+class RequestClass:
     """Requests of one kind.
 
     Args:
@@ -67,38 +67,38 @@ class Lane:
     pause: float = 0.0
 
 
-LOOKS = Lane("looks", 2, 200)
+LOOKS = RequestClass("looks", 2, 200)
 """What one group, view or camera is, and what a window asks again and again."""
-PAGES = Lane("pages", 2, 200)
+PAGES = RequestClass("pages", 2, 200)
 """The page of the browser application, whichever address it is asked for under."""
-READS = Lane("reads", min(4, max(2, os.cpu_count() or 2)), 200, each=1)
+READS = RequestClass("reads", min(4, max(2, os.cpu_count() or 2)), 200, each=1)
 """All other reading: lists and counts of many groups, which the database takes a processor for. What one
 person of a team asks is read one after the other: two long lists at once take the server from all others."""
-EDITS = Lane("edits", 1, 100, served=3)
+EDITS = RequestClass("edits", 1, 100, served=3)
 """What people do to one group, view or lease all day: read, solved and encoded one after the other. Who
 waits for the disk or a picture has left already (``app.admission``)."""
-CHANGES = Lane("changes", 3, 100)
+CHANGES = RequestClass("changes", 3, 100)
 """All others; they may take their time."""
-PREVIEWS = Lane("previews", 1, 100, apart=2, each=1)
+PREVIEWS = RequestClass("previews", 1, 100, apart=2, each=1)
 """What a drag asks: some milliseconds of solving, dozens where lines are dragged. A person drags one thing at
 a time."""
-LARGE = Lane("large", 1, 50)
+LARGE = RequestClass("large", 1, 50)
 """Edits and previews of hundreds of points, each of which is solved for as long as dozens of others, and
 edits of many views at once."""
-QUESTIONS = Lane("questions", 2, 100)
+QUESTIONS = RequestClass("questions", 2, 100)
 """What is answered by solving many times, or many groups; it takes up to seconds."""
-STREAMS = Lane("streams", 1, 200)
+STREAMS = RequestClass("streams", 1, 200)
 """Those that begin: who listens takes nobody's place. All windows of a team come back at the same
 moment when a server starts again, and what each asks first would keep readers waiting."""
-IMAGES = Lane("images", 6, 200)
-UPLOADS = Lane("uploads", 8, 8, each=4, pause=4.0)
-ZIPS = Lane("zips", 16, 100)
+IMAGES = RequestClass("images", 6, 200)
+UPLOADS = RequestClass("uploads", 8, 8, each=4, pause=4.0)
+ZIPS = RequestClass("zips", 16, 100)
 """Those of exports, which a request may find still being written."""
-LOGINS = Lane("logins", 4, 50)
+LOGINS = RequestClass("logins", 4, 50)
 """Passwords, whose hashes take some tenths of a second of a processor."""
-SIGN_ONS = Lane("sign-ons", 4, 50)
+SIGN_ONS = RequestClass("sign-ons", 4, 50)
 """Single sign-on, whose provider may take its time, or never answer."""
-LANES = (
+REQUEST_CLASSES = (
     LOOKS,
     PAGES,
     READS,
@@ -118,14 +118,18 @@ LARGE_BYTES = 8 * 1024
 """A body beyond these draws hundreds of points."""
 AWAY = 8
 """So many of a lane may have left it before they were done."""
-THREADS = sum(max(lane.width, lane.served or 0, lane.apart or 0) for lane in LANES) + 2 * AWAY + 6
+THREADS = (
+    sum(max(lane.width, lane.served or 0, lane.apart or 0) for lane in REQUEST_CLASSES)
+    + 2 * AWAY
+    + 6
+)
 """A thread for each request at work, for as many edits and changes as may have left, and some for files
 of the browser application."""
 
 _LANE = "lane"
 
 
-def limit(lane: Lane | None) -> Callable[[E], E]:
+def limit(lane: RequestClass | None) -> Callable[[E], E]:
     """Say of which kind the requests of a route are; None: they need no thread for long.
 
     A route that does not say it is of ``READS``, or of ``CHANGES``.
@@ -138,10 +142,10 @@ def limit(lane: Lane | None) -> Callable[[E], E]:
     return decorate
 
 
-def lane_of(endpoint: Callable[..., Any], methods: Collection[str]) -> Lane | None:
+def request_class(endpoint: Callable[..., Any], methods: Collection[str]) -> RequestClass | None:
     """The lane of a route, by the function that answers and its methods."""
     otherwise = READS if set(methods) <= SAFE_METHODS else CHANGES
-    found: Lane | None = getattr(endpoint, _LANE, otherwise)
+    found: RequestClass | None = getattr(endpoint, _LANE, otherwise)
     return found
 
 
@@ -152,7 +156,7 @@ def is_large(scope: Scope) -> bool:
     return int(size) > LARGE_BYTES if size.isdecimal() else "transfer-encoding" in headers
 
 
-class Turns:
+class FairLimiter:
     """Places on one event loop, given to those who wait person by person.
 
     Whoever sends a hundred requests at once waits for them himself; others wait for one of them each.
@@ -233,20 +237,24 @@ class Turns:
             del self._of[who]
 
 
-class Door:
+class ClassLimiter:
     """The door of one lane: who is at work, who waits, and how many were turned away.
 
     Args:
-        lane: The lane.
+        request_class: The lane.
         served: Whether a server of databases answers.
         apart: Whether there are processes for what takes long.
     """
 
-    def __init__(self, lane: Lane, served: bool = False, apart: bool = False):
-        self.lane = lane
+    def __init__(self, request_class: RequestClass, served: bool = False, apart: bool = False):
+        self.lane = request_class
         self.refused = self.away = 0
-        width = (served and lane.served) or (apart and lane.apart) or lane.width
-        self._turns = Turns(width, lane.queue, lane.each)
+        width = (
+            (served and request_class.served)
+            or (apart and request_class.apart)
+            or request_class.width
+        )
+        self._turns = FairLimiter(width, request_class.queue, request_class.each)
 
     @property
     def busy(self) -> int:
@@ -280,14 +288,16 @@ class Door:
         self._turns.give(who)
 
 
-class Doors:
-    """The doors of all lanes of one server; ``served``, ``apart``: see ``Door``."""
+class ClassLimiters:
+    """The doors of all lanes of one server; ``served``, ``apart``: see ``ClassLimiter``."""
 
     def __init__(self, served: bool = False, apart: bool = False) -> None:
-        self.all = tuple(Door(lane, served, apart) for lane in LANES)
-        self._of = {door.lane: door for door in self.all}
+        self.all = tuple(
+            ClassLimiter(request_class, served, apart) for request_class in REQUEST_CLASSES
+        )
+        self._of = {limiter.lane: limiter for limiter in self.all}
 
-    def of(self, lane: Lane | None, scope: Scope) -> Door | None:
+    def of(self, lane: RequestClass | None, scope: Scope) -> ClassLimiter | None:
         """The door that a request of a lane goes through, if any."""
         if lane in (EDITS, PREVIEWS) and is_large(scope):
             lane = LARGE
@@ -295,7 +305,7 @@ class Doors:
 
 
 @asynccontextmanager
-async def turn(door: Door | None, scope: Scope) -> AsyncIterator[Response | None]:
+async def turn(door: ClassLimiter | None, scope: Scope) -> AsyncIterator[Response | None]:
     """A request's turn, once it comes; what its sender is told instead where too many wait already.
 
     The turn ends when the answer is there, for sending it to a slow client takes nobody's place; and
@@ -317,14 +327,14 @@ async def turn(door: Door | None, scope: Scope) -> AsyncIterator[Response | None
         place.end()
 
 
-def _refusal(scope: Scope, lane: Lane) -> Response:
+def _refusal(scope: Scope, request_class: RequestClass) -> Response:
     """What who had no turn is told: a page for people who asked for one, else a problem."""
     later = {"Retry-After": RETRY_SECONDS}
-    if lane is PAGES and "text/html" in Headers(scope=scope).get("accept", ""):
+    if request_class is PAGES and "text/html" in Headers(scope=scope).get("accept", ""):
         return HTMLResponse(BUSY_PAGE, 503, {**later, "Cache-Control": "no-store"})
     problem = make_problem(
         503,
-        f"the server is busy with other {lane.name}",
+        f"the server is busy with other {request_class.name}",
         hint="Nothing was done. Send it again in a moment.",
     )
     return problem_response(problem, later)
@@ -333,8 +343,8 @@ def _refusal(scope: Scope, lane: Lane) -> Response:
 class _Place:
     """One request's place in its lane; it is given back once."""
 
-    def __init__(self, door: Door, who: str):
-        self._door, self._who, self._has, self._is_over = door, who, True, False
+    def __init__(self, limiter: ClassLimiter, who: str):
+        self._door, self._who, self._has, self._is_over = limiter, who, True, False
         self._loop = asyncio.get_running_loop()
 
     def leave_from_anywhere(self) -> None:

@@ -33,8 +33,8 @@ from app.http.bodies import (
 )
 from app.http.idempotency import Idempotency, RequestDigest
 from app.http.origin import SAFE_METHODS
-from app.http.permissions import AskedAbout, OwnedMention, Permission, permission_of
-from app.http.request_limits import Doors, lane_of, turn
+from app.http.permissions import OwnedMention, Permission, RequestSubject, permission_of
+from app.http.request_limits import ClassLimiters, request_class, turn
 from app.soccer.actors import LOCAL_USER
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -53,7 +53,7 @@ class Gate:
 
     access: Access | None
     idempotency: Idempotency
-    doors: Doors
+    doors: ClassLimiters
     max_json_bytes: int
 
 
@@ -75,7 +75,7 @@ class Route(APIRoute):
         if permission is None:
             raise TypeError(f"{path}: say who may ask it, with @may below the route")
         self.permission = permission
-        self.lane = lane_of(endpoint, options.get("methods") or ("GET",))
+        self.lane = request_class(endpoint, options.get("methods") or ("GET",))
         content = (options.get("openapi_extra") or {}).get("requestBody", {}).get("content", {})
         self._takes_bytes = BYTES in content
         super().__init__(path, endpoint, **options)
@@ -115,7 +115,7 @@ class Route(APIRoute):
     ) -> Response:
         """The answer to somebody, if they may have it."""
         scope = request.scope
-        asked = AskedAbout.of(
+        asked = RequestSubject.of(
             self.permission,
             request.path_params,
             scope["query_string"].decode("latin-1"),

@@ -13,7 +13,7 @@ import structlog
 from app.config import Settings
 from app.db.store import Store
 from app.errors import BusyError
-from app.features.agreement.service import weigh_left
+from app.features.agreement.service import compare_left
 from app.features.exports.folder import ExportFolder
 from app.features.exports.jobs import resume_exports
 from app.features.groups.large_edit_routes import LargeEdits
@@ -115,7 +115,7 @@ class Services:
             StatisticsStore(store),
             NoiseStore(store),
             Upkeep(store, jobs),
-            WebhookSender(store, leads=jobs.leads),
+            WebhookSender(store, leads=jobs.is_leader),
         )
 
     def start(self) -> None:
@@ -132,23 +132,23 @@ class Services:
         resume_recordings(self.jobs, self.store)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
-        self.jobs.on_lead(self._lead)
+        self.jobs.on_leadership(self._start_leading)
         self.jobs.start()
-        self.store.follow()
+        self.store.subscribe()
         self.upkeep.start()
         self.webhooks.start()
 
-    def _lead(self) -> None:
+    def _start_leading(self) -> None:
         """Begin what one process does for all."""
         if not self._solved_leftovers():
             Thread(target=self._solve_leftovers_later, daemon=True).start()
-        Thread(target=self._weigh_left, name="agreement", daemon=True).start()
+        Thread(target=self._compare_left, name="agreement", daemon=True).start()
         self.webhooks.wake()
 
-    def _weigh_left(self) -> None:
+    def _compare_left(self) -> None:
         """Compare annotations that an earlier run was stopped before."""
         try:
-            weigh_left(self.store, self.paint)
+            compare_left(self.store, self.paint)
         except Exception:
             log.exception("annotations could not be compared")
 

@@ -106,8 +106,10 @@ class IndexPage:
 
     def at(self, moment: str, banner: str = "") -> IndexPage:
         """The page that says how things stood when it was asked for, and which notice is shown."""
-        told = f'data-moment="{moment}" ' + (f'data-banner="{escape(banner)}" ' if banner else "")
-        html = self.html.replace(b"<html ", f"<html {told}".encode(), 1)
+        attributes = f'data-moment="{moment}" ' + (
+            f'data-banner="{escape(banner)}" ' if banner else ""
+        )
+        html = self.html.replace(b"<html ", f"<html {attributes}".encode(), 1)
         version = f"{moment}-{digest_of(banner.encode())[:8]}" if banner else moment
         return replace(self, html=html, etag=f'{self.etag[:-1]}-{version}"')
 

@@ -58,11 +58,11 @@ def stored_file(settings: Settings, sealed: str, name: str, request: Request) ->
 def _part(
     store: ObjectStore, stored: Stored, headers: dict[str, str], request: Request
 ) -> Response:
-    asked = request.headers.get("range", "")
+    range_header = request.headers.get("range", "")
     # A range of another content than the one that is there would be a part of nothing.
     if request.headers.get("if-range", stored.etag) != stored.etag:
-        asked = ""
-    span = _span(asked, stored.size)
+        range_header = ""
+    span = _span(range_header, stored.size)
     if span is None:
         return Response(
             status_code=416, headers={**headers, "Content-Range": f"bytes */{stored.size}"}
@@ -80,9 +80,9 @@ def _part(
     )
 
 
-def _span(asked: str, size: int) -> tuple[int, int] | None:
+def _span(range_header: str, size: int) -> tuple[int, int] | None:
     """First byte and the one after the last, of one range; None where it begins after the end."""
-    found = _RANGE.fullmatch(asked.strip())
+    found = _RANGE.fullmatch(range_header.strip())
     if found is None or found[1] == found[2] == "":
         return 0, size
     if not found[1]:

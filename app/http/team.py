@@ -15,7 +15,7 @@ from app.errors import ConflictError, NotLoggedInError
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.devices import CHALLENGE_LASTS, Devices
 from app.features.people.devices import LASTS as DEVICE_LASTS
-from app.features.people.logins import LASTS, Login, Logins, Way
+from app.features.people.logins import LASTS, Login, LoginMethod, Logins
 from app.features.people.passkeys import Passkeys, PasskeySite
 from app.features.people.second_factor import SecondFactors
 from app.features.people.sign_on import LASTS as BEGUN_LASTS
@@ -74,7 +74,7 @@ class Team:
         rules = read_rules(settings)
         if not settings.team:
             return None
-        logins = Logins(store, only=Way.SIGN_ON if rules and rules.only else None)
+        logins = Logins(store, only=LoginMethod.SIGN_ON if rules and rules.only else None)
         return Team(
             logins,
             AccessTokens(store),
@@ -164,11 +164,11 @@ class Team:
         Raises:
             ConflictError: Browsers make no passkeys for it.
         """
-        said = urlsplit(self.base(request))
-        name = said.hostname or ""
-        if name == "localhost" or (said.scheme == "https" and not _is_number(name)):
-            port = f":{said.port}" if said.port not in (None, 80, 443) else ""
-            return PasskeySite(name, f"{said.scheme}://{name}{port}")
+        url = urlsplit(self.base(request))
+        name = url.hostname or ""
+        if name == "localhost" or (url.scheme == "https" and not _is_number(name)):
+            port = f":{url.port}" if url.port not in (None, 80, 443) else ""
+            return PasskeySite(name, f"{url.scheme}://{name}{port}")
         raise ConflictError(
             "browsers make no passkeys for this address",
             hint="They need https and a name (touchline serve --team --url), or localhost.",

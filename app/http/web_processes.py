@@ -30,7 +30,7 @@ log = structlog.get_logger("touchline")
 Part = Callable[[Settings, socket.socket], None]
 """Serves until its process is told to stop."""
 
-GLANCE_SECONDS = 0.2
+POLL_SECONDS = 0.2
 AGAIN_SECONDS = 1.0
 """Before a process is started in the place of one that died."""
 STOP_SECONDS = 30.0
@@ -46,19 +46,19 @@ def serve_with(count: int, part: Part, settings: Settings, listening: socket.soc
         settings: Of the server.
         listening: The socket that all of them take connections from.
     """
-    asked = (part, settings, listening)
-    with _told_to_stop() as stopping, _shared_metrics() as metrics:
-        running = [_start(*asked) for _ in range(count)]
+    arguments = (part, settings, listening)
+    with _stop_event() as stopping, _shared_metrics() as metrics:
+        running = [_start(*arguments) for _ in range(count)]
         try:
             while not stopping.is_set():
-                wait([process.sentinel for process in running], timeout=GLANCE_SECONDS)
+                wait([process.sentinel for process in running], timeout=POLL_SECONDS)
                 for place, process in enumerate(running):
                     if not process.is_alive() and not stopping.is_set():
                         log.error("a process of the server died", process=process.pid)
                         # What it has counted stays counted; what it was at is over.
                         mark_process_dead(process.pid, metrics)  # type: ignore[no-untyped-call]
                         stopping.wait(AGAIN_SECONDS)
-                        running[place] = _start(*asked)
+                        running[place] = _start(*arguments)
         finally:
             _stop(running)
 
@@ -94,16 +94,16 @@ def _shared_metrics() -> Iterator[str]:
 
 
 @contextmanager
-def _told_to_stop() -> Iterator[Event]:
+def _stop_event() -> Iterator[Event]:
     """Set once this process is asked to end."""
-    asked = Event()
+    stopping = Event()
 
     def stop(*_: Any) -> None:
-        asked.set()
+        stopping.set()
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGINT)}
     try:
-        yield asked
+        yield stopping
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -42,7 +42,7 @@ from app.media.images import JPEG
 from app.media.neighbours import neighbours
 from app.media.object_frames import fetch_frame, is_kept, is_stored
 from app.media.video import Times, remember_index, remembered_index
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.media import Media
 from app.worker_pool import Explain, PoolTask, WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
@@ -62,7 +62,7 @@ INDEXING = WorkerLimits(memory=1024 * 2**20, processor=3600.0, silence=3600.0)
 INDEXERS = 1
 UNKEPT = 8
 """Videos whose indices are remembered that the disk refuses."""
-TELL_SECONDS = 1.0
+REPORT_SECONDS = 1.0
 """Between two words of whoever waits for an index."""
 WAITING = 64
 """Pictures that may wait; one more is told to come back."""
@@ -211,10 +211,10 @@ class Frames:
         """Have a frame read, once its video is indexed: a reader has not the time for that."""
 
         def submit(bounded: bool) -> PoolTask:
-            asked = (work, *arguments)
+            call = (work, *arguments)
             if media is not None:
-                asked = self._videos.with_index(media, *asked)
-            return self._readers.submit(*asked, explain=explain, bounded=bounded)
+                call = self._videos.with_index(media, *call)
+            return self._readers.submit(*call, explain=explain, bounded=bounded)
 
         indexing = None
         if media is not None:
@@ -230,14 +230,14 @@ class Frames:
                 return
             error = None if done.cancelled() else done.exception()
             if done.cancelled() or not isinstance(error, ImageError | NotFoundError | None):
-                _pass_on(waiting.future, done)
+                _forward_result(waiting.future, done)
                 return
             # It has waited already.
             reading = submit(bounded=False)
             waiting.future.add_done_callback(
                 lambda one: reading.leave() if one.cancelled() else None
             )
-            reading.future.add_done_callback(partial(_pass_on, waiting.future))
+            reading.future.add_done_callback(partial(_forward_result, waiting.future))
 
         indexing.future.add_done_callback(go_on)
         return waiting
@@ -320,7 +320,7 @@ class VideoIndexer:
         running.future.add_done_callback(partial(self._done, media.path))
         # Who waits may leave; the index is made all the same, for it takes long and is needed again.
         waiting = PoolTask(explain)
-        running.future.add_done_callback(partial(_pass_on, waiting.future))
+        running.future.add_done_callback(partial(_forward_result, waiting.future))
         return waiting
 
     def make_ready(
@@ -328,7 +328,7 @@ class VideoIndexer:
         pictures: Iterable[Media | None],
         done: int,
         total: int,
-        progress: TellProgress | None,
+        progress: ReportProgress | None,
     ) -> None:
         """Index the videos of frames that will be read; what is wrong with one its reader says.
 
@@ -344,7 +344,7 @@ class VideoIndexer:
                 with suppress(NotFoundError):
                     indexing = self.ask(media, bounded=False)
             while indexing is not None and not indexing.future.done():
-                wait([indexing.future], TELL_SECONDS)
+                wait([indexing.future], REPORT_SECONDS)
                 if progress is not None and media is not None:
                     progress(done, total, f"Finding the frames of {Path(media.path).name}.")
 
@@ -379,7 +379,7 @@ class VideoIndexer:
         self._running.pop(path, None)
 
 
-def _pass_on(waiting: Future[Any], done: Future[Any]) -> None:
+def _forward_result(waiting: Future[Any], done: Future[Any]) -> None:
     """Give what became of a task to one who waits for it."""
     if done.cancelled():
         waiting.cancel()

@@ -53,13 +53,13 @@ def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Med
         number = int(digits) + offset
         # 100 may follow 099 or 99.
         for text in dict.fromkeys((f"{number:0{len(digits)}d}", str(number))):
-            there = _there(media, str(name.with_name(f"{head}{text}{name.suffix}")))
+            there = _existing_neighbour(media, str(name.with_name(f"{head}{text}{name.suffix}")))
             if number >= 0 and there is not None:
                 yield offset, there
                 break
 
 
-def _there(media: Media, name: str) -> Media | None:
+def _existing_neighbour(media: Media, name: str) -> Media | None:
     """The neighbour of that name, in the same folder or archive, if it is one."""
     if media.member is not None:
         return replace(media, member=name) if has_member(media, name) else None

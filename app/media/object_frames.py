@@ -300,7 +300,7 @@ class ObjectCache:
 
     def _make_room(self) -> None:
         """Delete what was not asked for longest; one process at a time."""
-        with self._alone() as mine:
+        with self._exclusive() as mine:
             if not mine:
                 return
             found = sorted(self._files())
@@ -319,7 +319,7 @@ class ObjectCache:
                     yield status.st_mtime_ns, status.st_size, path
 
     @contextlib.contextmanager
-    def _alone(self) -> Iterator[bool]:
+    def _exclusive(self) -> Iterator[bool]:
         """Whether no other makes room any more: what was written meanwhile counts, too."""
         handle = os.open(self._folder, os.O_RDONLY | os.O_CLOEXEC)
         try:

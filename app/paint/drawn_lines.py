@@ -97,14 +97,14 @@ def _side(
 
 def _contradiction(apart: Mapping[str, float], limit: float) -> str:
     """Which drawn markings contradict; empty where none does."""
-    said = [
+    names = [
         f"“{name}” is drawn where the proposed camera does not see it"
         if np.isinf(distance)
         else f"“{name}” is drawn up to {distance:.0f} px from where the proposed lines put it"
         for name, distance in apart.items()
         if distance > limit
     ]
-    if not said:
+    if not names:
         return ""
-    advice = "It stays as drawn" if len(said) == 1 else "They stay as drawn"
-    return f"{', and '.join(said)}. {advice}: look whether label and place are right."
+    advice = "It stays as drawn" if len(names) == 1 else "They stay as drawn"
+    return f"{', and '.join(names)}. {advice}: look whether label and place are right."

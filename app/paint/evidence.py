@@ -17,7 +17,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
 from app.paint.grass_colour import grass_colour
 from app.paint.profile_kernels import BEYOND_PX, SIDE_PX, drop_strays, find_stripes
-from app.paint.tracing import Traced, trace_places
+from app.paint.tracing import TracedPlaces, trace_places
 from app.soccer.frames import Box
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint
 from app.soccer.pitch import MARKINGS, Pitch
@@ -94,7 +94,7 @@ class Evidence:
         strengths: How much brighter than the grass beside it, grey levels, shape (N,).
     """
 
-    traced: Traced
+    traced: TracedPlaces
     offsets: FloatArray
     sigmas: FloatArray
     strengths: FloatArray
@@ -147,7 +147,9 @@ def seen_field(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
     return seen
 
 
-def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SPACING_PX) -> Traced:
+def trace(
+    reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SPACING_PX
+) -> TracedPlaces:
     """Places along the markings as the camera shows them, on the field of play.
 
     Args:
@@ -160,7 +162,7 @@ def trace(reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SP
     return traced.only(found, int(on_field.sum()))
 
 
-def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evidence:
+def seek(reading: Reading, traced: TracedPlaces, window_px: float | FloatArray) -> Evidence:
     """Paint across each place, sought up to a distance.
 
     Args:
@@ -177,7 +179,7 @@ def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evi
     offsets[~_bright_as_paint(strengths, traced.widths)] = np.nan
     drop_strays(offsets, traced.marking, AROUND, APART_PX, CONFIRMED)
     kept = np.flatnonzero(np.isfinite(offsets))
-    seen = Traced(
+    seen = TracedPlaces(
         traced.places[kept],
         traced.pixels[kept],
         traced.normals[kept],
@@ -191,7 +193,7 @@ def seek(reading: Reading, traced: Traced, window_px: float | FloatArray) -> Evi
     return Evidence(seen, offsets[kept], sigma, strengths[kept])
 
 
-def shows_grass_beside(reading: Reading, traced: Traced, window_px: float) -> BoolArray:
+def shows_grass_beside(reading: Reading, traced: TracedPlaces, window_px: float) -> BoolArray:
     """Where paint would be seen if it was there: in the picture, with grass to both sides.
 
     Args:

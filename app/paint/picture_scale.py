@@ -13,7 +13,7 @@ import numpy as np
 from app.geometry.arrays import BoolArray
 from app.paint.evidence import Image, to_paint_evidence
 from app.paint.propose import LEAST_SIDE
-from app.paint.snap import Snapped
+from app.paint.snap import SnappedCamera
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint
 
@@ -35,7 +35,7 @@ class PictureScale:
         """Of a picture, shape (H, W, 3), and its annotated size."""
         return PictureScale(image.shape[1] / size.width, image.shape[0] / size.height)
 
-    def told(self, x: float, y: float) -> ImagePoint:
+    def sentence(self, x: float, y: float) -> ImagePoint:
         """A place of the picture in pixels of the annotations; centres of pixels are whole."""
         return ImagePoint((x + 0.5) / self.x - 0.5, (y + 0.5) / self.y - 0.5)
 
@@ -44,11 +44,11 @@ class PictureScale:
         x, y = ((box.x + 0.5) * self.x - 0.5, (box.y + 0.5) * self.y - 0.5)
         return Box(x, y, box.width * self.x, box.height * self.y)
 
-    def evidence(self, snapped: Snapped) -> PaintEvidence:
+    def evidence(self, snapped: SnappedCamera) -> PaintEvidence:
         """The paint that was found, in pixels of the annotations."""
         found = to_paint_evidence(snapped.evidence, snapped.camera)
         points = {
-            name: tuple(PaintPoint(*self.told(x, y), sigma / self.x) for x, y, sigma in places)
+            name: tuple(PaintPoint(*self.sentence(x, y), sigma / self.x) for x, y, sigma in places)
             for name, places in found.points.items()
         }
         return replace(found, points=points)
@@ -58,7 +58,7 @@ class PictureScale:
         rows, columns = np.nonzero(paint)
         step = -(-len(rows) // MOST_LINE_LIKE) or 1
         places = zip(columns[::step].tolist(), rows[::step].tolist(), strict=True)
-        return tuple(self.told(x, y) for x, y in places)
+        return tuple(self.sentence(x, y) for x, y in places)
 
 
 def why_unreadable(image: Image, size: ImageSize) -> str | None:

@@ -174,13 +174,13 @@ def drop_strays(offsets, marking, around, apart, share):
     for n in range(len(offsets)):
         if np.isnan(offsets[n]):
             continue
-        asked, agree = 0, 0
+        neighbours, agree = 0, 0
         for i in range(max(n - around, 0), min(n + around + 1, len(offsets))):
             if marking[i] == marking[n]:
-                asked += 1
+                neighbours += 1
                 if abs(offsets[i] - offsets[n]) <= apart:
                     agree += 1
-        confirmed[n] = agree >= share * asked
+        confirmed[n] = agree >= share * neighbours
     for n in range(len(offsets)):
         if not confirmed[n]:
             offsets[n] = np.nan

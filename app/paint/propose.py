@@ -37,8 +37,16 @@ from app.paint.goal import goal_height
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.ridges import line_like
 from app.paint.scoring import ScoredPicture
-from app.paint.search import KAPPA_MEAN, SCOUTED, SEARCHED, Shown, search, shown_by, shows_the_same
-from app.paint.snap import Snapped, snap_reading
+from app.paint.search import (
+    KAPPA_MEAN,
+    SCOUTED,
+    SEARCHED,
+    VisiblePaint,
+    search,
+    shown_by,
+    shows_the_same,
+)
+from app.paint.snap import SnappedCamera, snap_reading
 from app.paint.straight import straight_pieces
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize
@@ -109,7 +117,7 @@ class FrameProposal:
     reason: str | None
     camera: Camera | None = None
     agreement: PaintAgreement | None = None
-    snapped: Snapped | None = None
+    snapped: SnappedCamera | None = None
     runner_up: float | None = None
     weakest: float | None = None
 
@@ -127,7 +135,7 @@ class SearchedFrame:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class RankedCamera:
     """A camera on the paint, and how well it agrees with all of it.
 
     Attributes:
@@ -136,7 +144,7 @@ class Ranked:
         known: Covariance of where it started, shape (8, 8), where the match knows the position.
     """
 
-    snapped: Snapped
+    snapped: SnappedCamera
     agreement: PaintAgreement
     weakest: float
     policy: CalibrationPolicy = field(default_factory=CalibrationPolicy)
@@ -180,7 +188,7 @@ def propose(
     frame = read_frame(image)
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
-    ranked: list[Ranked] = []
+    ranked: list[RankedCamera] = []
     match = known_library(known) if known else None
     for library in [*([match] if match else []), MAIN, WIDE]:
         found = rank(frame, library, pitch, policy)
@@ -233,7 +241,7 @@ def read_frame(image: Image) -> SearchedFrame | str:
 
 def rank(
     frame: SearchedFrame, library: Library, pitch: Pitch, policy: CalibrationPolicy
-) -> list[Ranked]:
+) -> list[RankedCamera]:
     """The cameras of a library that lie on the paint of a frame, best first."""
     amount = (SNAPPED, SCOUTED, SEARCHED)
     if library.name == KNOWN:
@@ -257,18 +265,20 @@ def rank(
 
 def _ranked(
     frame: SearchedFrame,
-    snapped: Snapped,
+    snapped: SnappedCamera,
     pitch: Pitch,
     policy: CalibrationPolicy,
     known: FloatArray | None,
-) -> Ranked:
+) -> RankedCamera:
     seen = agreement(snapped.camera, frame.field, frame.paint, pitch)
-    return Ranked(snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known)
+    return RankedCamera(
+        snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known
+    )
 
 
 def _drawn(
     frame: SearchedFrame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
-) -> Snapped:
+) -> SnappedCamera:
     """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
     once more with what is known of cameras, or at the position that the match knows."""
     alone = _snap(frame.reading, start, pitch, WINDOWS, policy)
@@ -283,7 +293,9 @@ def _drawn(
     )
 
 
-def _where_known(frame: SearchedFrame, item: Ranked, match: Library, pitch: Pitch) -> Ranked:
+def _where_known(
+    frame: SearchedFrame, item: RankedCamera, match: Library, pitch: Pitch
+) -> RankedCamera:
     """A camera at the position that the match knows, where the paint alone leaves that open and shows
     the markings there as well."""
     if item.uncertain_m <= MOST_UNCERTAIN_M:
@@ -330,7 +342,7 @@ def _snap(
     windows: Sequence[float],
     policy: CalibrationPolicy,
     known: FloatArray | None = None,
-) -> Snapped:
+) -> SnappedCamera:
     """As ``snap_reading``, with what is known of the position where the match knows it."""
     return snap_reading(
         reading, start, pitch, windows, policy, known,
@@ -338,26 +350,28 @@ def _snap(
     )  # fmt: skip
 
 
-def weakest_marking(reading: Reading, snapped: Snapped, pitch: Pitch) -> float:
+def weakest_marking(reading: Reading, snapped: SnappedCamera, pitch: Pitch) -> float:
     """The lowest share of a marking's places that have paint; short markings do not count.
 
     A camera that lays some markings on paint that is there by chance shows others where none is.
     Nothing is asked of places behind people and along the border of the picture.
     """
     traced, paint = trace(reading, snapped.camera, pitch), snapped.evidence.traced
-    told = shows_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
-    told &= traced.widths > VISIBLE_PX
-    shown = np.bincount(traced.marking[told], minlength=len(MARKINGS))
+    usable = shows_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
+    usable &= traced.widths > VISIBLE_PX
+    shown = np.bincount(traced.marking[usable], minlength=len(MARKINGS))
     seen = np.bincount(paint.marking[paint.widths > VISIBLE_PX], minlength=len(MARKINGS))
     seen = np.minimum(seen, shown)
     long = shown >= MARKING_PLACES
     return float((seen[long] / shown[long]).min()) if long.any() else 1.0
 
 
-def merged(frame: SearchedFrame, one: Sequence[Ranked], other: Sequence[Ranked]) -> list[Ranked]:
+def merged(
+    frame: SearchedFrame, one: Sequence[RankedCamera], other: Sequence[RankedCamera]
+) -> list[RankedCamera]:
     """Both lists in one, best first, each camera once."""
-    kept: list[Ranked] = []
-    shown: list[Shown] = []
+    kept: list[RankedCamera] = []
+    shown: list[VisiblePaint] = []
     for item in sorted([*one, *other], key=lambda item: -item.score):
         camera = item.snapped.camera
         if not any(shows_the_same(old, camera, frame.picture) for old in shown):
@@ -366,14 +380,14 @@ def merged(frame: SearchedFrame, one: Sequence[Ranked], other: Sequence[Ranked])
     return kept
 
 
-def runner_up(ranked: Sequence[Ranked]) -> float | None:
+def runner_up(ranked: Sequence[RankedCamera]) -> float | None:
     """How far the second camera lies behind the first, in supported x explained."""
     if len(ranked) < 2:
         return None
     return ranked[0].score - ranked[1].score
 
 
-def why_unsure(ranked: Sequence[Ranked]) -> str | None:
+def why_unsure(ranked: Sequence[RankedCamera]) -> str | None:
     """Why the best camera cannot be proposed; None where it can."""
     if not ranked:
         return "no camera was found that lies on the paint"
@@ -424,7 +438,7 @@ def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
 
 
 def _answer(
-    image: Image, frame: SearchedFrame, ranked: list[Ranked], pitch: Pitch
+    image: Image, frame: SearchedFrame, ranked: list[RankedCamera], pitch: Pitch
 ) -> FrameProposal:
     reason = why_unsure(ranked)
     if not ranked:
@@ -448,7 +462,9 @@ def _answer(
     )
 
 
-def _at_full_size(image: Image, frame: SearchedFrame, best: Ranked, pitch: Pitch) -> Snapped:
+def _at_full_size(
+    image: Image, frame: SearchedFrame, best: RankedCamera, pitch: Pitch
+) -> SnappedCamera:
     """A camera drawn once more onto the paint of the picture as it is; where that says otherwise,
     as it was found in the small one."""
     height, width = image.shape[:2]
@@ -460,7 +476,7 @@ def _at_full_size(image: Image, frame: SearchedFrame, best: Ranked, pitch: Pitch
     return last if last.reason is None else found
 
 
-def scaled(snapped: Snapped, height: int, width: int) -> Snapped:
+def scaled(snapped: SnappedCamera, height: int, width: int) -> SnappedCamera:
     """A camera on the paint, and that paint, in the pixels of the picture at another size."""
     factor = width / snapped.size[1]
     return replace(

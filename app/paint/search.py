@@ -111,7 +111,7 @@ def _distinct(
     rows: FloatArray, score: FloatArray, picture: ScoredPicture, most: int
 ) -> list[Found]:
     found: list[Found] = []
-    shown: list[Shown] = []
+    shown: list[VisiblePaint] = []
     x0, y0 = picture.center
     for index in np.argsort(-score, kind="stable"):
         if len(found) == most or score[index] <= 0 or not np.isfinite(rows[index]).all():
@@ -124,7 +124,7 @@ def _distinct(
 
 
 @dataclass(frozen=True)
-class Shown:
+class VisiblePaint:
     """Where on the grass a camera sees some of the paint.
 
     Attributes:
@@ -136,16 +136,16 @@ class Shown:
     pixels: FloatArray
 
 
-def shown_by(camera: Camera, picture: ScoredPicture) -> Shown:
+def shown_by(camera: Camera, picture: ScoredPicture) -> VisiblePaint:
     """Where a camera sees some of the paint; what it sees above the horizon is left out."""
     pixels = picture.few[:COMPARED] + picture.center
     rays = camera.rays(pixels)
     down = rays[:, 2] > 1e-3 * np.linalg.norm(rays, axis=1)
     rays, pixels = rays[down], pixels[down]
-    return Shown(camera.position - camera.position[2] / rays[:, 2:] * rays, pixels)
+    return VisiblePaint(camera.position - camera.position[2] / rays[:, 2:] * rays, pixels)
 
 
-def shows_the_same(shown: Shown, other: Camera, picture: ScoredPicture) -> bool:
+def shows_the_same(shown: VisiblePaint, other: Camera, picture: ScoredPicture) -> bool:
     """Whether another camera sees the same places, or those of the pitch turned by half a turn."""
     if len(shown.pixels) < len(picture.few[:COMPARED]) / 2:
         return False

@@ -45,7 +45,7 @@ START_SIGMAS, START_PX = 4.0, 2.0
 
 
 @dataclass(frozen=True)
-class Snapped:
+class SnappedCamera:
     """A camera after snapping.
 
     Attributes:
@@ -85,7 +85,7 @@ def snap(
     hidden: Sequence[Box] = (),
     policy: CalibrationPolicy | None = None,
     start_covariance: FloatArray | None = None,
-) -> Snapped:
+) -> SnappedCamera:
     """The camera that the paint of a picture determines, near a start.
 
     Args:
@@ -113,7 +113,7 @@ def snap_reading(
     circles_count_twice: bool = False,
     position_is_known: bool = False,
     most_surprising: float = MOST_SURPRISING,
-) -> Snapped:
+) -> SnappedCamera:
     """As ``snap``, for a picture that is prepared already.
 
     Args:
@@ -134,28 +134,28 @@ def snap_reading(
         spacing = SPACING_PX if strict else COARSE_PX
         evidence = rounds.seek(parameters, window, spacing)
         if not _suffices(evidence, twice, spacing, least):
-            return _kept(rounds, evidence, NO_PAINT)
+            return _unchanged(rounds, evidence, NO_PAINT)
         parameters = parameters + rounds.problem.step(parameters, rounds.seen(evidence), strict)
         if not np.isfinite(parameters).all():
-            return _kept(rounds, evidence, PAINT_DISAGREES)
+            return _unchanged(rounds, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
     if not _suffices(evidence, twice, least=least) or evidence.share < LEAST_SEEN:
-        return _kept(rounds, evidence, NO_PAINT)
+        return _unchanged(rounds, evidence, NO_PAINT)
     places = evidence.traced.places[:, :2]
     noise = rounds.problem.noise(parameters, rounds.seen(evidence), places, pitch)
     if noise is None:
-        return _kept(rounds, evidence, NO_PAINT)
+        return _unchanged(rounds, evidence, NO_PAINT)
     camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
-    error, moved = float(np.median(np.abs(evidence.offsets))), _moved(start, camera, evidence)
+    error, moved = float(np.median(np.abs(evidence.offsets))), _moved_px(start, camera, evidence)
     if (
         error > rounds.unit * WORST_PX
         or moved > rounds.unit * (windows[0] if start_covariance is None else np.inf)
-        or rounds.problem.surprise(parameters) > most_surprising
+        or rounds.problem.mahalanobis_squared(parameters) > most_surprising
         or evidence.share < KEPT_SHARE * before.share
     ):
-        return _kept(rounds, evidence, PAINT_DISAGREES, error, moved)
+        return _unchanged(rounds, evidence, PAINT_DISAGREES, error, moved)
     own, size = noise.parameters, rounds.size
-    return Snapped(camera, evidence, error, own + noise.pitch, moved, None, size, planned=own)
+    return SnappedCamera(camera, evidence, error, own + noise.pitch, moved, None, size, planned=own)
 
 
 class _Rounds:
@@ -213,18 +213,18 @@ def _suffices(
     return len(evidence.offsets) >= LEAST_POINTS and markings >= least
 
 
-def _kept(
+def _unchanged(
     rounds: _Rounds,
     evidence: Evidence,
     reason: str,
     error: float | None = None,
     moved: float = 0.0,
-) -> Snapped:
+) -> SnappedCamera:
     """The start, with why it was kept and what snapping would have done."""
-    return Snapped(rounds.start, evidence, error, None, moved, reason, rounds.size)
+    return SnappedCamera(rounds.start, evidence, error, None, moved, reason, rounds.size)
 
 
-def _moved(start: Camera, camera: Camera, evidence: Evidence) -> float:
+def _moved_px(start: Camera, camera: Camera, evidence: Evidence) -> float:
     places = evidence.traced.places
     apart = np.hypot(*(camera.project(places) - start.project(places)).T)
     known = apart[np.isfinite(apart)]

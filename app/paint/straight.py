@@ -50,7 +50,7 @@ def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
     return np.array(pieces).reshape(-1, 4)
 
 
-def _beside(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _along_and_off(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Where paint lies along a piece from its start, and how far from it, shapes (N,); its length."""
     start, stop = end[:2], end[2:]
     length = float(np.hypot(*(stop - start)))
@@ -62,14 +62,14 @@ def _beside(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray,
 
 def _along(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint beside a piece, between its ends."""
-    along, across, length = _beside(paint, end)
+    along, across, length = _along_and_off(paint, end)
     near: npt.NDArray[np.bool_] = (across < NEAR_PX * unit) & (along > -2) & (along < length + 2)
     return near
 
 
 def _grown(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint along a piece and, on both sides, as far as it goes on without a long gap."""
-    along, across, length = _beside(paint, end)
+    along, across, length = _along_and_off(paint, end)
     near = across < NEAR_PX * unit
     places = np.sort(along[near])
     gaps = np.flatnonzero(np.diff(places) > GAP_PX * unit)

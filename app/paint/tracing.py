@@ -19,7 +19,7 @@ PAINTED = tuple(name for name in MARKINGS if not name.startswith("Goal"))
 
 
 @dataclass(frozen=True)
-class Traced:
+class TracedPlaces:
     """Places along the projected markings of one camera, a few pixels apart.
 
     Attributes:
@@ -40,9 +40,9 @@ class Traced:
     jacobian: FloatArray
     visible: int
 
-    def only(self, chosen: IntArray, visible: int) -> Traced:
+    def only(self, chosen: IntArray, visible: int) -> TracedPlaces:
         """Some of the places."""
-        return Traced(
+        return TracedPlaces(
             self.places[chosen], self.pixels[chosen], self.normals[chosen],
             self.widths[chosen], self.marking[chosen], self.jacobian[chosen], visible,
         )  # fmt: skip
@@ -50,7 +50,7 @@ class Traced:
 
 def trace_places(
     camera: Camera, pitch: Pitch, width: int, height: int, spacing_px: float, most: int
-) -> Traced:
+) -> TracedPlaces:
     """Places along the markings that lie in the picture, hidden ones too.
 
     Args:
@@ -69,7 +69,7 @@ def trace_places(
         places, pixels, normals, widths, marking, rows,
     )  # fmt: skip
     written = slice(count)
-    return Traced(
+    return TracedPlaces(
         places[written], pixels[written], normals[written],
         widths[written], marking[written], rows[written], count,
     )  # fmt: skip

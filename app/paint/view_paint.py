@@ -107,10 +107,10 @@ def paint_of(
     hidden = [scale.box(box) for box in hiding_boxes(people, size)]
     seen_grass = seen_field(grass, hidden)
     paint = line_like(image, grass) & seen_grass
-    told = ViewPaint("nothing", line_like=scale.line_like(paint))
+    nothing = ViewPaint("nothing", line_like=scale.line_like(paint))
     why = _unusable(start)
     if why is not None:
-        return replace(told, sentence=why)
+        return replace(nothing, sentence=why)
     assert start.camera is not None
     camera = start.camera.scaled(scale.x, scale.y)
     spread = None
@@ -121,10 +121,10 @@ def paint_of(
             image, grass, camera, pitch, hidden=hidden, policy=policy, start_covariance=spread
         )
     except (GeometryError, np.linalg.LinAlgError):
-        return replace(told, sentence="The camera of the lines cannot be drawn onto the paint.")
+        return replace(nothing, sentence="The camera of the lines cannot be drawn onto the paint.")
     seen = agreement(snapped.camera, seen_grass, paint, pitch)
     return replace(
-        told,
+        nothing,
         outcome="kept" if snapped.reason else "snapped",
         reason=snapped.reason,
         sentence=SENTENCES[snapped.reason] if snapped.reason else "",

@@ -88,7 +88,7 @@ def proposal_of(
     if found.outcome == "proposed" and snapped is not None:
         lines = dict(scale.evidence(snapped).some_points())
         goals = goal_lines(image, snapped.camera, pitch)
-        lines |= {name: tuple(scale.told(*place) for place in goals[name]) for name in goals}
+        lines |= {name: tuple(scale.sentence(*place) for place in goals[name]) for name in goals}
     return ViewProposal(
         found.outcome,
         "" if found.reason is None else f"{found.reason[:1].upper()}{found.reason[1:]}.",

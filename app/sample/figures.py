@@ -13,7 +13,7 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.instant import TEAM, Instant
-from app.sample.look import Colour, Kit, Look
+from app.sample.look import Colour, Look, Outfit
 from app.sample.patch import Image, Patch
 from app.sample.pose import INDEX, Pose
 
@@ -83,7 +83,7 @@ def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -
     return people
 
 
-def kit_of(look: Look, index: int) -> Kit:
+def kit_of(look: Look, index: int) -> Outfit:
     """What person ``index`` of an instant wears."""
     if index == 2 * TEAM:
         return look.referee
@@ -121,7 +121,7 @@ def draw_person(
 class _Painter:
     patch: Patch
     person: DrawnPerson
-    kit: Kit
+    kit: Outfit
     skin: Colour
     hair: Colour
     boots: Colour

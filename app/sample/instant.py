@@ -59,7 +59,7 @@ def make_instant(rng: np.random.Generator, numbers: tuple[int, ...]) -> Instant:
     return Instant(
         ball=ball,
         spin=rng.normal(0, 1.4, 3),
-        feet=_keep_apart(feet),
+        feet=_spread_people(feet),
         heading=heading,
         speed=speed,
         stride=rng.uniform(0, 2 * np.pi, PEOPLE),
@@ -91,12 +91,12 @@ def later(instant: Instant, seconds: float, ball_shift: FloatArray) -> Instant:
         instant,
         ball=ball,
         spin=instant.spin + 0.7 * seconds,
-        feet=_keep_apart(feet),
+        feet=_spread_people(feet),
         stride=instant.stride + 9.0 * seconds,
     )
 
 
-def clear_sight(instant: Instant, cameras: FloatArray) -> Instant:
+def clear_view(instant: Instant, cameras: FloatArray) -> Instant:
     """The same moment with nobody between the ball and a camera, or inside the ball.
 
     Args:
@@ -166,7 +166,7 @@ def _place_people(rng: np.random.Generator, ball: FloatArray, attack: float) -> 
     return inside
 
 
-def _keep_apart(feet: FloatArray) -> FloatArray:
+def _spread_people(feet: FloatArray) -> FloatArray:
     feet = feet.copy()
     for _ in range(4):
         offset = feet[:, None] - feet[None]

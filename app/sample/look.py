@@ -13,7 +13,7 @@ Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Kit:
+class Outfit:
     """What a team, a goalkeeper or a referee wears. ``pattern``: plain, stripes, halves."""
 
     shirt: Colour
@@ -89,11 +89,11 @@ class Look:
     """Everything that the frames of one match have in common."""
 
     seed: int
-    home: Kit
-    away: Kit
-    home_keeper: Kit
-    away_keeper: Kit
-    referee: Kit
+    home: Outfit
+    away: Outfit
+    home_keeper: Outfit
+    away_keeper: Outfit
+    referee: Outfit
     light: Light
     grass: Grass
     stands: Stands
@@ -107,14 +107,14 @@ _GREY, _PINK, _LIME = (128.0, 122.0, 118.0), (176.0, 118.0, 232.0), (72.0, 226.0
 
 # Pairs that no viewer mixes up, neither with each other nor with the grass.
 _PAIRS = (
-    (Kit(_RED, _WHITE, _WHITE, _RED), Kit(_NAVY, _SKY, _NAVY, _NAVY)),
-    (Kit(_SKY, _WHITE, _WHITE, _SKY, "halves"), Kit(_CLARET, _SKY, _CLARET, _CLARET)),
-    (Kit(_WHITE, _NAVY, _NAVY, _WHITE), Kit(_ORANGE, _BLACK, _BLACK, _ORANGE)),
-    (Kit(_BLUE, _RED, _BLUE, _BLUE, "stripes"), Kit(_YELLOW, _BLUE, _YELLOW, _YELLOW)),
-    (Kit(_BLACK, _WHITE, _BLACK, _BLACK, "stripes"), Kit(_RED, _YELLOW, _RED, _RED)),
-    (Kit(_CLARET, _SKY, _WHITE, _SKY, "halves"), Kit(_WHITE, _PURPLE, _WHITE, _WHITE)),
-    (Kit(_PURPLE, _WHITE, _PURPLE, _WHITE), Kit(_WHITE, _RED, _BLACK, _WHITE, "stripes")),
-    (Kit(_YELLOW, _BLACK, _BLACK, _YELLOW), Kit(_BLUE, _WHITE, _WHITE, _BLUE)),
+    (Outfit(_RED, _WHITE, _WHITE, _RED), Outfit(_NAVY, _SKY, _NAVY, _NAVY)),
+    (Outfit(_SKY, _WHITE, _WHITE, _SKY, "halves"), Outfit(_CLARET, _SKY, _CLARET, _CLARET)),
+    (Outfit(_WHITE, _NAVY, _NAVY, _WHITE), Outfit(_ORANGE, _BLACK, _BLACK, _ORANGE)),
+    (Outfit(_BLUE, _RED, _BLUE, _BLUE, "stripes"), Outfit(_YELLOW, _BLUE, _YELLOW, _YELLOW)),
+    (Outfit(_BLACK, _WHITE, _BLACK, _BLACK, "stripes"), Outfit(_RED, _YELLOW, _RED, _RED)),
+    (Outfit(_CLARET, _SKY, _WHITE, _SKY, "halves"), Outfit(_WHITE, _PURPLE, _WHITE, _WHITE)),
+    (Outfit(_PURPLE, _WHITE, _PURPLE, _WHITE), Outfit(_WHITE, _RED, _BLACK, _WHITE, "stripes")),
+    (Outfit(_YELLOW, _BLACK, _BLACK, _YELLOW), Outfit(_BLUE, _WHITE, _WHITE, _BLUE)),
 )
 _KEEPERS = (_LIME, _PINK, _TEAL, _GREY, _ORANGE)
 _REFEREES = (_YELLOW, _BLACK, _TEAL)
@@ -132,15 +132,15 @@ def make_look(index: int, seed: int, evening: bool) -> Look:
         away=away,
         home_keeper=_plain(keepers[0]),
         away_keeper=_plain(keepers[1]),
-        referee=Kit(referee, _BLACK, _BLACK, _BLACK),
+        referee=Outfit(referee, _BLACK, _BLACK, _BLACK),
         light=_light(rng, index, evening),
         grass=_grass(rng, index),
         stands=_stands(rng, home, away),
     )
 
 
-def _plain(colour: Colour) -> Kit:
-    return Kit(colour, _BLACK, colour, colour)
+def _plain(colour: Colour) -> Outfit:
+    return Outfit(colour, _BLACK, colour, colour)
 
 
 def _far_from(choices: tuple[Colour, ...], taken: tuple[Colour, ...], skip: int) -> Colour:
@@ -191,7 +191,7 @@ def _grass(rng: np.random.Generator, index: int) -> Grass:
     )
 
 
-def _stands(rng: np.random.Generator, home: Kit, away: Kit) -> Stands:
+def _stands(rng: np.random.Generator, home: Outfit, away: Outfit) -> Stands:
     depth, rake = rng.uniform(15, 22), rng.uniform(0.50, 0.62)
     first_top = 1.6 + depth * rake
     second = rng.uniform(12, 18)

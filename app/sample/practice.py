@@ -15,7 +15,7 @@ import cv2
 from app.finite import json_text
 from app.formats.match_frames import ARCHIVE
 from app.formats.soccernet_v3_writer import write_soccernet_v3
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.sample.faults import FaultPlan
 from app.sample.render import render
 from app.sample.scene import Scene
@@ -76,7 +76,7 @@ def _plan(lesson: Lesson) -> FaultPlan | None:
     return FaultPlan(lesson.kind, lesson.view, lesson.seed)
 
 
-def write_practice(out: Path, progress: TellProgress | None = None) -> None:
+def write_practice(out: Path, progress: ReportProgress | None = None) -> None:
     """Write the lessons as a SoccerNet-v3 tree with ``truth.json`` beside it.
 
     What an earlier call left there is replaced by the same bytes.
@@ -101,7 +101,7 @@ def write_practice(out: Path, progress: TellProgress | None = None) -> None:
     temporary.replace(out / TRUTH)
 
 
-def _write_frames(archive: Path, scenes: list[Scene], progress: TellProgress | None) -> None:
+def _write_frames(archive: Path, scenes: list[Scene], progress: ReportProgress | None) -> None:
     frames = [(scene, view.key) for scene in scenes for view in scene.group.views]
     temporary = archive.with_suffix(".part")
     with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as members:

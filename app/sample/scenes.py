@@ -28,7 +28,7 @@ from app.sample.fixture import Fixture, make_fixture
 from app.sample.instant import (
     BALL_DIAMETER,
     Instant,
-    clear_sight,
+    clear_view,
     make_instant,
     shirt_numbers,
 )
@@ -158,8 +158,8 @@ def _film(
         else:
             cameras[index], instants[index], amount = _other_moment(own, stage, main, instant)
     positions = np.array([camera.position for camera in cameras])
-    cleared = clear_sight(instant, positions)
-    instants = [cleared if one is instant else clear_sight(one, positions) for one in instants]
+    cleared = clear_view(instant, positions)
+    instants = [cleared if one is instant else clear_view(one, positions) for one in instants]
     return [Shot(c, i) for c, i in zip(cameras, instants, strict=True)], amount
 
 

@@ -21,7 +21,7 @@ from app.errors import InputError
 from app.finite import json_text
 from app.formats.match_frames import ARCHIVE
 from app.formats.soccernet_v3_writer import write_soccernet_v3
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.sample.fixture import group_counts, make_fixture
 from app.sample.order import GROUPS, SEED
 from app.sample.render import render
@@ -76,7 +76,7 @@ def write_sample(
     seed: int = SEED,
     labels_only: bool = False,
     faults: bool = True,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     workers: int | None = None,
 ) -> SampleReport:
     """Write ``<league>/<season>/<match>/{Labels-v3.json, Frames-v3.zip}`` and ``truth.json``.
@@ -136,7 +136,7 @@ def _staged(out: Path) -> Iterator[Path]:
 
 
 def _write_labels(
-    out: Path, jobs: list[_Job], run: _Mapper, total: int, progress: TellProgress | None
+    out: Path, jobs: list[_Job], run: _Mapper, total: int, progress: ReportProgress | None
 ) -> SampleReport:
     done = views = faults = 0
     temporary = out / f".{TRUTH}.part"
@@ -169,7 +169,7 @@ def _label_match(job: _Job) -> _Labelled:
 
 
 def _write_frames(
-    out: Path, matches: list[_Job], run: _Mapper, total: int, progress: TellProgress | None
+    out: Path, matches: list[_Job], run: _Mapper, total: int, progress: ReportProgress | None
 ) -> None:
     done = 0
     jobs = [part for match in matches for part in _parts(match)]

@@ -45,7 +45,7 @@ def is_of(actor: str, name: str) -> bool:
     return name in (actor, person_of(actor))
 
 
-def script_name(said: str, *, pointer: str | None = None) -> str:
+def script_name(text: str, *, pointer: str | None = None) -> str:
     """The name under which a script acts.
 
     Example:
@@ -55,7 +55,7 @@ def script_name(said: str, *, pointer: str | None = None) -> str:
     Raises:
         InputError: It cannot be a name.
     """
-    name = said.strip().removeprefix(SCRIPT)
+    name = text.strip().removeprefix(SCRIPT)
     if not _NAME.fullmatch(name):
         raise InputError(
             "the name of a script is up to 60 letters, digits, spaces and . _ @ + -",

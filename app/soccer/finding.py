@@ -41,7 +41,7 @@ one of three groups."""
 
 @dataclass(frozen=True)
 class Fix:
-    """What a finding or a remedy proposes to do.
+    """What a finding or a suggestion proposes to do.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
     ``include_view``, ``exclude_view``, ``free_picture``, ``hide_marking`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``

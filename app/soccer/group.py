@@ -67,7 +67,7 @@ class Station:
                 hint="Leave the covariance out: the noise of given cameras stands in the policy.",
             )
 
-    def with_said(self, other: Station) -> Station:
+    def with_annotations_of(self, other: Station) -> Station:
         """This station with the lines, the camera and the picture that were said of another."""
         return replace(
             self,
@@ -81,12 +81,12 @@ class Station:
         )
 
     @property
-    def said_lines(self) -> Lines:
+    def annotated_lines(self) -> Lines:
         """The lines, and those that are said not to be visible, without points: as they are kept."""
         if not self.not_visible:
             return self.lines
-        said = {**self.lines, **dict.fromkeys(self.not_visible, ())}
-        return {marking: said[marking] for marking in sorted(said)}
+        lines = {**self.lines, **dict.fromkeys(self.not_visible, ())}
+        return {marking: lines[marking] for marking in sorted(lines)}
 
     def with_given(
         self, given: Camera | None, covariance: tuple[float, ...] | None = None

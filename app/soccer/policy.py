@@ -33,7 +33,7 @@ def _threshold(
     maximum: float | None = None,
     choices: tuple[float | str, ...] = (),
     later: bool = False,
-    told: bool = True,
+    shown: bool = True,
 ) -> Any:
     """A field of a policy with what ``Threshold`` says of it; ``told``: in its ``repr``."""
     known = {
@@ -45,7 +45,7 @@ def _threshold(
         "choices": choices,
         "later": later,
     }
-    return field(default=default, metadata=known, repr=told)
+    return field(default=default, metadata=known, repr=shown)
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class CalibrationPolicy:
     check_labels: bool = _threshold(True, CALIBRATION, "Leave out markings found mislabelled")
     """Leave out markings that are found mislabelled."""
     share_position: bool = _threshold(
-        False, CALIBRATION, "Use the shared position of a match", later=True, told=False
+        False, CALIBRATION, "Use the shared position of a match", later=True, shown=False
     )
     """Where the main camera stands is known from the match's other pictures, where that was
     accepted. Not in the ``repr``, which keys calibrations: they are keyed by the position itself."""
@@ -76,7 +76,7 @@ class CalibrationPolicy:
         "Source of cameras",
         choices=("lines", "paint"),
         later=True,
-        told=False,
+        shown=False,
     )
     """``lines``: what was clicked; ``paint``: started by the clicks, drawn onto what was read of the
     paint in the picture. Not in the ``repr`` either: calibrations are keyed by what was read."""
@@ -88,7 +88,7 @@ class CalibrationPolicy:
         0.1,
         10.0,
         later=True,
-        told=False,
+        shown=False,
     )
     """Of a clicked point across its marking, about which images differ; None: what real annotations
     show, and each image by itself. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
@@ -100,7 +100,7 @@ class CalibrationPolicy:
         0.0,
         0.95,
         later=True,
-        told=False,
+        shown=False,
     )
     """What the points of a marking have in common of that variance; None: weighed image by image."""
     shortest_marking_px: float = _threshold(
@@ -111,7 +111,7 @@ class CalibrationPolicy:
         0.0,
         50.0,
         later=True,
-        told=False,
+        shown=False,
     )
     """0: each one, as the public evaluator does. Stubs of a few pixels at the border of a picture
     are none that people draw. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
@@ -122,7 +122,7 @@ class CalibrationPolicy:
         "Pitch and picture of a frame alone",
         choices=("exact", "professional", "any"),
         later=True,
-        told=False,
+        shown=False,
     )
     """What nobody says of the pitch and the picture of a frame without a match and other views: ``exact``, they are
     as they stand here; ``professional``, the pitch is that of some professional club; ``any``, it is
@@ -135,7 +135,7 @@ class CalibrationPolicy:
         "What people click of a goal's frame",
         choices=("inner", "middle"),
         later=True,
-        told=False,
+        shown=False,
     )
     """``inner``: the inner edges of posts and crossbar, as the public evaluator has them;
     ``middle``: their middle, where people click. JaC asks for the inner edges in either case. Not
@@ -251,7 +251,7 @@ def digested_values(policy: Policy) -> dict[str, Any]:
     A threshold that came later counts only where it asks for something else than before it came:
     the hash of a policy, and of each version that was frozen with it, stays what it was.
     """
-    values = _asked(policy)
+    values = _comparisons_of(policy)
     del values["name"]
     values["calibration"] = digested_calibration(policy.calibration)
     return values
@@ -259,10 +259,10 @@ def digested_values(policy: Policy) -> dict[str, Any]:
 
 def digested_calibration(policy: CalibrationPolicy) -> dict[str, Any]:
     """The same of its part for calibrations."""
-    return _asked(policy)
+    return _comparisons_of(policy)
 
 
-def _asked(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
+def _comparisons_of(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
     values = asdict(policy)
     for item in fields(policy):
         if item.metadata.get("later") and values[item.name] == item.default:
@@ -304,7 +304,7 @@ def is_shipped(policy: Policy) -> bool:
 
 
 Asks = Literal["more than", "at least", "at most"]
-_ASKS: dict[str, Asks] = {
+_COMPARISONS: dict[str, Asks] = {
     "min_jac": "more than",
     "min_agreement": "at least",
     "tau_percent": "at most",
@@ -358,15 +358,15 @@ class Threshold:
         return self.subject if self.subject in GATES else None
 
     @property
-    def asks(self) -> Asks | None:
+    def comparison(self) -> Asks | None:
         """How a value compares with it to pass its gate; None: it is compared with no value."""
-        return _ASKS.get(self.name)
+        return _COMPARISONS.get(self.name)
 
     @property
     def text(self) -> str:
         """What it is, in a line."""
         text = f"{self.label}, {self.unit}" if self.unit else self.label
-        return f"{text}; must be exceeded" if self.asks == "more than" else text
+        return f"{text}; must be exceeded" if self.comparison == "more than" else text
 
     @property
     def optional(self) -> bool:

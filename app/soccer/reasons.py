@@ -41,10 +41,10 @@ def left_out(reason: str | None, note: str | None) -> LeftOut | None:
         return None
     if reason not in REASONS:
         known = ", ".join(REASONS)
-        said = (
+        problem = (
             "a note needs a reason beside it" if reason is None else f'"{reason}" is not a reason'
         )
-        raise InputError(f"{said}; reasons are {known}", pointer="/reason")
+        raise InputError(f"{problem}; reasons are {known}", pointer="/reason")
     require_words(reason, note)
     return LeftOut(reason, note)
 

@@ -15,7 +15,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.camera_numbers import WHOLE, CameraNumbers
 from app.solving.facts import STEP_PX, Facts
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
 """The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""
@@ -189,39 +189,43 @@ def calibration_covariance(
     return alone
 
 
-def pixel_covariance(sight: Sighting, point: FloatArray, policy: Policy) -> FloatArray:
+def pixel_covariance(observation: BallObservation, point: FloatArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel in a view, square pixels, shape (2, 2).
 
     The noise of the click, that of a given camera, and, where the camera comes from lines, the
     covariance of its calibration carried to the ball.
     """
-    found: FloatArray = sight_covariances([sight], point[None], policy)[0]
+    found: FloatArray = ray_covariances([observation], point[None], policy)[0]
     return found
 
 
-def sight_covariances(sights: Sequence[Sighting], points: FloatArray, policy: Policy) -> FloatArray:
-    """``pixel_covariance`` of several sights at a point each, square pixels, shape (N, 2, 2).
+def ray_covariances(
+    observations: Sequence[BallObservation], points: FloatArray, policy: Policy
+) -> FloatArray:
+    """``pixel_covariance`` of several observations at a point each, square pixels, shape (N, 2, 2).
 
     Args:
-        sights: One for each point.
+        observations: One for each point.
         points: Pitch frame, metres, shape (N, 3).
         policy: Holds the noises.
     """
-    diagonals = np.array([sight.size.diagonal for sight in sights])
+    diagonals = np.array([observation.size.diagonal for observation in observations])
     noise = click_variance(
         diagonals,
-        np.array([sight.diameter_px for sight in sights]),
+        np.array([observation.diameter_px for observation in observations]),
         policy,
-        np.array([sight.is_bare for sight in sights]),
-        np.array([sight.noise for sight in sights]),
+        np.array([observation.is_bare for observation in observations]),
+        np.array([observation.noise for observation in observations]),
     )
     found: FloatArray = noise[:, None, None] * np.eye(2)
     plain: dict[int, CameraNumbers] = {}
-    for row, sight in enumerate(sights):
-        if sight.numbers is not None and sight.numbers.picture is None:
-            plain[row] = sight.numbers
+    for row, observation in enumerate(observations):
+        if observation.numbers is not None and observation.numbers.picture is None:
+            plain[row] = observation.numbers
         else:
-            found[row] += calibration_covariance(sight.calibration, sight.size, points[row])
+            found[row] += calibration_covariance(
+                observation.calibration, observation.size, points[row]
+            )
     if plain:
         rows = [*plain]
         parameters = np.array([item.parameters for item in plain.values()])
@@ -307,10 +311,10 @@ class MeanCovariance:
         """
         facts = self._facts
         with self._lock, np.errstate(invalid="ignore"):
-            self._follow(valid, groups, points)
-            asked = np.zeros(facts.groups, bool)
-            asked[groups] = True
-            views = np.flatnonzero(self._used & asked[facts.view_group])
+            self._update(valid, groups, points)
+            wanted = np.zeros(facts.groups, bool)
+            wanted[groups] = True
+            views = np.flatnonzero(self._used & wanted[facts.view_group])
             slopes, pixels = self._slope[views], self._carried[views]
             pixels = click_covariances(facts, views, policy) + pixels
             parts = (slopes.transpose(0, 2, 1) @ pixels @ slopes).reshape(-1, 9)
@@ -318,7 +322,7 @@ class MeanCovariance:
         total = [np.bincount(owner, part, minlength=len(groups)) for part in parts.T]
         return np.array(total, float).T.reshape(-1, 3, 3)
 
-    def _follow(self, valid: BoolArray, groups: IntArray, points: FloatArray) -> None:
+    def _update(self, valid: BoolArray, groups: IntArray, points: FloatArray) -> None:
         """Compute slopes and carried covariances anew where the valid pairs are others."""
         facts = self._facts
         pairs = np.zeros(facts.groups, np.int64)

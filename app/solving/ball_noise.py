@@ -32,7 +32,7 @@ from app.solving.noise_grid import (
     posterior_variance,
     vertex,
 )
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 
 MIN_NUMBERS = 20
 """Of one camera or person: fewer say too little."""
@@ -127,7 +127,7 @@ class BallNoise:
     share_interval: tuple[float, float] | None = None
 
 
-def misses_of(ball: Ball3D, sights: Sequence[Sighting]) -> tuple[Miss, ...]:
+def misses_of(ball: Ball3D, observations: Sequence[BallObservation]) -> tuple[Miss, ...]:
     """What the rays to the ball of one group leave unexplained: 2 V - 3 numbers of V views.
 
     Given cameras with a covariance are left aside: those of one rig err together, and a
@@ -135,34 +135,35 @@ def misses_of(ball: Ball3D, sights: Sequence[Sighting]) -> tuple[Miss, ...]:
 
     Args:
         ball: Where the group's valid pairs put it.
-        sights: Of the group; those in no valid pair are left aside.
+        observations: Of the group; those in no valid pair are left aside.
     """
     seen = [
-        sight
-        for sight in sights
-        if sight.view in ball.views and (sight.calibration.source != "given" or sight.is_bare)
+        observation
+        for observation in observations
+        if observation.view in ball.views
+        and (observation.calibration.source != "given" or observation.is_bare)
     ]
     if len(seen) < 2:
         return ()
     point = np.array(ball.point)
-    pixels = np.array([sight.camera.project(point[None])[0] for sight in seen])
+    pixels = np.array([observation.camera.project(point[None])[0] for observation in seen])
     if not np.isfinite(pixels).all():
         return ()
-    offsets = (np.array([sight.center for sight in seen]) - pixels).ravel()
-    jacobian = np.vstack([sight.camera.jacobian(point) for sight in seen])
+    offsets = (np.array([observation.center for observation in seen]) - pixels).ravel()
+    jacobian = np.vstack([observation.camera.jacobian(point) for observation in seen])
     # Directions of all pixels together in which no 3D point moves ...
     normals = np.linalg.svd(jacobian)[0][:, 3:]
     known = np.zeros((len(offsets), len(offsets)))
-    for at, sight in enumerate(seen):
+    for at, observation in enumerate(seen):
         part = slice(2 * at, 2 * at + 2)
-        known[part, part] = calibration_covariance(sight.calibration, sight.size, point)
+        known[part, part] = calibration_covariance(observation.calibration, observation.size, point)
     # ... turned until the cameras' errors are independent in them, as equal clicks are anyway.
     _, turn = np.linalg.eigh(normals.T @ known @ normals)
     normals = normals @ turn
     squared = (normals**2).reshape(len(seen), 2, -1).sum(axis=1).T
-    units = np.array([(sight.size.diagonal / CLICK_DIAGONAL) ** 2 for sight in seen])
-    diameters = np.array([sight.diameter_px**2 for sight in seen])
-    bare = np.array([sight.is_bare for sight in seen])
+    units = np.array([(observation.size.diagonal / CLICK_DIAGONAL) ** 2 for observation in seen])
+    diameters = np.array([observation.diameter_px**2 for observation in seen])
+    bare = np.array([observation.is_bare for observation in seen])
     columns = (
         offsets @ normals,
         squared @ units,
@@ -171,7 +172,7 @@ def misses_of(ball: Ball3D, sights: Sequence[Sighting]) -> tuple[Miss, ...]:
         np.einsum("im,ij,jm->m", normals, known, normals),
     )
     own = squared[:, :, None] * np.column_stack([units, diameters, units * bare])
-    names = [sight.view for sight in seen]
+    names = [observation.view for observation in seen]
     found = []
     for row, parts in zip(np.transpose(columns).tolist(), own.tolist(), strict=True):
         by_view = tuple((name, *part) for name, part in zip(names, parts, strict=True))
@@ -251,8 +252,8 @@ def _jackknifed(
     variance = posterior_variance(scatter, numbers, known.spread)
     half = STUDENT * math.sqrt(variance)
     # Where neighbours err alike, there are fewer independent numbers than there seem to be.
-    told = posterior_variance(0.0, numbers, known.spread) / variance
-    sigma = math.exp(held_log(_LOGS, told * _costs(rows[kept], found) + known.costs))
+    weight = posterior_variance(0.0, numbers, known.spread) / variance
+    sigma = math.exp(held_log(_LOGS, weight * _costs(rows[kept], found) + known.costs))
     wide = max(STUDENT * math.sqrt(of_share), wide)
     low, high = math.exp(whole - half), math.exp(whole + half)
     interval = max(found - wide, 0.0), found + wide
@@ -266,8 +267,8 @@ def _fit(rows: FloatArray, known: _Expected) -> tuple[float, float, float]:
     if not kept[:, 2].any():
         return _lowest(_costs(kept, known.share) + known.costs)[1], known.share, 0.0
     fits = [_lowest(_costs(kept, share) + known.costs) for share in SHARES]
-    told = ((SHARES - known.share) / SHARE_SIGMA) ** 2 / 2
-    costs = told + [least for least, _ in fits]
+    prior = ((SHARES - known.share) / SHARE_SIGMA) ** 2 / 2
+    costs = prior + [least for least, _ in fits]
     at = int(np.argmin(costs))
     off = vertex(costs, at)[0]
     share = float(SHARES[at]) + _SHARE_STEP * off

@@ -13,9 +13,9 @@ from app.geometry.arrays import FloatArray, IntArray, row_by_row
 from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, ChiSquare, Pair
-from app.solving.ball_covariance import sight_covariances
+from app.solving.ball_covariance import ray_covariances
 from app.solving.chi_square import widening
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 
 MAX_MAHALANOBIS = 13.8
 """Squared, of two coordinates: one honest view in a thousand lies beyond."""
@@ -36,7 +36,9 @@ class _Estimate:
         return bool((self.distances <= MAX_MAHALANOBIS).all())
 
 
-def best_ball(pairs: Sequence[Pair], usable: Sequence[Sighting], policy: Policy) -> BestBall | None:
+def best_ball(
+    pairs: Sequence[Pair], usable: Sequence[BallObservation], policy: Policy
+) -> BestBall | None:
     """The point that explains the most views best; None where no two views see the ball.
 
     All views count, weighted by the uncertainty of click and calibration. Where they contradict
@@ -64,14 +66,16 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sighting], policy: Policy)
     freedom, total = 2 * len(estimate.numbers) - 3, float(estimate.distances.sum())
     test = ChiSquare(total, freedom, float(chdtrc(freedom, total)), ())
     covariance = widening(test) ** 2 * estimate.covariance
-    used = tuple(views.sights[number].view for number in estimate.numbers)
+    used = tuple(views.observations[number].view for number in estimate.numbers)
     x, y, z = estimate.point.tolist()
     return BestBall(
         point=(x, y, z),
         covariance=row_by_row(covariance),
         sigma_m=float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])),
         views=used,
-        contradicting=tuple(sight.view for sight in usable if sight.view not in used),
+        contradicting=tuple(
+            observation.view for observation in usable if observation.view not in used
+        ),
         influence_m=_influence(views, estimate),
     )
 
@@ -79,10 +83,10 @@ def best_ball(pairs: Sequence[Pair], usable: Sequence[Sighting], policy: Policy)
 def _most_consistent(views: _Views, starts: dict[frozenset[str], FloatArray]) -> _Estimate | None:
     """The estimate from the largest set of views that agree, else from the best pair."""
     fallback: list[_Estimate] = []
-    for count in range(len(views.sights), 1, -1):
+    for count in range(len(views.observations), 1, -1):
         chosen, origins = [], []
-        for numbers in combinations(range(len(views.sights)), count):
-            names = {views.sights[number].view for number in numbers}
+        for numbers in combinations(range(len(views.observations)), count):
+            names = {views.observations[number].view for number in numbers}
             inside = [point for pair, point in starts.items() if pair <= names]
             if inside:
                 chosen.append(numbers)
@@ -103,7 +107,7 @@ def _influence(views: _Views, estimate: _Estimate) -> tuple[tuple[str, float], .
     rest = [[other for other in numbers if other != left] for left in numbers]
     without = views.estimates(rest, [estimate.point] * len(rest))
     return tuple(
-        (views.sights[left].view, float(np.linalg.norm(found.point - estimate.point)))
+        (views.observations[left].view, float(np.linalg.norm(found.point - estimate.point)))
         for left, found in zip(numbers, without, strict=True)
         if found is not None
     )
@@ -112,11 +116,11 @@ def _influence(views: _Views, estimate: _Estimate) -> tuple[tuple[str, float], .
 class _Views:
     """The views of a group, and the most likely point of any of their subsets."""
 
-    def __init__(self, sights: Sequence[Sighting], policy: Policy):
-        self.sights = tuple(sights)
+    def __init__(self, observations: Sequence[BallObservation], policy: Policy):
+        self.observations = tuple(observations)
         self._policy = policy
-        self._centers = np.array([sight.center for sight in sights])
-        self._cameras = CameraTable.of([sight.camera for sight in sights])
+        self._centers = np.array([observation.center for observation in observations])
+        self._cameras = CameraTable.of([observation.camera for observation in observations])
 
     def estimates(
         self, chosen: Sequence[Sequence[int]], starts: Sequence[FloatArray]
@@ -143,15 +147,15 @@ class _Views:
 
     def _covariances(self, chosen: IntArray, points: FloatArray) -> FloatArray:
         """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""
-        sights = [self.sights[view] for view in chosen.ravel().tolist()]
+        observations = [self.observations[view] for view in chosen.ravel().tolist()]
         places = np.repeat(points, chosen.shape[1], axis=0)
-        return sight_covariances(sights, places, self._policy).reshape(*chosen.shape, 2, 2)
+        return ray_covariances(observations, places, self._policy).reshape(*chosen.shape, 2, 2)
 
 
-def _is_behind(pair: Pair, sights: Sequence[Sighting]) -> bool:
+def _is_behind(pair: Pair, observations: Sequence[BallObservation]) -> bool:
     point = np.array([pair.point])
     return any(
-        sight.camera.pitch_to_camera(point)[0, 2] <= 0
-        for sight in sights
-        if sight.view in (pair.a, pair.b)
+        observation.camera.pitch_to_camera(point)[0, 2] <= 0
+        for observation in observations
+        if observation.view in (pair.a, pair.b)
     )

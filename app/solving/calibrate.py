@@ -95,7 +95,7 @@ def calibrate(
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_main(fit, observations)
     picture = find_picture(problem, fit.parameters, observations)
-    found = replace(_found(problem, fit, observations), suspects=suspects, picture=picture)
+    found = replace(_calibration_of(problem, fit, observations), suspects=suspects, picture=picture)
     return measure(found, lines, pitch, size, shortest_px=shortest_px(policy, size))
 
 
@@ -122,7 +122,7 @@ def calibrate_near(
     shared = problem.refine_near(fit, observations, near)
     if shared is fit:
         return alone
-    found = _found(problem, shared, observations)
+    found = _calibration_of(problem, shared, observations)
     # Whether the picture was stretched or cropped its own lines say, to the camera that fits them.
     found = replace(found, suspects=alone.suspects, picture=alone.picture)
     return measure(found, lines, pitch, size, shortest_px=shortest_px(policy, size))
@@ -218,7 +218,9 @@ def _picture_covariance(
     return search.carried(unknowns, whole), whole
 
 
-def _found(problem: ResectionProblem, fit: Resection, observations: Observations) -> Calibration:
+def _calibration_of(
+    problem: ResectionProblem, fit: Resection, observations: Observations
+) -> Calibration:
     """The camera and how well the lines determine it; the priors count for nothing there."""
     try:
         covariance = problem.line_noise(fit.parameters, observations).parameters
@@ -332,7 +334,7 @@ def calibrate_view(
     key = clicks_key(group, view, policy)
     clicked = known.get(key) or calibrate_clicks(group, view, policy)
     reading = wanted_paint(group, view, policy)
-    if reading is None or reading.sought_for != sought_key(group, view, policy):
+    if reading is None or reading.sought_for != paint_search_key(group, view, policy):
         if not is_lone(group, view, policy):
             return clicked
         station = view.station
@@ -355,7 +357,7 @@ def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str,
     """The same, and after it the key of the clicks that it starts from where it is another."""
     key = clicks_key(group, view, policy)
     reading = wanted_paint(group, view, policy)
-    if reading is None or reading.sought_for != sought_key(group, view, policy):
+    if reading is None or reading.sought_for != paint_search_key(group, view, policy):
         if not is_lone(group, view, policy):
             return (key,)
         return digest_of(f"{key} lone {policy.lone_frames}".encode()), key
@@ -368,7 +370,7 @@ def clicks_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     return calibration_key(view.station, group.pitch, policy, _shared(group, view, policy))
 
 
-def sought_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+def paint_search_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
     """Digest of what the camera depends on from which the paint of a view's picture is sought.
 
     How that camera is measured has no part in it, nor how noisy its clicks are: neither what counts

@@ -20,7 +20,7 @@ from app.solving.chi_square import (
 )
 from app.solving.facts import Facts
 from app.solving.judgement import Judgement, views_of
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 
 SURE = 0.9
 """How sure the solver must be of a view to name it."""
@@ -97,7 +97,7 @@ def contradiction(
     keys: Sequence[str],
     facts: Facts,
     judgement: Judgement,
-    sights: Sequence[Sighting],
+    observations: Sequence[BallObservation],
     policy: Policy,
 ) -> Contradiction | None:
     """Where the views of the ball contradict each other; None where they do not.
@@ -109,28 +109,28 @@ def contradiction(
         keys: Of its views.
         facts: Of the one group.
         judgement: What the policy makes of them.
-        sights: Of its views.
+        observations: Of its views.
         policy: How noisy a click is.
     """
     if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
         return None
     used = np.array([key in chi_square.views for key in keys])
     known = not untestable(facts, used, policy)[0]
-    chosen = [sight for sight in sights if sight.view in chi_square.views]
+    chosen = [observation for observation in observations if observation.view in chi_square.views]
     if len(chosen) == 2:
         one, other = chosen
-        gap, moved = _apart(one, other, judgement.point[0], policy)
+        gap, moved = _ray_distance(one, other, judgement.point[0], policy)
         return Contradiction(chi_square, None, None, gap, moved, known)
-    view, confidence, point = _blamed(keys, facts, used, judgement.point, policy)
+    view, confidence, point = _outlier_view(keys, facts, used, judgement.point, policy)
     if view is None:
         return Contradiction(chi_square, None, None, is_known=known)
-    sight = next(sight for sight in chosen if sight.view == view)
-    place = _to_level(sight, float(point[2]))
+    observation = next(observation for observation in chosen if observation.view == view)
+    place = _to_level(observation, float(point[2]))
     level = None if place is None else float(np.linalg.norm(place - point))
-    return Contradiction(chi_square, view, confidence, _off_ray(sight, point), level, known)
+    return Contradiction(chi_square, view, confidence, _off_ray(observation, point), level, known)
 
 
-def _blamed(
+def _outlier_view(
     keys: Sequence[str], facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
 ) -> tuple[str | None, float, FloatArray]:
     """The view without which the others agree, how sure that is, and their ball, shape (3,)."""
@@ -143,8 +143,8 @@ def _blamed(
     return keys[places[best]] if agree else None, confidence, left.point[best]
 
 
-def _apart(
-    a: Sighting, b: Sighting, point: FloatArray, policy: Policy
+def _ray_distance(
+    a: BallObservation, b: BallObservation, point: FloatArray, policy: Policy
 ) -> tuple[float, float | None]:
     """How far two rays miss each other, and their balls if both lie on the grass, metres."""
     gap = _rays_apart(a, b)
@@ -155,17 +155,17 @@ def _apart(
     return gap, float(np.linalg.norm(ends[0] - ends[1]))
 
 
-def _to_level(sight: Sighting, z: float) -> FloatArray | None:
+def _to_level(observation: BallObservation, z: float) -> FloatArray | None:
     """Where a ray meets a level of the pitch frame, shape (3,); None where it is nearly level."""
-    direction, position = _direction(sight), sight.camera.position
+    direction, position = _direction(observation), observation.camera.position
     if direction[2] < STEEP or z < position[2]:
         return None
     place: FloatArray = position + (z - position[2]) / direction[2] * direction
     return place
 
 
-def _rays_apart(a: Sighting, b: Sighting) -> float:
-    """Smallest distance of the rays of two sights, metres."""
+def _rays_apart(a: BallObservation, b: BallObservation) -> float:
+    """Smallest distance of the rays of two observations, metres."""
     across = np.cross(_direction(a), _direction(b))
     length = float(np.linalg.norm(across))
     between = b.camera.position - a.camera.position
@@ -174,12 +174,14 @@ def _rays_apart(a: Sighting, b: Sighting) -> float:
     return abs(float(between @ across)) / length
 
 
-def _off_ray(sight: Sighting, point: FloatArray) -> float:
-    """Distance of a point from the ray of a sight, metres."""
-    return float(np.linalg.norm(np.cross(point - sight.camera.position, _direction(sight))))
+def _off_ray(observation: BallObservation, point: FloatArray) -> float:
+    """Distance of a point from the ray of an observation, metres."""
+    return float(
+        np.linalg.norm(np.cross(point - observation.camera.position, _direction(observation)))
+    )
 
 
-def _direction(sight: Sighting) -> FloatArray:
-    ray = sight.camera.rays(np.array([sight.center]))[0]
+def _direction(observation: BallObservation) -> FloatArray:
+    ray = observation.camera.rays(np.array([observation.center]))[0]
     direction: FloatArray = ray / np.linalg.norm(ray)
     return direction

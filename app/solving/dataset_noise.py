@@ -32,7 +32,7 @@ from app.solving.line_noise import (
 )
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
-from app.solving.triangulate import Sighting, sights_of
+from app.solving.triangulate import BallObservation, ball_observations
 
 
 def view_line_noise(
@@ -43,7 +43,7 @@ def view_line_noise(
     Raises:
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
-    problem, parameters = _at(calibration, size, policy)
+    problem, parameters = _problem_at(calibration, size, policy)
     return problem.line_noise(parameters, observe(lines, policy.fitted(pitch), size))
 
 
@@ -55,7 +55,7 @@ def view_line_evidence(
     Raises:
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
-    problem, parameters = _at(calibration, size, policy)
+    problem, parameters = _problem_at(calibration, size, policy)
     rows = problem.noise_rows(parameters, observe(lines, policy.fitted(pitch), size))
     return line_evidence(*rows).in_units(problem.unit)
 
@@ -71,7 +71,7 @@ def view_line_covariance(
     return row_by_row(noise.parameters)
 
 
-def _at(
+def _problem_at(
     calibration: Calibration, size: ImageSize, policy: CalibrationPolicy
 ) -> tuple[ResectionProblem, FloatArray]:
     if calibration.camera is None:
@@ -109,18 +109,18 @@ class SeenGroup:
     def of(group: Group, solution: Solution, policy: Policy) -> SeenGroup:
         """What a group and its solution under a policy say."""
         views = (
-            _seen(group, view, solved.calibration_key, solved.calibration, policy)
+            _seen_view(group, view, solved.calibration_key, solved.calibration, policy)
             for view, solved in zip(group.views, solution.views, strict=True)
         )
         return SeenGroup(group, solution.ball, tuple(views))
 
     def misses(self, policy: Policy) -> tuple[Miss, ...]:
         """What the rays leave unexplained, with cameras as certain as a policy's lines make them."""
-        return () if self.ball is None else misses_of(self.ball, self._sights(policy))
+        return () if self.ball is None else misses_of(self.ball, self._observations(policy))
 
-    def _sights(self, policy: Policy) -> list[Sighting]:
+    def _observations(self, policy: Policy) -> list[BallObservation]:
         found = [self._calibration(view, policy) for view in self.views]
-        return sights_of(self.group.views, found)
+        return ball_observations(self.group.views, found)
 
     def _calibration(self, seen: SeenView, policy: Policy) -> Calibration:
         # What paint says of a camera, and what is not known of a picture, hardly depends on clicks.
@@ -185,14 +185,16 @@ def _with_lines(policy: Policy, lines: LineEstimate) -> Policy:
     return replace(policy, calibration=known)
 
 
-def _seen(group: Group, view: View, key: str, calibration: Calibration, policy: Policy) -> SeenView:
+def _seen_view(
+    group: Group, view: View, key: str, calibration: Calibration, policy: Policy
+) -> SeenView:
     left_out = {suspect.marking for suspect in calibration.suspects}
     lines = make_lines({k: at for k, at in view.station.lines.items() if k not in left_out})
     evidence = None
     made = calibration.source != "given" and calibration.covariance is not None
     if made and view.station.picture is None:
-        asked = calibration, lines, group.pitch, view.size, policy.calibration
+        arguments = calibration, lines, group.pitch, view.size, policy.calibration
         # Lines that leave the camera open say nothing of their noise.
         with suppress(DegenerateGeometryError, np.linalg.LinAlgError):
-            evidence = view_line_evidence(*asked)
+            evidence = view_line_evidence(*arguments)
     return SeenView(key, view, replace(calibration, markings=()), lines, evidence)

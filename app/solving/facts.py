@@ -22,7 +22,7 @@ from app.soccer.group import View
 from app.soccer.picture import camera_aspect
 from app.soccer.solution import Calibration
 from app.solving.camera_numbers import WHOLE, CameraNumbers
-from app.solving.triangulate import Meeting, lines_of_sight, meet, sights_of
+from app.solving.triangulate import PairPoint, ball_observations, meet, observation_pairs
 
 STEP_PX = 0.5
 """How far a pixel is moved to see how its pair's point moves."""
@@ -229,19 +229,19 @@ def _offsets(parts: Sequence[Facts], name: str, sizes: Sequence[int]) -> IntArra
 
 def group_facts(views: Sequence[View], calibrations: Sequence[Calibration]) -> Facts:
     """The facts of one group, from what was said of its views and the calibration of each."""
-    meetings = meet(combinations(sights_of(views, calibrations), 2))
-    return facts_of(views, calibrations, meetings)
+    pair_points = meet(combinations(ball_observations(views, calibrations), 2))
+    return facts_of(views, calibrations, pair_points)
 
 
 def facts_of(
-    views: Sequence[View], calibrations: Sequence[Calibration], meetings: Sequence[Meeting]
+    views: Sequence[View], calibrations: Sequence[Calibration], pair_points: Sequence[PairPoint]
 ) -> Facts:
     """The facts of one group.
 
     Args:
         views: Of the group.
         calibrations: Of each view.
-        meetings: Of every two of its sights.
+        pair_points: Of every two of its observations.
     """
     marks = [
         (place, fit.largest_px)
@@ -261,7 +261,7 @@ def facts_of(
             parameters[place], covariances[place] = known.parameters, known.covariance
             pictures[place] = 0.0 if known.picture is None else known.picture
     places = {view.key: place for place, view in enumerate(views)}
-    slopes, axes = _rays(meetings, places)
+    slopes, axes = _rays(pair_points, places)
     return Facts(
         groups=1,
         view_group=np.zeros(len(views), np.int64),
@@ -282,16 +282,16 @@ def facts_of(
         ),
         mark_view=np.array([place for place, _ in marks], np.int64),
         mark_px=np.array([np.inf if apart is None else apart for _, apart in marks], float),
-        pair_group=np.zeros(len(meetings), np.int64),
+        pair_group=np.zeros(len(pair_points), np.int64),
         pair_view=np.array(
-            [(places[item.a.view], places[item.b.view]) for item in meetings], np.int64
+            [(places[item.a.view], places[item.b.view]) for item in pair_points], np.int64
         ).reshape(-1, 2),
-        pair_errors=_rows([item.errors_px for item in meetings], 2),
-        pair_front=np.array([item.in_front for item in meetings], bool),
-        pair_baseline=np.array([item.baseline_m for item in meetings], float),
-        pair_parallax=np.array([item.parallax_degrees for item in meetings], float),
-        pair_point=_rows([item.point for item in meetings], 3),
-        pair_moved=_moved(meetings),
+        pair_errors=_rows([item.errors_px for item in pair_points], 2),
+        pair_front=np.array([item.in_front for item in pair_points], bool),
+        pair_baseline=np.array([item.baseline_m for item in pair_points], float),
+        pair_parallax=np.array([item.parallax_degrees for item in pair_points], float),
+        pair_point=_rows([item.point for item in pair_points], 3),
+        pair_moved=_moved(pair_points),
         view_picture=pictures,
         view_stretch=_stretches(views, calibrations, numbers),
         view_noise=np.array([view.noise for view in views], float),
@@ -314,12 +314,16 @@ def _stretches(
     return stretches
 
 
-def _rays(meetings: Sequence[Meeting], places: Mapping[str, int]) -> tuple[FloatArray, FloatArray]:
+def _rays(
+    pair_points: Sequence[PairPoint], places: Mapping[str, int]
+) -> tuple[FloatArray, FloatArray]:
     """Slope and axis of the views that meet others, NaN for those that do not."""
     slopes, axes = np.full((len(places), 2, 3), np.nan), np.full((len(places), 3), np.nan)
-    for sight in {item.view: item for each in meetings for item in (each.a, each.b)}.values():
-        place, camera = places[sight.view], sight.camera
-        ray = camera.rays(np.array([sight.center]))[0]
+    for observation in {
+        item.view: item for each in pair_points for item in (each.a, each.b)
+    }.values():
+        place, camera = places[observation.view], observation.camera
+        ray = camera.rays(np.array([observation.center]))[0]
         slopes[place] = camera.jacobian(camera.position + ray)
         axes[place] = camera.rotation[2]
     return slopes, axes
@@ -329,14 +333,14 @@ def _position(calibration: Calibration) -> Sequence[float] | FloatArray:
     return (np.nan,) * 3 if calibration.camera is None else calibration.camera.position
 
 
-def _moved(meetings: Sequence[Meeting]) -> FloatArray:
-    if not meetings:
+def _moved(pair_points: Sequence[PairPoint]) -> FloatArray:
+    if not pair_points:
         return NOTHING.pair_moved
-    a, b = [item.a for item in meetings], [item.b for item in meetings]
+    a, b = [item.a for item in pair_points], [item.b for item in pair_points]
     slopes = None
-    if any(sight.camera.is_wide for sight in (*a, *b)):
+    if any(observation.camera.is_wide for observation in (*a, *b)):
         slopes = np.array([s.ideal_slope for s in a]), np.array([s.ideal_slope for s in b])
-    return moved_points(*lines_of_sight(a, b), STEP_PX, slopes)
+    return moved_points(*observation_pairs(a, b), STEP_PX, slopes)
 
 
 def _rows(values: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:

@@ -62,7 +62,8 @@ def _facts(groups: Sequence[FloatArray]) -> Facts:
     starts = dict(zip(_ROWS, (ends - heads[:, 1:]).T, strict=True))
     totals = dict(zip(_ROWS, ends[-1].tolist(), strict=True))
     arrays: dict[str, Any] = {
-        name: np.empty((totals[_of(name)], *shape), kind) for name, (kind, shape) in COLUMNS.items()
+        name: np.empty((totals[_column_owner(name)], *shape), kind)
+        for name, (kind, shape) in COLUMNS.items()
     }
     sizes, size_of = np.unique(heads, axis=0, return_inverse=True)
     for place, (length, *counts) in enumerate(sizes.tolist()):
@@ -92,18 +93,18 @@ def _scatter(
     """Put the columns of groups of one size, a row of ``numbers`` each, where they belong."""
     at = len(_ROWS)
     for name, (_, shape) in COLUMNS.items():
-        target = targets[_of(name)]
+        target = targets[_column_owner(name)]
         if name in LATER and at == length:
             arrays[name][target] = LATER[name] if shape else LATER[name][0]
             continue
-        end = at + rows[_of(name)] * int(np.prod(shape))
+        end = at + rows[_column_owner(name)] * int(np.prod(shape))
         arrays[name][target] = numbers[:, at:end].reshape(len(target), *shape)
         at = end
     if at != length:
         raise ValueError("there are more numbers than the columns hold")
 
 
-def _of(name: str) -> str:
+def _column_owner(name: str) -> str:
     """What a column has a row for."""
     return name.partition("_")[0]
 

@@ -18,7 +18,7 @@ from app.solving.numbers import degrees, metres, pixels
 from app.solving.paint_findings import paint_findings
 from app.solving.plausible import implausible
 from app.solving.sides import Swap, find_swaps
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 
 MAX_SIZE_RATIO = 2.0
 """A ball box may be so many times larger or smaller than the 3D point implies."""
@@ -51,21 +51,21 @@ _BY_WEIGHT = (
 def find(
     group: Group,
     views: Sequence[ViewSolution],
-    sights: Sequence[Sighting],
+    observations: Sequence[BallObservation],
     pairs: Sequence[Pair],
     ball: Ball3D | None,
     policy: Policy,
     contradicted: Contradiction | None = None,
 ) -> tuple[Finding, ...]:
     """All findings of a group: what makes its ball unusable first, then what explains most."""
-    swaps = {swap.view: swap for swap in _swaps(group, views, sights, policy)}
+    swaps = {swap.view: swap for swap in _swaps(group, views, observations, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
-        said = calibration_findings(solved.calibration, view.size, view.key)
+        noticed = calibration_findings(solved.calibration, view.size, view.key)
         # A static camera would say in every frame what nobody annotated in any.
         found.extend(
             item
-            for item in said
+            for item in noticed
             if not (view.station.shared and item.kind == "visible_not_annotated")
         )
         found.extend(paint_findings(group, view, solved, policy.calibration))
@@ -94,13 +94,19 @@ def _weight(finding: Finding) -> tuple[bool, int, float]:
 
 
 def _swaps(
-    group: Group, views: Sequence[ViewSolution], sights: Sequence[Sighting], policy: Policy
+    group: Group,
+    views: Sequence[ViewSolution],
+    observations: Sequence[BallObservation],
+    policy: Policy,
 ) -> tuple[Swap, ...]:
     left = {solved.view for solved in views if solved.failed is None}
-    first = next((sight for sight in sights if sight.view == group.views[0].key), None)
-    usable = [sight for sight in sights if sight.view in left]
+    first = next(
+        (observation for observation in observations if observation.view == group.views[0].key),
+        None,
+    )
+    usable = [observation for observation in observations if observation.view in left]
     badly = {solved.view for solved in views if solved.failed == "jac"}
-    doubtful = [sight for sight in sights if sight.view in badly]
+    doubtful = [observation for observation in observations if observation.view in badly]
     return find_swaps(first, usable, group.pitch, policy, doubtful)
 
 

@@ -239,8 +239,8 @@ def _baseline(group: _Group, pairs: Sequence[Pair], widest: float, policy: Polic
     named = _letters_of(group)
     close = [pair for pair in pairs if pair.failed == "baseline"]
     if passed and close:
-        said = ", ".join(f"{_name(pair, named)} {pair.baseline_m:.1f} m" for pair in close)
-        sentence += f"; {said} not used"
+        unused = ", ".join(f"{_name(pair, named)} {pair.baseline_m:.1f} m" for pair in close)
+        sentence += f"; {unused} not used"
     return _gate("baseline", passed, widest, policy.min_baseline_m, sentence)
 
 

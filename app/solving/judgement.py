@@ -130,14 +130,14 @@ def judge_standing(
         return np.any(failed[:_SIGMA], axis=0) if first_alone else fallen
 
     def certain(limit_m: float) -> BoolArray:
-        asked = np.flatnonzero(~before())
-        covariances = uncertainty.covariances(valid, asked, point[asked], policy)
+        candidates = np.flatnonzero(~before())
+        covariances = uncertainty.covariances(valid, candidates, point[candidates], policy)
         # Contradictions only widen: whoever is uncertain without them is so with them.
         within = is_within(covariances, limit_m)
-        asked, covariances = asked[within], covariances[within]
+        candidates, covariances = candidates[within], covariances[within]
         found = np.zeros(facts.groups, bool)
-        widened = widened_covariances(facts, valid, asked, covariances, point, policy)
-        found[asked] = is_within(widened, limit_m)
+        widened = widened_covariances(facts, valid, candidates, covariances, point, policy)
+        found[candidates] = is_within(widened, limit_m)
         return found
 
     def p_value() -> FloatArray:
@@ -222,9 +222,9 @@ def widened_covariances(
         point: Of every group, pitch frame, metres, shape (G, 3).
         policy: How noisy a click is.
     """
-    asked = np.zeros(facts.groups, bool)
-    asked[groups] = True
-    used = views_of(facts, valid) & asked[facts.view_group]
+    wanted = np.zeros(facts.groups, bool)
+    wanted[groups] = True
+    used = views_of(facts, valid) & wanted[facts.view_group]
     widening = residuals_of(facts, used, point, policy).widening[groups]
     widened: FloatArray = covariances * (widening**2)[:, None, None]
     return widened

@@ -41,7 +41,7 @@ MIN_MEASUREMENTS_LEFT = 8
 
 
 @dataclass(frozen=True)
-class _Doubt:
+class _Suspicion:
     """A marking left out: how far off it is, and the class that its points fit best, if any."""
 
     marking: str
@@ -63,7 +63,7 @@ class _Doubt:
 class _Trial:
     """What happens without some markings: the camera, and the largest distance of the others."""
 
-    doubts: tuple[_Doubt, ...]
+    doubts: tuple[_Suspicion, ...]
     rest: Observations
     fit: Resection
     worst: float
@@ -175,7 +175,7 @@ class _Search:
 
     def doubt(
         self, observations: Observations, rest: Observations, fit: Resection, marking: str
-    ) -> _Doubt:
+    ) -> _Suspicion:
         """A marking against the camera from the rest, under its label and those not in use."""
         error = self.distance(fit.parameters, observations.only(marking))
         taken = {*rest.markings, marking}
@@ -185,11 +185,11 @@ class _Search:
             if other not in taken and (other in CIRCLES) == (marking in CIRCLES)
         )
         if not ranked:
-            return _Doubt(marking, error, None, np.inf)
+            return _Suspicion(marking, error, None, np.inf)
         nearest, best = ranked[0]
         rival = ranked[1][0] if len(ranked) > 1 else np.inf
         plausible = nearest <= RELABELLED or (nearest <= NEAREST and 2 * nearest < rival)
-        return _Doubt(marking, error, best if plausible else None, nearest)
+        return _Suspicion(marking, error, best if plausible else None, nearest)
 
     def largest(self, observations: Observations, fit: Resection) -> dict[str, float]:
         """Largest distance of each marking's points."""
@@ -203,7 +203,7 @@ class _Search:
         """Largest distance of all points."""
         return float(self.problem.distances(parameters, observations).max()) / self.gamma
 
-    def suspect(self, doubt: _Doubt) -> Suspect:
+    def suspect(self, doubt: _Suspicion) -> Suspect:
         """The doubt as people are told of it; a class that fits as badly is worth nothing."""
         named = doubt.suggested is not None
         return Suspect(
@@ -226,10 +226,12 @@ def _by_suspicion(largest: dict[str, float]) -> list[str]:
 
 def _minority(markings: Sequence[str]) -> list[str]:
     """The markings of that half of the pitch which fewer of them belong to."""
-    halves = ([name for name in markings if _half(name) == half] for half in ("left", "right"))
+    halves = (
+        [name for name in markings if _pitch_half(name) == half] for half in ("left", "right")
+    )
     return min(halves, key=len)
 
 
-def _half(marking: str) -> str | None:
+def _pitch_half(marking: str) -> str | None:
     """``left`` or ``right`` of the pitch; None for what belongs to both."""
     return next((word for word in marking.split(" ")[1:3] if word in ("left", "right")), None)

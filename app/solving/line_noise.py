@@ -248,8 +248,8 @@ def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
         return None
     blocks = np.zeros((BLOCKS, len(FREEDOMS), len(SIGMAS), len(SHARES)))
     for at, item in enumerate(found):
-        told = item.log_likelihood(SIGMAS[:, None], FREEDOMS[:, None, None])
-        blocks[at * BLOCKS // len(found)] -= told
+        likelihoods = item.log_likelihood(SIGMAS[:, None], FREEDOMS[:, None, None])
+        blocks[at * BLOCKS // len(found)] -= likelihoods
     # How alike the images are decides little: the likeliest holds for all blocks.
     blocks = blocks[:, blocks.sum(axis=0).min(axis=(1, 2)).argmin()]
     whole = blocks.sum(axis=0)

@@ -131,9 +131,9 @@ def lone_frame(
             # What looks mislabelled on the pitch in use may lie where another pitch has it.
             whole = _Frame(problem, observations, pitch, sigma).fit(parameters)
             if whole.worst_px(left_out) <= RELABELLED * GAMMA_SHARE * problem.size.diagonal:
-                return replace(whole.told(), explains=tuple(left_out))
+                return replace(whole.information(), explains=tuple(left_out))
         kept = observations.without(*left_out)
-        return _Frame(problem, kept, pitch, sigma).fit(parameters).told()
+        return _Frame(problem, kept, pitch, sigma).fit(parameters).information()
     except np.linalg.LinAlgError:
         return None
 
@@ -162,9 +162,9 @@ class _Fit:
         seen = np.isin(self.frame.observations.marking, [MARKINGS.index(name) for name in markings])
         return float(self.rows.distance[seen].max(initial=0.0))
 
-    def told(self) -> LoneFrame:
+    def information(self) -> LoneFrame:
         """As it is used."""
-        carry = _carry(self.rows)
+        carry = _camera_jacobian(self.rows)
         spread, off = self.frame.noise(self.rows), carry @ self.off
         covariance = carry @ spread @ carry.T + np.outer(off, off)
         if not np.isfinite(covariance).all():
@@ -205,9 +205,9 @@ class _Frame:
     def noise(self, rows: _Rows) -> FloatArray:
         """Covariance of the thirteen, shape (13, 13)."""
         # Residuals in units of a click, so that the prior weighs what it says.
-        spare = max(len(rows.apart) - PARAMETERS, 1)
+        freedom = max(len(rows.apart) - PARAMETERS, 1)
         least = MIN_CLICK_SIGMA_PX * self.problem.unit
-        click = max(float(np.sqrt(rows.apart @ rows.apart / spare)), least)
+        click = max(float(np.sqrt(rows.apart @ rows.apart / freedom)), least)
         known = self.problem.noise
         known = replace(known, sigma_px=known.sigma_px / click, floor_px=known.floor_px / click)
         return line_noise(
@@ -273,7 +273,7 @@ class _Frame:
 
         def at(pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
             moved = Observations(seen.curves, pixels, seen.marking)
-            return residuals(camera, moved.curves, moved.sightings(), half)
+            return residuals(camera, moved.curves, moved.curve_points(), half)
 
         offsets, by_camera = at(seen.pixels)
         slopes = np.stack(
@@ -309,7 +309,7 @@ class _Frame:
         return _Rows(apart, jacobian, np.append(seen.marking, -1 - beyond), distance)
 
 
-def _carry(rows: _Rows) -> FloatArray:
+def _camera_jacobian(rows: _Rows) -> FloatArray:
     """From the thirteen to the camera's eight, shape (8, 13).
 
     What a picture does is carried by rotation and lens, never by the position, as in

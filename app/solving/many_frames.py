@@ -49,8 +49,8 @@ def without_camera(gradient: FloatArray, information: FloatArray, variance: floa
     camera, shared = slice(0, PARAMETERS), slice(PARAMETERS, None)
     carried = np.linalg.solve(information[camera, camera], information[camera, shared])
     pull = (gradient[shared] - carried.T @ gradient[camera]) / variance
-    told = (information[shared, shared] - information[shared, camera] @ carried) / variance
-    return pull, told
+    reduced = (information[shared, shared] - information[shared, camera] @ carried) / variance
+    return pull, reduced
 
 
 def with_own_numbers(share: Share, sigma: FloatArray) -> Share:
@@ -60,9 +60,9 @@ def with_own_numbers(share: Share, sigma: FloatArray) -> Share:
         share: As if the numbers were those of the match.
         sigma: By which a frame's numbers differ from them, shape (K,).
     """
-    pull, told = share
-    shrunk = np.linalg.inv(np.eye(len(pull)) + told * sigma**2)
-    return shrunk @ pull, shrunk @ told
+    pull, information = share
+    shrunk = np.linalg.inv(np.eye(len(pull)) + information * sigma**2)
+    return shrunk @ pull, shrunk @ information
 
 
 def shared_sigmas(pulls: FloatArray, information: FloatArray, spent: int) -> FloatArray:

@@ -90,13 +90,13 @@ def estimate_match_picture(
     Raises:
         DegenerateGeometryError: Too few frames show enough markings.
     """
-    seen = [_Seen.of(frames[index], policy) for index in choose_frames(frames)]
+    seen = [_FittedFrame.of(frames[index], policy) for index in choose_frames(frames)]
     if len(seen) < MIN_FRAMES:
         raise DegenerateGeometryError(
             f"{len(seen)} frames show enough markings, a picture needs {MIN_FRAMES}"
         )
-    warp, pull, told = _adjust(seen)
-    information = told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
+    warp, pull, informations = _adjust(seen)
+    information = informations.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
     aspect, right, down = shared_sigmas(pull, information, spent=1).tolist()
     return PictureEstimate(picture_of(warp, (aspect, right, down)), len(seen))
 
@@ -108,7 +108,7 @@ def choose_frames(frames: Sequence[PictureFrame]) -> list[int]:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _FittedFrame:
     """A frame with its best camera so far, in the picture as it was taken."""
 
     problem: ResectionProblem
@@ -116,12 +116,12 @@ class _Seen:
     camera: FloatArray
 
     @staticmethod
-    def of(frame: PictureFrame, policy: CalibrationPolicy) -> _Seen:
+    def of(frame: PictureFrame, policy: CalibrationPolicy) -> _FittedFrame:
         problem = ResectionProblem.of(frame.size, policy)
         observations = observe(frame.lines, policy.fitted(frame.pitch), frame.size)
-        return _Seen(problem, observations, problem.resect(observations).parameters)
+        return _FittedFrame(problem, observations, problem.resect(observations).parameters)
 
-    def at(self, warp: FloatArray) -> _Seen:
+    def at(self, warp: FloatArray) -> _FittedFrame:
         """The frame with another picture, its camera refined."""
         seen = undo_warp(self.problem, self.observations, warp)
         return replace(self, camera=self.problem.refine(seen, self.camera[None]).parameters)
@@ -137,24 +137,24 @@ class _Seen:
         prior = self.problem.prior()
         gradient[:PARAMETERS] += (self.camera - prior.mean) / prior.sigma**2
         information[range(PARAMETERS), range(PARAMETERS)] += prior.sigma**-2
-        pull, told = without_camera(gradient, information, search.click_variance(unknowns))
+        pull, reduced = without_camera(gradient, information, search.click_variance(unknowns))
         # A frame that says nearly nothing may say a little less than nothing, by rounding.
-        values, vectors = np.linalg.eigh((told + told.T) / 2)
-        told = vectors * np.maximum(values, 0.0) @ vectors.T
-        return with_own_numbers((pull, told), FRAME_SIGMA)
+        values, vectors = np.linalg.eigh((reduced + reduced.T) / 2)
+        reduced = vectors * np.maximum(values, 0.0) @ vectors.T
+        return with_own_numbers((pull, reduced), FRAME_SIGMA)
 
 
-def _adjust(seen: Sequence[_Seen]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _adjust(seen: Sequence[_FittedFrame]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The three numbers once they settle, and each frame's pull and information."""
     warp = np.zeros(3)
     for _ in range(_ROUNDS):
         seen = [frame.at(warp) for frame in seen]
         shares = [frame.share(warp) for frame in seen]
-        pull, told = (np.array(part) for part in zip(*shares, strict=True))
-        information = told.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
+        pull, informations = (np.array(part) for part in zip(*shares, strict=True))
+        information = informations.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
         step = -np.linalg.solve(information, pull.sum(axis=0) + warp / PRIOR_SIGMA**2)
         step = np.clip(step, -_LONGEST, _LONGEST)
         warp = warp + step
         if np.abs(step).max() < _SETTLED:
             break
-    return warp, pull, told
+    return warp, pull, informations

@@ -14,10 +14,10 @@ from app.solving.ball_covariance import MeanCovariance, longest_sigma
 from app.solving.chi_square import widening
 from app.solving.facts import Facts
 from app.solving.judgement import PASSES, Judgement
-from app.solving.triangulate import Meeting
+from app.solving.triangulate import PairPoint
 
 
-def judged_pairs(meetings: Sequence[Meeting], judgement: Judgement) -> tuple[Pair, ...]:
+def judged_pairs(pair_points: Sequence[PairPoint], judgement: Judgement) -> tuple[Pair, ...]:
     """Every pair of views with its point, and the gate that makes it invalid."""
     return tuple(
         Pair(
@@ -30,7 +30,7 @@ def judged_pairs(meetings: Sequence[Meeting], judgement: Judgement) -> tuple[Pai
             valid=gate == PASSES,
             failed=None if gate == PASSES else GATES[gate],
         )
-        for item, gate in zip(meetings, judgement.pair_failed.tolist(), strict=True)
+        for item, gate in zip(pair_points, judgement.pair_failed.tolist(), strict=True)
     )
 
 

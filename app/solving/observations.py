@@ -9,7 +9,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.point_kernels import keep_farthest
-from app.geometry.resection import ARC, SEGMENT, Curves, IntArray, Sightings
+from app.geometry.resection import ARC, SEGMENT, CurvePoints, Curves, IntArray
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Arc, Pitch, Segment
@@ -34,9 +34,9 @@ class Observations:
         """Names of the markings that are seen."""
         return tuple(MARKINGS[index] for index in np.unique(self.marking))
 
-    def sightings(self) -> Sightings:
+    def curve_points(self) -> CurvePoints:
         """All points with weight one."""
-        return Sightings(self.pixels, self.marking, np.ones(len(self.pixels)))
+        return CurvePoints(self.pixels, self.marking, np.ones(len(self.pixels)))
 
     def without(self, *markings: str) -> Observations:
         """The same without the points of some markings."""

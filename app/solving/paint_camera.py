@@ -14,8 +14,8 @@ from app.geometry.arrays import FloatArray
 from app.geometry.resection import (
     PARAMETERS,
     ROLL,
+    CurvePoints,
     Prior,
-    Sightings,
     X,
     Z,
     residuals,
@@ -110,7 +110,7 @@ class PaintProblem:
         scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
         return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
 
-    def surprise(self, parameters: FloatArray) -> float:
+    def mahalanobis_squared(self, parameters: FloatArray) -> float:
         """Squared distance from the start in its own sigmas; 0 where nothing is known of it."""
         if self.information is None:
             return 0.0
@@ -169,12 +169,12 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         None where the paint does not determine it, does not lie on the markings in the end, or
         moves the camera farther than its start allows.
     """
-    sightings, sigmas = _sightings(evidence, problem.resection.size)
+    curve_points, sigmas = _curve_points(evidence, problem.resection.size)
     if not len(sigmas):
         return None
     parameters = problem.first
     for index in range(ROUNDS):
-        seen = offsets_of(problem, parameters, sightings, sigmas, pitch)
+        seen = offsets_of(problem, parameters, curve_points, sigmas, pitch)
         strict = index >= SOFT_ROUNDS
         try:
             moved = problem.step(parameters, seen, strict)
@@ -186,15 +186,15 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         # The information of one exact place of paint is far above any start's.
         if strict and float(np.abs(seen.jacobian @ moved).max()) < SETTLED * sigmas.min():
             break
-    seen = offsets_of(problem, parameters, sightings, sigmas, pitch)
+    seen = offsets_of(problem, parameters, curve_points, sigmas, pitch)
     camera = problem.resection.camera(parameters)
-    places = camera.on_ground(sightings.pixels + np.array(camera.principal_point))
+    places = camera.on_ground(curve_points.pixels + np.array(camera.principal_point))
     noise = problem.noise(parameters, seen, np.nan_to_num(places), pitch)
     error = float(np.median(np.abs(seen.offsets)))
     if (
         noise is None
         or error > problem.unit * WORST_PX
-        or problem.surprise(parameters) > MOST_SURPRISING
+        or problem.mahalanobis_squared(parameters) > MOST_SURPRISING
     ):
         return None
     return PaintCamera(parameters, noise.parameters, noise.pitch, error)
@@ -203,18 +203,18 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
 def offsets_of(
     problem: PaintProblem,
     parameters: FloatArray,
-    sightings: Sightings,
+    curve_points: CurvePoints,
     sigmas: FloatArray,
     pitch: Pitch,
 ) -> PaintOffsets:
     """Stored paint as a camera sees it; what lies beyond the end of its marking, across it."""
     half = problem.resection.size.diagonal / 2
-    offsets, jacobians = residuals(parameters, pitch_curves(pitch), sightings, half)
-    radii = np.hypot(*sightings.pixels.T) / half
-    return PaintOffsets(offsets[:, 0], sigmas, sightings.curve, -jacobians[:, 0], radii)
+    offsets, jacobians = residuals(parameters, pitch_curves(pitch), curve_points, half)
+    radii = np.hypot(*curve_points.pixels.T) / half
+    return PaintOffsets(offsets[:, 0], sigmas, curve_points.curve, -jacobians[:, 0], radii)
 
 
-def _sightings(evidence: PaintEvidence, size: ImageSize) -> tuple[Sightings, FloatArray]:
+def _curve_points(evidence: PaintEvidence, size: ImageSize) -> tuple[CurvePoints, FloatArray]:
     """Places of paint by marking, pixels from the principal point, and their sigmas."""
     rows = [
         (index, *point)
@@ -223,7 +223,7 @@ def _sightings(evidence: PaintEvidence, size: ImageSize) -> tuple[Sightings, Flo
     ]
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
     pixels = np.ascontiguousarray(table[:, 1:3] - np.array(principal_point(size)))
-    return Sightings(pixels, table[:, 0].astype(np.int64), np.ones(len(table))), table[:, 3]
+    return CurvePoints(pixels, table[:, 0].astype(np.int64), np.ones(len(table))), table[:, 3]
 
 
 def _inverse(covariance: FloatArray) -> FloatArray:

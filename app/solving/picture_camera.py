@@ -155,8 +155,8 @@ class PictureProblem:
         apart, _ = self.rows(unknowns)
         scale = self._scale
         robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
-        spare = max(len(apart) - WIDTH + 2, 1)
-        return max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.problem.unit) ** 2)
+        freedom = max(len(apart) - WIDTH + 2, 1)
+        return max(float(robust.sum()) / freedom, (MIN_CLICK_SIGMA_PX * self.problem.unit) ** 2)
 
     @_ABSURD_IS_INFINITE
     def covariance(self, unknowns: FloatArray) -> FloatArray:
@@ -217,7 +217,7 @@ class PictureProblem:
         """Distances of moved points across their markings, and derivatives by the camera."""
         points = Observations(seen.curves, seen.pixels + moved, seen.marking)
         offsets, jacobians = residuals(
-            camera, points.curves, points.sightings(), self.problem.size.diagonal / 2
+            camera, points.curves, points.curve_points(), self.problem.size.diagonal / 2
         )
         return offsets[:, 0], jacobians[:, 0] if with_slopes else jacobians[:0, 0]
 

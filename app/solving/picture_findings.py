@@ -77,8 +77,8 @@ def _find(
     warp = np.zeros(3)
     floor = (MIN_CLICK_SIGMA_PX * problem.unit) ** 2
     first = _linear(problem, parameters, observations, warp)
-    spare = first.points - _WIDTH
-    if spare < 1:
+    freedom = first.points - _WIDTH
+    if freedom < 1:
         return None
     camera_prior = np.zeros(_WIDTH)
     camera_prior[KAPPA] = problem.distortion_sigma**-2
@@ -86,7 +86,7 @@ def _find(
     offset[KAPPA] = parameters[KAPPA] - problem.distortion_mean
     narrow = first.step(camera_prior, offset, PARAMETERS)
     before = first.squares - float(first.pull[:PARAMETERS] @ narrow)
-    variance = max(before / (spare + 3), floor)
+    variance = max(before / (freedom + 3), floor)
     linear = first
     for count in range(ROUNDS):
         prior = camera_prior.copy()
@@ -95,8 +95,8 @@ def _find(
         offset[KAPPA] = parameters[KAPPA] - problem.distortion_mean
         step = linear.step(prior, offset, _WIDTH)
         if count == 0:
-            left = max(first.squares - float(first.pull @ step), floor * spare)
-            if (before - left) / left * spare / 3 < SUSPICIOUS:
+            left = max(first.squares - float(first.pull @ step), floor * freedom)
+            if (before - left) / left * freedom / 3 < SUSPICIOUS:
                 return None
         warp = np.clip(warp - step[PARAMETERS:], -BOUND, BOUND)
         moved = parameters - step[:PARAMETERS]
@@ -104,9 +104,9 @@ def _find(
             return None
         parameters = problem.refine(undo_warp(problem, observations, warp), moved[None]).parameters
         linear = _linear(problem, parameters, observations, warp)
-        variance = max(linear.squares / (spare + 1), floor)
-    left = max(linear.squares, floor * spare)
-    ratio = (before - left) / left * spare / 3
+        variance = max(linear.squares / (freedom + 1), floor)
+    left = max(linear.squares, floor * freedom)
+    ratio = (before - left) / left * freedom / 3
     prior[PARAMETERS:] = variance / PRIOR**2
     sigma = np.sqrt(variance * np.diag(_inverse(linear.normal + np.diag(prior)))[PARAMETERS:])
     if ratio < BELIEVED or not _is_large(warp, sigma).any():
@@ -130,7 +130,7 @@ def _linear(
 
     def at(place: FloatArray) -> tuple[FloatArray, FloatArray]:
         seen = undo_warp(problem, observations, place)
-        return residuals(parameters, seen.curves, seen.sightings(), problem.size.diagonal / 2)
+        return residuals(parameters, seen.curves, seen.curve_points(), problem.size.diagonal / 2)
 
     offsets, jacobians = at(warp)
     steps = _STEP * np.eye(3)

@@ -101,8 +101,8 @@ class PitchEstimate:
 
         A length or width that is unknown, or agrees within its uncertainty, stays as it is.
         """
-        length = _other(pitch.length, self.length, self.length_sigma_m)
-        width = _other(pitch.width, self.width, self.width_sigma_m)
+        length = _certainly_other(pitch.length, self.length, self.length_sigma_m)
+        width = _certainly_other(pitch.width, self.width, self.width_sigma_m)
         if length is None and width is None:
             return None
         return Pitch(length or pitch.length, width or pitch.width)
@@ -128,7 +128,7 @@ def estimate_pitch(
             are of one match show pitches of several sizes.
     """
     pitch = policy.fitted(Pitch())
-    seen = [_Seen.of(frames[index], pitch, policy) for index in choose_frames(frames)]
+    seen = [_FittedFrame.of(frames[index], pitch, policy) for index in choose_frames(frames)]
     if len(seen) < least:
         raise DegenerateGeometryError(
             f"{len(seen)} frames show enough markings, the size of a pitch needs {least}"
@@ -146,7 +146,7 @@ def estimate_pitch(
             f"{len(seen)} frames show pitches of several sizes; import them with their matches"
         )
     sigma = _sigmas(shares)
-    heard = (_voices(shares) >= MIN_VOICES) | _is_confirmed(shares)
+    heard = (_effective_frames(shares) >= MIN_VOICES) | _is_confirmed(shares)
     known = (sigma <= UNKNOWN_SIGMA_M) & heard & _is_inside(pitch)
     return PitchEstimate(
         length=pitch.length if known[0] else None,
@@ -164,28 +164,28 @@ def choose_frames(frames: Sequence[PitchFrame]) -> list[int]:
     the width when it shows a touchline and something whose width is fixed.
     """
     order = by_measurements(observe(frame.lines, Pitch(), frame.size) for frame in frames)
-    length = [index for index in order if _tells_length(frames[index].lines)]
-    width = [index for index in order if _tells_width(frames[index].lines)]
+    length = [index for index in order if _determines_length(frames[index].lines)]
+    width = [index for index in order if _determines_width(frames[index].lines)]
     half = MAX_FRAMES // 2
     best = [*length[:half], *width[:half]]
     chosen = dict.fromkeys([*best, *length, *width, *order])
     return sorted(list(chosen)[:MAX_FRAMES])
 
 
-def _tells_length(lines: Lines) -> bool:
+def _determines_length(lines: Lines) -> bool:
     middle = any(name in lines for name in ("Middle line", "Circle central"))
     left, right = (any(side in name.split(" ") for name in lines) for side in ("left", "right"))
     return (middle and (left or right)) or (left and right)
 
 
-def _tells_width(lines: Lines) -> bool:
+def _determines_width(lines: Lines) -> bool:
     top, bottom = ("Side line top" in lines), ("Side line bottom" in lines)
     inner = any(name.startswith(("Big", "Small", "Circle", "Goal")) for name in lines)
     return (top and bottom) or ((top or bottom) and inner)
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _FittedFrame:
     """A frame with its best camera so far."""
 
     problem: ResectionProblem
@@ -193,12 +193,12 @@ class _Seen:
     fit: Resection
 
     @staticmethod
-    def of(frame: PitchFrame, pitch: Pitch, policy: CalibrationPolicy) -> _Seen:
+    def of(frame: PitchFrame, pitch: Pitch, policy: CalibrationPolicy) -> _FittedFrame:
         problem = ResectionProblem.of(frame.size, policy)
         observations = observe(frame.lines, pitch, frame.size)
-        return _Seen(problem, observations, problem.resect(observations))
+        return _FittedFrame(problem, observations, problem.resect(observations))
 
-    def on(self, pitch: Pitch) -> _Seen:
+    def on(self, pitch: Pitch) -> _FittedFrame:
         """The frame on another pitch, its camera refined."""
         moved = replace(self.observations, curves=pitch_curves(pitch))
         return replace(
@@ -219,7 +219,7 @@ class _Seen:
         offsets, by_camera = residuals(
             self.fit.parameters,
             self.observations.curves,
-            self.observations.sightings(),
+            self.observations.curve_points(),
             self.problem.size.diagonal / 2,
         )
         # A marking that moves is a camera that moves the other way.
@@ -264,14 +264,16 @@ def size_moves(
     return moves
 
 
-def _adjust(pitch: Pitch, seen: Sequence[_Seen]) -> tuple[Pitch, list[_Seen], list[Share]]:
+def _adjust(
+    pitch: Pitch, seen: Sequence[_FittedFrame]
+) -> tuple[Pitch, list[_FittedFrame], list[Share]]:
     """Sizes and cameras adjusted together until the sizes settle."""
     for _ in range(_ROUNDS):
         seen = [item.on(pitch) for item in seen]
         shares = [item.share() for item in seen]
         gradient, information = (sum(part) for part in zip(*shares, strict=True))
         step = -np.linalg.solve(information + np.eye(2) / _LOOSE_M**2, gradient)
-        pitch = _moved(pitch, np.clip(step, -_LONGEST_STEP_M, _LONGEST_STEP_M))
+        pitch = _resized_pitch(pitch, np.clip(step, -_LONGEST_STEP_M, _LONGEST_STEP_M))
         if np.abs(step).max() < _SETTLED_M:
             break
     return pitch, list(seen), shares
@@ -290,17 +292,19 @@ def _disagree(shares: Sequence[Share]) -> bool:
     A frame's gradient is zero but for chance, with its information as variance.
     """
     pulls = np.array([gradient for gradient, _ in shares])
-    told = np.array([np.diag(information) for _, information in shares])
-    speaks = told > SPEAKS
-    squares = np.where(speaks, pulls**2 / np.maximum(told, SPEAKS), 0.0).sum(axis=0)
+    informations = np.array([np.diag(information) for _, information in shares])
+    speaks = informations > SPEAKS
+    squares = np.where(speaks, pulls**2 / np.maximum(informations, SPEAKS), 0.0).sum(axis=0)
     freedom = np.maximum(speaks.sum(axis=0) - 1, 1)
     return bool((chdtrc(freedom, squares) < SEVERAL_P_VALUE).any())
 
 
-def _voices(shares: Sequence[Share]) -> FloatArray:
+def _effective_frames(shares: Sequence[Share]) -> FloatArray:
     """How many frames speak of length and of width, as if all of them said as much, shape (2,)."""
-    told = np.array([np.diag(information) for _, information in shares])
-    voices: FloatArray = told.sum(axis=0) ** 2 / np.maximum((told**2).sum(axis=0), 1e-30)
+    informations = np.array([np.diag(information) for _, information in shares])
+    voices: FloatArray = informations.sum(axis=0) ** 2 / np.maximum(
+        (informations**2).sum(axis=0), 1e-30
+    )
     return voices
 
 
@@ -311,11 +315,11 @@ def _is_confirmed(shares: Sequence[Share]) -> npt.NDArray[np.bool_]:
     takes it to the size that the frame alone says.
     """
     pulls = np.array([gradient for gradient, _ in shares])
-    told = np.maximum([np.diag(information) for _, information in shares], 1e-30)
-    loudest = told.argmax(axis=0), range(2)
-    others = np.maximum(told.sum(axis=0) - told[loudest], 1e-30)
-    apart = pulls[loudest] / told[loudest] - (pulls.sum(axis=0) - pulls[loudest]) / others
-    chance = 1 / told[loudest] + 1 / others
+    informations = np.maximum([np.diag(information) for _, information in shares], 1e-30)
+    loudest = informations.argmax(axis=0), range(2)
+    others = np.maximum(informations.sum(axis=0) - informations[loudest], 1e-30)
+    apart = pulls[loudest] / informations[loudest] - (pulls.sum(axis=0) - pulls[loudest]) / others
+    chance = 1 / informations[loudest] + 1 / others
     known: npt.NDArray[np.bool_] = others >= UNKNOWN_SIGMA_M**-2
     alike: npt.NDArray[np.bool_] = apart**2 <= AGREES**2 * chance
     return known & alike
@@ -329,7 +333,7 @@ def _is_inside(pitch: Pitch) -> npt.NDArray[np.bool_]:
     return inside
 
 
-def _moved(pitch: Pitch, by: FloatArray) -> Pitch:
+def _resized_pitch(pitch: Pitch, by: FloatArray) -> Pitch:
     """The pitch with another length and width, within the Laws of the Game."""
     ends = np.array([LENGTH_RANGE, WIDTH_RANGE])
     low, high = ends[:, 0] + _END_M / 2, ends[:, 1] - _END_M / 2
@@ -337,7 +341,7 @@ def _moved(pitch: Pitch, by: FloatArray) -> Pitch:
     return replace(pitch, length=length, width=width)
 
 
-def _other(now: float, found: float | None, sigma: float | None) -> float | None:
+def _certainly_other(now: float, found: float | None, sigma: float | None) -> float | None:
     """What was found, to a tenth of a metre, where it certainly is another size."""
     if found is None or sigma is None:
         return None

@@ -260,7 +260,7 @@ class ResectionProblem:
     def distances(self, parameters: FloatArray, observations: Observations) -> FloatArray:
         """Distance of each observed point to its marking, pixels, shape (N,)."""
         return distances(
-            parameters, observations.curves, observations.sightings(), self.size.diagonal / 2
+            parameters, observations.curves, observations.curve_points(), self.size.diagonal / 2
         )
 
     def line_noise(self, parameters: FloatArray, observations: Observations) -> LineNoise:
@@ -295,7 +295,7 @@ class ResectionProblem:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
         offsets, jacobians = residuals(
-            parameters, observations.curves, observations.sightings(), self.size.diagonal / 2
+            parameters, observations.curves, observations.curve_points(), self.size.diagonal / 2
         )
         # At a wider scale honest clicks weigh one, as the formula for the covariance has it.
         scale = WIDE * self.robust_scale_px * self.unit
@@ -315,9 +315,9 @@ class ResectionProblem:
         """Variance of the clicks' distances, from the robust fit, pixels squared."""
         scale = self.robust_scale_px * self.unit
         apart = self.distances(parameters, observations)
-        spare = max(len(apart) - PARAMETERS + 1, 1)
+        freedom = max(len(apart) - PARAMETERS + 1, 1)
         robust = 2 * scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
-        return max(float(robust.sum()) / spare, (MIN_CLICK_SIGMA_PX * self.unit) ** 2)
+        return max(float(robust.sum()) / freedom, (MIN_CLICK_SIGMA_PX * self.unit) ** 2)
 
     def camera(self, parameters: FloatArray) -> Camera:
         """Camera of one row of parameters, shape (8,), in pixels of this picture and the pitch frame."""
@@ -340,7 +340,7 @@ class ResectionProblem:
         return fit_curves(
             starts,
             observations.curves,
-            observations.sightings(),
+            observations.curve_points(),
             prior or self.prior(),
             (stage.scale_px or self.robust_scale_px) * self.unit,
             self.size.diagonal / 2,

@@ -201,7 +201,7 @@ def adjust(rig: Rig) -> RigFit:
 def line_distances(camera: RigCamera, parameters: FloatArray, pitch: Pitch) -> FloatArray:
     """Distance of each annotated point to its projected marking, pixels, shape (N,)."""
     observed = _observed(camera, pitch)
-    return distances(parameters, observed.curves, observed.sightings(), camera.half_diagonal)
+    return distances(parameters, observed.curves, observed.curve_points(), camera.half_diagonal)
 
 
 def grass_in_view(camera: RigCamera) -> FloatArray:
@@ -246,7 +246,7 @@ class _Problem:
         cost, gradient, information = normal_equations(
             parameters[None],
             observed.curves,
-            observed.sightings(),
+            observed.curve_points(),
             _NO_PRIOR,
             self.scale * sigma,
             camera.half_diagonal,
@@ -366,7 +366,7 @@ def _line_sigma(
 ) -> float:
     """Noise of the line points, robustly, pixels at 1920 x 1080; 0 without lines."""
     apart = [
-        distances(row, seen.curves, seen.sightings(), camera.half_diagonal) / camera.unit
+        distances(row, seen.curves, seen.curve_points(), camera.half_diagonal) / camera.unit
         for row, camera, seen in zip(parameters, cameras, observed, strict=True)
     ]
     every = np.concatenate(apart)

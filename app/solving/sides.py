@@ -19,7 +19,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_covariance import pixel_covariance
 from app.solving.plausible import is_plausible
-from app.solving.triangulate import Meeting, Sighting, meet
+from app.solving.triangulate import BallObservation, PairPoint, meet
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 LOOSE, SIZE_SIGMA = 0.15, 0.35
@@ -61,11 +61,11 @@ def turned_camera(camera: Camera) -> Camera:
 
 
 def find_swaps(
-    first: Sighting | None,
-    usable: Sequence[Sighting],
+    first: BallObservation | None,
+    usable: Sequence[BallObservation],
     pitch: Pitch,
     policy: Policy,
-    doubtful: Sequence[Sighting] = (),
+    doubtful: Sequence[BallObservation] = (),
 ) -> tuple[Swap, ...]:
     """Views whose ball meets that of the others only after a half turn.
 
@@ -94,75 +94,87 @@ def find_swaps(
     return tuple(swap for swap in swaps if swap is not None)
 
 
-def _from_lines(sight: Sighting) -> bool:
-    return sight.calibration.source != "given"
+def _from_lines(observation: BallObservation) -> bool:
+    return observation.calibration.source != "given"
 
 
-def _others(sight: Sighting, sights: Sequence[Sighting]) -> list[Sighting]:
-    return [other for other in sights if other is not sight]
+def _others(
+    observation: BallObservation, observations: Sequence[BallObservation]
+) -> list[BallObservation]:
+    return [other for other in observations if other is not observation]
 
 
 def _swap(
-    sight: Sighting,
-    others: Sequence[Sighting],
-    first: Sighting | None,
+    observation: BallObservation,
+    others: Sequence[BallObservation],
+    first: BallObservation | None,
     pitch: Pitch,
     policy: Policy,
 ) -> Swap | None:
-    turned = _meetings(_turn(sight), others, policy)
+    turned = _pair_points(_turned_observation(observation), others, policy)
     after = _best_error(turned, pitch, policy)
     # So it is with nearly every view that is labelled as it should be: nothing more is asked.
     if after >= 1:
         return None
-    labelled = _meetings(sight, others, policy)
-    costs = _costs(sight, turned, True, pitch, policy)
-    better = _weighed(_costs(sight, labelled, False, pitch, policy), labelled, first)
-    better -= _weighed(costs, turned, first)
+    labelled = _pair_points(observation, others, policy)
+    costs = _costs(observation, turned, True, pitch, policy)
+    better = _weighted_cost(_costs(observation, labelled, False, pitch, policy), labelled, first)
+    better -= _weighted_cost(costs, turned, first)
     if min(costs) > MAX_COST or better < CLEARLY:
         return None
-    before, tau = _best_error(labelled, pitch, policy), sight.tau_px(policy)
+    before, tau = _best_error(labelled, pitch, policy), observation.tau_px(policy)
     return Swap(
-        sight.view,
+        observation.view,
         None if np.isinf(before) else before * tau,
         after * tau,
         confidence=min(SURE, 1.0 / (1.0 + float(np.exp(-better / 2)))),
     )
 
 
-def _turn(sight: Sighting) -> Sighting:
-    calibration = replace(sight.calibration, camera=turned_camera(sight.camera), covariance=None)
-    return replace(sight, calibration=calibration)
+def _turned_observation(observation: BallObservation) -> BallObservation:
+    calibration = replace(
+        observation.calibration, camera=turned_camera(observation.camera), covariance=None
+    )
+    return replace(observation, calibration=calibration)
 
 
-def _meetings(sight: Sighting, others: Sequence[Sighting], policy: Policy) -> list[Meeting]:
-    """Where the sight meets the others, except from beside it."""
+def _pair_points(
+    observation: BallObservation, others: Sequence[BallObservation], policy: Policy
+) -> list[PairPoint]:
+    """Where the observation meets the others, except from beside it."""
     return [
         item
-        for item in meet((sight, other) for other in others)
+        for item in meet((observation, other) for other in others)
         if item.baseline_m >= policy.min_baseline_m
     ]
 
 
-def _best_error(meetings: Sequence[Meeting], pitch: Pitch, policy: Policy) -> float:
+def _best_error(pair_points: Sequence[PairPoint], pitch: Pitch, policy: Policy) -> float:
     """Larger error of the best pair, in units of tau; infinite where none says anything."""
     errors = [
         max(item.errors_px[0] / item.a.tau_px(policy), item.errors_px[1] / item.b.tau_px(policy))
-        for item in meetings
+        for item in pair_points
         if _says_something(item, pitch, policy)
     ]
     return min(errors, default=np.inf)
 
 
-def _weighed(costs: Sequence[float], meetings: Sequence[Meeting], first: Sighting | None) -> float:
+def _weighted_cost(
+    costs: Sequence[float], pair_points: Sequence[PairPoint], first: BallObservation | None
+) -> float:
     """Sum of costs; the main camera counts more than a replay, which may be turned itself."""
     return sum(
         cost * (MAIN_WEIGHT if item.b is first else 1.0)
-        for cost, item in zip(costs, meetings, strict=True)
+        for cost, item in zip(costs, pair_points, strict=True)
     )
 
 
 def _costs(
-    sight: Sighting, meetings: Sequence[Meeting], turned: bool, pitch: Pitch, policy: Policy
+    observation: BallObservation,
+    pair_points: Sequence[PairPoint],
+    turned: bool,
+    pitch: Pitch,
+    policy: Policy,
 ) -> list[float]:
     """How badly a view fits each of the others: minus twice the logarithm of the likelihood, robustly.
 
@@ -170,32 +182,32 @@ def _costs(
     ball can be, and seldom as far away as both boxes say.
 
     Args:
-        sight: As labelled.
-        meetings: Of the sight, or of the turned one, with others.
-        turned: Whether the meetings are those of the turned sight.
+        observation: As labelled.
+        pair_points: Of the observation, or of the turned one, with others.
+        turned: Whether the points are those of the turned observation.
         pitch: Tells which meeting points are plausible.
         policy: How noisy a click is.
     """
     costs = []
-    for item in meetings:
+    for item in pair_points:
         cost = WORST
         if _says_something(item, pitch, policy):
             back = _HALF_TURN @ item.point if turned else item.point
-            cost = _misfit(sight, back, policy) + _misfit(item.b, item.point, policy)
+            cost = _misfit(observation, back, policy) + _misfit(item.b, item.point, policy)
         costs.append(min(cost, WORST))
     return costs
 
 
-def _misfit(sight: Sighting, point: FloatArray, policy: Policy) -> float:
+def _misfit(observation: BallObservation, point: FloatArray, policy: Policy) -> float:
     """Squared residuals of a ball's place and size in a view, each in units of its sigma."""
-    offset = np.array(sight.center) - sight.camera.project(point[None])[0]
+    offset = np.array(observation.center) - observation.camera.project(point[None])[0]
     if np.isnan(offset).any():
         return WORST
-    place = float(offset @ np.linalg.solve(pixel_covariance(sight, point, policy), offset))
-    if not sight.diameter_px:
+    place = float(offset @ np.linalg.solve(pixel_covariance(observation, point, policy), offset))
+    if not observation.diameter_px:
         return place
-    expected = _expected_px(sight.camera, point, policy.ball_diameter_m)
-    size = (np.log(sight.diameter_px / expected) - LOOSE) / SIZE_SIGMA
+    expected = _expected_px(observation.camera, point, policy.ball_diameter_m)
+    size = (np.log(observation.diameter_px / expected) - LOOSE) / SIZE_SIGMA
     return place + min(float(size) ** 2, WORST / 4)
 
 
@@ -209,11 +221,14 @@ def _expected_px(camera: Camera, point: FloatArray, diameter_m: float) -> float:
     return diameter_m * camera.focal_length[1] / depth
 
 
-def _says_something(item: Meeting, pitch: Pitch, policy: Policy) -> bool:
+def _says_something(item: PairPoint, pitch: Pitch, policy: Policy) -> bool:
     """Two rays can meet by accident, far from any pitch: such a pair says nothing."""
     return not _is_behind(item) and is_plausible(item.place, pitch, policy)
 
 
-def _is_behind(meeting: Meeting) -> bool:
-    place = meeting.point[None]
-    return any(sight.camera.pitch_to_camera(place)[0, 2] <= 0 for sight in (meeting.a, meeting.b))
+def _is_behind(pair_point: PairPoint) -> bool:
+    place = pair_point.point[None]
+    return any(
+        observation.camera.pitch_to_camera(place)[0, 2] <= 0
+        for observation in (pair_point.a, pair_point.b)
+    )

@@ -33,7 +33,7 @@ from app.solving.findings import find
 from app.solving.gates import JudgedView, describe
 from app.solving.judgement import PASSES, Judgement, judge
 from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
-from app.solving.triangulate import meet, sights_of
+from app.solving.triangulate import ball_observations, meet
 
 NO_CALIBRATIONS: Mapping[str, Calibration] = MappingProxyType({})
 LEFT_OUT = "excluded"
@@ -61,26 +61,26 @@ def solve_with_facts(
     known = dict(calibrations)
     keys = [_calibrated(view, group, policy, known) for view in group.views]
     found = [known[key] for key in keys]
-    sights = sights_of(group.views, found)
-    meetings = meet(combinations(sights, 2))
-    facts = facts_of(group.views, found, meetings)
+    observations = ball_observations(group.views, found)
+    pair_points = meet(combinations(observations, 2))
+    facts = facts_of(group.views, found, pair_points)
     uncertainty = MeanCovariance(facts)
     judgement = judge(facts, policy, uncertainty)
-    pairs = judged_pairs(meetings, judgement)
+    pairs = judged_pairs(pair_points, judgement)
     names = [view.key for view in group.views]
     failed = _failed(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
-    usable = [sight for sight in sights if sight.view in left]
+    usable = [observation for observation in observations if observation.view in left]
     chi_square = chi_square_of(names, facts, judgement, policy)
     mean = mean_ball(names, facts, judgement, uncertainty, policy, chi_square)
     best = best_ball(pairs, usable, policy)
     ball = leaving_ball(mean, best, policy)
-    contradicted = contradiction(chi_square, names, facts, judgement, sights, policy)
+    contradicted = contradiction(chi_square, names, facts, judgement, observations, policy)
     views = tuple(
         _with_ball(view, ViewSolution(view.key, known[key], key, False, gate), ball, policy)
         for view, key, gate in zip(group.views, keys, failed, strict=True)
     )
-    judged, left_out = _judged(group, views, judgement, policy), _left_out(group)
+    judged, left_out = _judged_views(group, views, judgement, policy), _left_out(group)
     solution = Solution(
         views=views,
         pairs=pairs,
@@ -89,7 +89,7 @@ def solve_with_facts(
         mean_ball=None if ball is mean else mean,
         chi_square=chi_square,
         gates=describe(judged, left_out, pairs, mean, judgement, policy, chi_square),
-        findings=find(group, views, sights, pairs, ball, policy, contradicted),
+        findings=find(group, views, observations, pairs, ball, policy, contradicted),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
     )
@@ -143,7 +143,7 @@ def _no_ball(view: View) -> str:
     return "placed in {} (not counted)" if seen and seen[0].inferred else "none in {}"
 
 
-def _judged(
+def _judged_views(
     group: Group, views: Sequence[ViewSolution], judgement: Judgement, policy: Policy
 ) -> tuple[JudgedView, ...]:
     return tuple(

@@ -110,7 +110,7 @@ NOBODY = SourceFactors(1.0, (), np.zeros(0), np.zeros((0, 0)), np.zeros(0))
 
 
 @dataclass(frozen=True)
-class _Parts:
+class _SourceShares:
     """What views add to the variance of misses.
 
     Attributes:
@@ -169,7 +169,9 @@ def estimate_sources(
         share: What the ball's diameter adds to it.
         given: What a given camera adds to it, pixels at 1920 x 1080.
     """
-    sources = _told_apart([of.get(view[0], ()) for miss, of in misses for view in miss.by_view])
+    sources = _distinct_sources(
+        [of.get(view[0], ()) for miss, of in misses for view in miss.by_view]
+    )
     if not sources:
         return NOBODY
     parts = _parts(misses, sources, np.array([click**2, share**2, given**2]))
@@ -184,7 +186,7 @@ def estimate_sources(
     )
 
 
-def _told_apart(seen: Sequence[Sequence[BallSource]]) -> list[BallSource]:
+def _distinct_sources(seen: Sequence[Sequence[BallSource]]) -> list[BallSource]:
     """The sources, without those that all views have: one alone is the dataset."""
     every = sorted({source for sources in seen for source in sources})
     return [one for one in every if not all(one in sources for sources in seen)]
@@ -194,7 +196,7 @@ def _parts(
     misses: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]],
     sources: Sequence[BallSource],
     squared: FloatArray,
-) -> _Parts:
+) -> _SourceShares:
     place = {source: at for at, source in enumerate(sources)}
     known = np.array([miss.known for miss, _ in misses])
     added, rows, which = [], [], []
@@ -209,10 +211,10 @@ def _parts(
                 known[row] += np.dot(columns, squared)
     squares = np.array([miss.miss**2 for miss, _ in misses])
     of_each = np.array(which, float).reshape(-1, len(sources))
-    return _Parts(squares, known, np.array(added), np.array(rows, np.int64), of_each)
+    return _SourceShares(squares, known, np.array(added), np.array(rows, np.int64), of_each)
 
 
-def _fitted(parts: _Parts) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _fitted(parts: _SourceShares) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Logarithms of the factors, their covariance, and how much speaks of each."""
     logs = np.zeros(parts.of.shape[1])
     for _ in range(_ROUNDS):

@@ -19,7 +19,7 @@ from app.solving.camera_numbers import CameraNumbers
 
 
 @dataclass(frozen=True)
-class Sighting:
+class BallObservation:
     """The ball in one calibrated view.
 
     Attributes:
@@ -81,11 +81,11 @@ class Sighting:
 
 
 @dataclass(frozen=True)
-class Meeting:
-    """Where the rays of two sights meet, whatever the gates say of it.
+class PairPoint:
+    """Where the rays of two observations meet, whatever the gates say of it.
 
     Attributes:
-        a: The first sight; ``b`` the second.
+        a: The first observation; ``b`` the second.
         point: Pitch frame, metres, shape (3,).
         errors_px: Reprojection error in both.
         in_front: The point lies in front of both cameras.
@@ -93,8 +93,8 @@ class Meeting:
         parallax_degrees: Between the rays.
     """
 
-    a: Sighting
-    b: Sighting
+    a: BallObservation
+    b: BallObservation
     point: FloatArray
     errors_px: tuple[float, float]
     in_front: bool
@@ -108,18 +108,20 @@ class Meeting:
         return x, y, z
 
 
-def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> list[Sighting]:
+def ball_observations(
+    views: Sequence[View], calibrations: Sequence[Calibration]
+) -> list[BallObservation]:
     """The views that take part: included, calibrated, and with one ball.
 
-    A ball that was put where the others see it is no sight: it would confirm itself. Nor is one
+    A ball that was put where the others see it is no observation: it would confirm itself. Nor is one
     beyond the radius where the lens folds the picture.
 
     Args:
         views: Of a group.
         calibrations: Of each view.
     """
-    sights = [
-        Sighting(
+    observations = [
+        BallObservation(
             view.key,
             calibration,
             center,
@@ -132,10 +134,12 @@ def sights_of(views: Sequence[View], calibrations: Sequence[Calibration]) -> lis
         if (ball := view.ball) is not None and not ball.inferred
         if (center := ball.center) is not None
     ]
-    return [sight for sight in sights if np.isfinite(sight.ideal_center).all()]
+    return [
+        observation for observation in observations if np.isfinite(observation.ideal_center).all()
+    ]
 
 
-def meet(couples: Iterable[tuple[Sighting, Sighting]]) -> list[Meeting]:
+def meet(couples: Iterable[tuple[BallObservation, BallObservation]]) -> list[PairPoint]:
     """Where the rays of each couple meet; one camera twice, and parallel rays, meet nowhere.
 
     Source: SoccerNet-v3D (arXiv 2504.10106), triangulation of ball annotations.
@@ -143,50 +147,51 @@ def meet(couples: Iterable[tuple[Sighting, Sighting]]) -> list[Meeting]:
     couples = [(a, b) for a, b in couples if not np.array_equal(a.P, b.P)]
     if not couples:
         return []
-    points = triangulate_pairs(*lines_of_sight([a for a, _ in couples], [b for _, b in couples]))
+    points = triangulate_pairs(*observation_pairs([a for a, _ in couples], [b for _, b in couples]))
     return [
-        _meeting(a, b, point)
+        _pair_point(a, b, point)
         for (a, b), point in zip(couples, points, strict=True)
         if np.isfinite(point).all()
     ]
 
 
-def lines_of_sight(
-    a: Sequence[Sighting], b: Sequence[Sighting]
+def observation_pairs(
+    a: Sequence[BallObservation], b: Sequence[BallObservation]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Couples of sights as ``triangulate_pairs`` takes them."""
+    """Couples of observations as ``triangulate_pairs`` takes them."""
     return (
-        np.array([sight.P for sight in a]),
-        np.array([sight.P for sight in b]),
-        np.array([sight.ideal_center for sight in a]),
-        np.array([sight.ideal_center for sight in b]),
+        np.array([observation.P for observation in a]),
+        np.array([observation.P for observation in b]),
+        np.array([observation.ideal_center for observation in a]),
+        np.array([observation.ideal_center for observation in b]),
     )
 
 
-def _meeting(a: Sighting, b: Sighting, point: FloatArray) -> Meeting:
+def _pair_point(a: BallObservation, b: BallObservation, point: FloatArray) -> PairPoint:
     positions = a.camera.position, b.camera.position
     angle = parallax_angle(positions[0][None], positions[1][None], point[None])[0]
-    return Meeting(
+    return PairPoint(
         a=a,
         b=b,
         point=point,
         errors_px=(_reprojection_error(a, point), _reprojection_error(b, point)),
         in_front=all(
-            sight.camera.pitch_to_camera(point[None])[0, 2] > MIN_DEPTH for sight in (a, b)
+            observation.camera.pitch_to_camera(point[None])[0, 2] > MIN_DEPTH
+            for observation in (a, b)
         ),
         baseline_m=float(np.linalg.norm(positions[0] - positions[1])),
         parallax_degrees=float(np.degrees(angle)),
     )
 
 
-def _reprojection_error(sight: Sighting, point: FloatArray) -> float:
+def _reprojection_error(observation: BallObservation, point: FloatArray) -> float:
     """Distance of the annotated centre from the image of a point, pixels.
 
     A point behind the camera has no image; it is measured by the pinhole's formula, so that
     the number stays finite, and is refused by its depth.
     """
-    pixel = sight.camera.project(point[None])[0]
+    pixel = observation.camera.project(point[None])[0]
     if np.isnan(pixel[0]):
-        homogeneous = sight.P @ np.append(point, 1.0)
+        homogeneous = observation.P @ np.append(point, 1.0)
         pixel = homogeneous[:2] / homogeneous[2]
-    return float(np.hypot(*(pixel - sight.center)))
+    return float(np.hypot(*(pixel - observation.center)))

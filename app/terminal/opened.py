@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.terminal.options import read_settings
 from app.terminal.server import require_home
 from app.terminal.terminal import show_progress
@@ -31,7 +31,7 @@ def opened_store(settings: Settings | None = None) -> Iterator[Store]:
 @contextmanager
 def opened_to_solve(
     what: str, workers: int | None, cluster: str | None = None
-) -> Iterator[tuple[Store, Executor | None, TellProgress]]:
+) -> Iterator[tuple[Store, Executor | None, ReportProgress]]:
     """The database, where its datasets are solved, and a bar that says what is done."""
     from app.workers.executors import executor_of
 

@@ -61,13 +61,13 @@ def acting() -> str:
     return _ACTING.get()
 
 
-def act_as(said: str | None) -> None:
+def act_as(name: str | None) -> None:
     """Let this command act under the name of a script; None: as the local user.
 
     Raises:
         InputError: It cannot be a name.
     """
-    _ACTING.set(LOCAL_USER if said is None else script_name(said))
+    _ACTING.set(LOCAL_USER if name is None else script_name(name))
 
 
 _ACTING = ContextVar("acting", default=LOCAL_USER)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from app.progress import TellProgress
-from app.terminal.terminal import INTERRUPTED, complain
+from app.progress import ReportProgress
+from app.terminal.terminal import INTERRUPTED, print_error
 
 if TYPE_CHECKING:
     from app.soccer.policy import Policy
@@ -81,7 +81,7 @@ def finding_values(client: Client, dataset: str) -> Iterator[dict[str, Any]]:
 
 
 def solve_values(
-    client: Client, dataset: str, policy: Policy | None, progress: TellProgress
+    client: Client, dataset: str, policy: Policy | None, progress: ReportProgress
 ) -> tuple[dict[str, Any], str]:
     """Let the server solve a dataset, by another policy from now on where one is given.
 
@@ -148,7 +148,7 @@ def freeze_values(
     client: Client,
     dataset: str,
     request: Mapping[str, Any],
-    progress: TellProgress,
+    progress: ReportProgress,
     *,
     dry_run: bool,
 ) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def _batch(item: Mapping[str, Any]) -> dict[str, Any]:
     return some({**item, **own}, *BATCH)
 
 
-def follow(client: Client, job: Mapping[str, Any], progress: TellProgress) -> dict[str, Any]:
+def follow(client: Client, job: Mapping[str, Any], progress: ReportProgress) -> dict[str, Any]:
     """Wait for a job of the server and show how far it is; Ctrl+C leaves it running.
 
     Raises:
@@ -220,7 +220,7 @@ def follow(client: Client, job: Mapping[str, Any], progress: TellProgress) -> di
             job, progress=lambda seen: progress(seen["done"], seen["total"], seen["sentence"])
         )
     except KeyboardInterrupt:
-        complain(
+        print_error(
             f"not waited for: job {job['id']} goes on on the server",
             "The page Jobs shows how far it is, and cancels it.",
         )

@@ -14,7 +14,7 @@ from app.errors import InputError, NotFoundError
 from app.formats.output import zip_files
 from app.formats.safe_path import resolve_inside
 from app.object_store.address import is_address
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.terminal.remote import IMPORT, follow, part, some, time_text
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def import_values(
     frames: str | None,
     policy: str | None,
     dry_run: bool,
-    progress: TellProgress,
+    progress: ReportProgress,
 ) -> tuple[dict[str, Any], tuple[str, str | None] | None]:
     """Send files, and let the server read them; a text is an address in a store of the server.
 
@@ -86,7 +86,7 @@ def _report(result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def export_values(
-    client: Client, out: Path | str, request: Mapping[str, Any], progress: TellProgress
+    client: Client, out: Path | str, request: Mapping[str, Any], progress: ReportProgress
 ) -> dict[str, Any]:
     """Let the server write an export, and fetch it to ``out``: a folder, or a zip by its ending.
 
@@ -114,20 +114,20 @@ def _export_report(found: Mapping[str, Any]) -> dict[str, Any]:
 def evaluate(
     client: Client,
     dataset: str,
-    asked: SourcesRequest,
-    progress: TellProgress,
+    request: SourcesRequest,
+    progress: ReportProgress,
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Send predictions, and let the server measure them.
 
     Returns:
         The evaluation, and the sets that were made or found for it.
     """
-    named = {"predictions": asked.predictions, "careful": asked.careful}
+    named = {"predictions": request.predictions, "careful": request.careful}
     sets = {
         name: _set(client, dataset, source) for name, source in named.items() if not source.is_empty
     }
     found_sets = {name: found["id"] for name, found in sets.items()}
-    body = {**vars(asked.request), **found_sets, "version": asked.version}
+    body = {**vars(request.request), **found_sets, "version": request.version}
     place = f"datasets/{part(dataset)}/evaluations"
     job = follow(client, client.post(place, body), progress)
     found = client.get(f"evaluations/{job['result']['evaluation']}")

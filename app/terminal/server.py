@@ -98,7 +98,7 @@ def read_token(path: Path) -> str:
     Raises:
         InputError: It is no plain file, others can read it, or it holds none.
     """
-    from app.features.people.access_tokens import is_whole
+    from app.features.people.access_tokens import has_valid_checksum
 
     try:
         with open_plain(path) as file:
@@ -108,7 +108,7 @@ def read_token(path: Path) -> str:
         raise InputError(f"{path} cannot be read ({error.strerror})") from error
     if is_open_to_others(found):
         raise InputError(f"other users can read {path}", hint=f"chmod 600 {path}")
-    if not is_whole(text):
+    if not has_valid_checksum(text):
         raise InputError(
             f"{path} holds no whole token",
             hint="Copy it again, all of it: tl_ and 54 letters and digits.",

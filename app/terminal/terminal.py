@@ -14,7 +14,7 @@ from threading import Event
 from typing import Any, TypeVar
 
 from app.finite import finite, json_text
-from app.progress import TellProgress
+from app.progress import ReportProgress
 
 Row = TypeVar("Row")
 
@@ -31,7 +31,7 @@ LINE_SECONDS = 3.0
 """Where output is no terminal, a line of progress comes no more often."""
 
 
-def harmless(text: str) -> str:
+def escape_controls(text: str) -> str:
     """A text whose control characters are spelt out: a file's name must not steer a terminal.
 
     They are spelt as JSON spells them, so that a JSON document stays what it is. Line ends stay.
@@ -40,7 +40,7 @@ def harmless(text: str) -> str:
 
 
 @contextmanager
-def show_progress(what: str) -> Iterator[TellProgress]:
+def show_progress(what: str) -> Iterator[ReportProgress]:
     """A bar on stderr while something runs; without a terminal, a line every few seconds."""
     from rich import progress as rich
     from rich.console import Console
@@ -70,7 +70,7 @@ def show_progress(what: str) -> Iterator[TellProgress]:
         yield progress
 
 
-def _telling_lines(what: str) -> TellProgress:
+def _telling_lines(what: str) -> ReportProgress:
     """Progress in plain lines; what is done within seconds tells none."""
     last = time.monotonic()
 
@@ -81,7 +81,7 @@ def _telling_lines(what: str) -> TellProgress:
         last = time.monotonic()
         place = f"{done:,}" if total is None else f"{done:,} of {total:,}"
         stage = f"{sentence.rstrip('.')} ({place})" if sentence else place
-        complain(f"{what}: {stage}")
+        print_error(f"{what}: {stage}")
 
     return progress
 
@@ -105,7 +105,7 @@ def held_interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def spell_out() -> None:
+def allow_any_text() -> None:
     """Let no letter be too much for the terminal's encoding: it is spelt as JSON spells it."""
     codecs.register_error("spelt", _spelt)
     for stream in (sys.stdout, sys.stderr):
@@ -120,16 +120,16 @@ def _spelt(error: UnicodeError) -> tuple[str, int]:
     return json_text(text, ascii_=True)[1:-1], error.end
 
 
-def complain(message: str, hint: str | None = None) -> None:
+def print_error(message: str, hint: str | None = None) -> None:
     """One sentence on stderr, and what to do about it."""
-    print(harmless(message), file=sys.stderr)  # noqa: T201
+    print(escape_controls(message), file=sys.stderr)  # noqa: T201
     if hint:
-        print(harmless(hint), file=sys.stderr)  # noqa: T201
+        print(escape_controls(hint), file=sys.stderr)  # noqa: T201
 
 
 def say(line: str) -> None:
     """A line of the result, at once."""
-    print(harmless(line), flush=True)  # noqa: T201
+    print(escape_controls(line), flush=True)  # noqa: T201
 
 
 def print_json(value: Any) -> None:
@@ -181,9 +181,9 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
         return
     from app.formats.export_formats import lacking
 
-    lacks = lacking(values.get("format", ""), values["counts"])
-    if lacks is not None:
-        say(f"Not complete: {lacks}. --images copy puts them there.")
+    absent = lacking(values.get("format", ""), values["counts"])
+    if absent is not None:
+        say(f"Not complete: {absent}. --images copy puts them there.")
     missing = values["missing_images"]
     for line in missing[:MAX_MISSING]:
         say(f"  {line}")

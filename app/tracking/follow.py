@@ -30,7 +30,7 @@ from app.geometry.resection import (
 )
 from app.paint.agreement import PaintAgreement, agreement
 from app.paint.propose import propose, weakest_marking
-from app.paint.snap import Snapped, snap_reading
+from app.paint.snap import SnappedCamera, snap_reading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.motion import BackgroundMatches, rotate_camera
@@ -86,7 +86,7 @@ class TrackedFrame:
     time: float
     outcome: Outcome
     camera: Camera | None = None
-    snapped: Snapped | None = None
+    snapped: SnappedCamera | None = None
     seen: PaintAgreement | None = None
     is_key: bool = False
     age: int = 0
@@ -289,7 +289,7 @@ class Follower:
 
     def _why_not(
         self,
-        snapped: Snapped,
+        snapped: SnappedCamera,
         seen: PaintAgreement,
         weakest: float,
         unit: float,
@@ -309,7 +309,7 @@ class Follower:
 
     def _snap(
         self, picture: Picture, camera: Camera, known: FloatArray | None, windows: Sequence[float]
-    ) -> Snapped:
+    ) -> SnappedCamera:
         return snap_reading(
             picture.reading, camera, self.pitch, windows, self.policy, known,
             circles_count_twice=True, position_is_known=known is not None, most_surprising=np.inf,

@@ -28,7 +28,7 @@ from app.geometry.resection import (
     PAN,
     PARAMETERS,
     ROLL,
-    Sightings,
+    CurvePoints,
     X,
     Z,
     camera_from_parameters,
@@ -68,7 +68,7 @@ TERMS = len(MARKINGS) + 4
 class _Sight:
     """The paint of a frame: places from the principal point and their sigmas, pixels."""
 
-    sightings: Sightings
+    sightings: CurvePoints
     sigmas: FloatArray
 
 
@@ -154,7 +154,7 @@ class _Shot:
         traced = evidence.traced
         middle = frame.snapped.camera.project(traced.places)
         pixels = middle + evidence.offsets[:, None] * traced.normals - self.principal_point
-        sightings = Sightings(np.ascontiguousarray(pixels), traced.marking, np.ones(len(pixels)))
+        sightings = CurvePoints(np.ascontiguousarray(pixels), traced.marking, np.ones(len(pixels)))
         return _Sight(sightings, evidence.sigmas)
 
     def _turn(self, place: int, match: BackgroundMatches | None) -> tuple[FloatArray, FloatArray]:

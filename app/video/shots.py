@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from app.config import Settings
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.video.cuts import hard_cuts
 from app.video.frames import Image, RecordingReader
 from app.video.index import RecordingIndex
@@ -78,7 +78,7 @@ class RecordingShots:
 def find_shots(
     index: RecordingIndex,
     look: Callable[[Sequence[int]], Sequence[LookedAt]] | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> RecordingShots:
     """Shots of a recording.
 
@@ -189,7 +189,7 @@ def shots_of_recording(
 
 
 def shots_of_indexed(
-    path: Path, index: RecordingIndex, progress: TellProgress | None = None
+    path: Path, index: RecordingIndex, progress: ReportProgress | None = None
 ) -> RecordingShots:
     """Find the shots of a recording that is indexed, in this process.
 

@@ -63,7 +63,7 @@ def _run(program: Coroutine[Any, Any, None]) -> None:
 async def _schedule(place: SchedulerPlace, say: Say) -> None:
     from distributed import Scheduler
 
-    end = _told_to_end()
+    end = _stop_event()
     try:
         scheduler = await Scheduler(
             host=place.host,
@@ -83,17 +83,17 @@ async def _schedule(place: SchedulerPlace, say: Say) -> None:
 async def _work(
     place: SchedulerPlace, count: int, memory: int | None, folder: str, say: Say
 ) -> None:
-    end = _told_to_end()
+    end = _stop_event()
     say(f"{count} workers look for the scheduler at {place.address}")
     limit = 0.9 / count if memory is None else memory
-    keepers = [asyncio.ensure_future(_keep(place, limit, folder)) for _ in range(count)]
+    keepers = [asyncio.ensure_future(_keep_running(place, limit, folder)) for _ in range(count)]
     await end.wait()
     for keeper in keepers:
         keeper.cancel()
     await asyncio.gather(*keepers, return_exceptions=True)
 
 
-async def _keep(place: SchedulerPlace, limit: float, folder: str) -> None:
+async def _keep_running(place: SchedulerPlace, limit: float, folder: str) -> None:
     """A worker, and another one whenever it has ended."""
     from distributed import Nanny
 
@@ -113,7 +113,7 @@ async def _keep(place: SchedulerPlace, limit: float, folder: str) -> None:
         await asyncio.sleep(AGAIN_S)
 
 
-def _told_to_end() -> asyncio.Event:
+def _stop_event() -> asyncio.Event:
     end, loop = asyncio.Event(), asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, end.set)

@@ -93,6 +93,6 @@ export function postDecision(group, take, asStart) {
 }
 
 /** @param {number} group @param {number} take @param {string} reason @returns {Promise<void>} */
-export function postAdjudicatedBack(group, take, reason) {
-	return request(`/groups/${group}/adjudication/hand-back`, { method: 'POST', body: { take, reason } });
+export function postReturnForCorrection(group, take, reason) {
+	return request(`/groups/${group}/adjudication/return`, { method: 'POST', body: { take, reason } });
 }

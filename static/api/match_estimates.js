@@ -66,7 +66,7 @@ export function sharePositions(dataset, match) {
 }
 
 /** Give a match what it had before. @param {number} dataset @param {string} match @returns {Promise<JobJson>} */
-export function takePositionsBack(dataset, match) {
+export function revertPositions(dataset, match) {
 	return request(`/datasets/${dataset}/positions${queryText({ match })}`, { method: 'DELETE', key: idempotencyKey() });
 }
 
@@ -152,7 +152,7 @@ export function acceptNoise(dataset) {
 }
 
 /** Take the balls of all cameras and people to be alike. @param {number} dataset @returns {Promise<JobJson>} */
-export function takeNoiseBack(dataset) {
+export function revertNoise(dataset) {
 	return request(`/datasets/${dataset}/noise`, { method: 'DELETE', key: idempotencyKey() });
 }
 

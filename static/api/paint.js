@@ -81,6 +81,6 @@ export function readDatasetPaint(dataset, match) {
 }
 
 /** Take the last reading back. @param {number} dataset @returns {Promise<JobJson>} */
-export function takeDatasetPaintBack(dataset) {
+export function revertPaint(dataset) {
 	return request(`/datasets/${dataset}/paint`, { method: 'DELETE', key: idempotencyKey() });
 }

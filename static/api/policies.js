@@ -18,7 +18,7 @@ import { idempotencyKey, request, requestTagged } from './client.js';
  * @property {number | null} maximum
  * @property {(number | string)[]} choices values to offer; empty: any between the ends
  * @property {string | null} gate
- * @property {string | null} asks how a value compares with it to pass: "more than", "at least", "at most"
+ * @property {string | null} comparison how a value compares with it to pass: "more than", "at least", "at most"
  * @property {boolean} optional whether it can be null
  */
 

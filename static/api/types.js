@@ -204,7 +204,7 @@
  * @property {number | null} threshold
  * @property {number | null} confidence
  * @property {FixJson | null} fix
- * @property {OfferJson[]} offers edits that mend it
+ * @property {OfferJson[]} offers edits that correct it
  * @property {GuideJson | null} guide where no edit does
  * @property {boolean} unusable_ball whether nobody can use the ball: accepting needs a note
  * @property {{by: string, at: string, note: string | null} | null} [dismissed] who has checked it and found it fine

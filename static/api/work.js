@@ -3,13 +3,13 @@
 
 import { request } from './client.js';
 
-/** @import {HandedBackJson} from './takes.js' */
+/** @import {ReturnedJson} from './independent_annotations.js' */
 
 /** @typedef {{person: string, since: string}} Presence */
 /** @typedef {'annotator' | 'reviewer'} Part */
 /** @typedef {{id: number, dataset: string, name: string, q: string, sort: string, verdicts: number, due: string | null, state: 'open' | 'closed', created: string, created_by: string, annotators: string[], reviewers: string[], groups: number, waiting: number, handed_in: number, settled: number, last: string | null}} BatchJson */
-/** @typedef {{batch: BatchJson, group: number | null, part: Part | null, until: string | null, here: Presence[], handed_in_by: string | null, handed_back: HandedBackJson | null, place: number | null, of: number | null}} LeaseJson */
-/** @typedef {{batch: BatchJson, parts: Part[], left: number, handed_back: HandedBackJson[]}} MyBatchJson */
+/** @typedef {{batch: BatchJson, group: number | null, part: Part | null, until: string | null, here: Presence[], handed_in_by: string | null, handed_back: ReturnedJson | null, place: number | null, of: number | null}} LeaseJson */
+/** @typedef {{batch: BatchJson, parts: Part[], left: number, handed_back: ReturnedJson[]}} MyBatchJson */
 /** @typedef {{name: string, handed_in: number, judged: number, groups: number, minutes: number, minutes_a_group: number | null, groups_an_hour: number | null}} PaceJson */
 /** @typedef {{batch: BatchJson, gold_every: number | null, here: Presence[], stalled: string | null, people: PaceJson[]}} TeamBatchJson */
 /** @typedef {{name: string, q: string, size: number | null, annotators: string[], reviewers: string[], due: string | null, skip_given: boolean, verdicts?: number, blind?: boolean, gold_every?: number | null}} NewBatch */
@@ -45,7 +45,7 @@ export const putLease = (id, group, over = false) => request(`${at(id, group)}/l
 export const deleteLease = (id, group) => request(`${at(id, group)}/lease`, { method: 'DELETE', keepalive: true });
 
 /** @param {number} id @param {number} group @returns {Promise<LeaseJson>} */
-export const putHandIn = (id, group) => request(`${at(id, group)}/hand-in`, { method: 'PUT' });
+export const putSubmission = (id, group) => request(`${at(id, group)}/submission`, { method: 'PUT' });
 
 /** @param {number} id @param {number} group @param {string} reason @returns {Promise<LeaseJson>} */
-export const postHandBack = (id, group, reason) => request(`${at(id, group)}/hand-back`, { method: 'POST', body: { reason } });
+export const postReturn = (id, group, reason) => request(`${at(id, group)}/return`, { method: 'POST', body: { reason } });

@@ -2,7 +2,7 @@
 /** Which part of a picture shows what was changed in it. */
 
 /** @import {BallJson, LinesJson, PointJson} from '../api/types.js' */
-/** @import {ChangedView, PastView} from '../api/past.js' */
+/** @import {ChangedView, PastView} from '../api/history.js' */
 
 /** Of the picture's width: a crop is no narrower, so that one sees where it is. */
 const NARROWEST = 0.14;

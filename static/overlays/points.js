@@ -18,11 +18,11 @@ const LONG_WHISKER = 40;
 
 /** From the projected line through the annotated point, `gain` times as long as it is where it would else be hard to see. */
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
-export function drawWhiskers(context, scene) {
+export function drawResidualLines(context, scene) {
 	for (const { points } of scene.picture.markings) {
 		for (const { point, nearest, distance } of points) {
 			if (!nearest || distance === null) continue;
-			drawWhisker(context, scene, point, nearest, distance, gradeOfResidual(distance, scene.picture.gamma));
+			drawResidualLine(context, scene, point, nearest, distance, gradeOfResidual(distance, scene.picture.gamma));
 		}
 	}
 }
@@ -32,7 +32,7 @@ export function drawWhiskers(context, scene) {
  * @param {ImagePoint} point @param {ImagePoint} nearest place on the marking
  * @param {number} distance image pixels @param {Grade} grade
  */
-export function drawWhisker(context, { viewport, gain }, point, nearest, distance, grade) {
+export function drawResidualLine(context, { viewport, gain }, point, nearest, distance, grade) {
 	if (distance * gain * viewport.scale < SHORTEST_WHISKER) return;
 	const shown = Math.max(1, Math.min(gain, LONG_WHISKER / (distance * viewport.scale)));
 	const end = {

@@ -12,7 +12,7 @@ import { pinsOf } from '../lib/pins.js';
 /** @import {ImagePoint} from '../geometry/camera.js' */
 /** @import {MarkingResiduals} from '../geometry/residual.js' */
 /** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
-/** @import {Mend} from '../state/mends.js' */
+/** @import {Suggestion} from '../state/suggestions.js' */
 /** @import {Mark, ViewMarks} from '../state/prediction_marks.js' */
 /** @import {Selection} from '../state/workspace.js' */
 
@@ -56,7 +56,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {boolean} [draws] whether a click draws in this view
  * @property {boolean} rays
  * @property {import('../state/conflict.js').Field[]} [ghosts] what a conflict keeps beside what is shown
- * @property {Mend | null} [meant] what the card speaks about, in this view
+ * @property {Suggestion | null} [meant] what the card speaks about, in this view
  */
 
 /**

@@ -9,9 +9,9 @@ import { drawEpipolars } from './epipolars.js';
 import { drawExpected } from './expected_ball.js';
 import { drawGhosts } from './ghosts.js';
 import { drawMarkings } from './markings.js';
-import { drawMendMarks } from './mend_marks.js';
+import { drawSuggestionMarks } from './suggestion_marks.js';
 import { drawPins } from './pins.js';
-import { drawPoints, drawSelectedPoint, drawWhiskers } from './points.js';
+import { drawPoints, drawSelectedPoint, drawResidualLines } from './points.js';
 import { drawUndrawn } from './undrawn.js';
 
 /** @import {Scene} from './scene.js' */
@@ -113,14 +113,14 @@ export function drawOverlays(context, scene) {
 	context.save();
 	if (scene.projections) drawMarkings(context, scene);
 	if (scene.projections) drawUndrawn(context, scene);
-	if (scene.projections) (scene.picture.paint?.draw ?? drawWhiskers)(context, scene);
+	if (scene.projections) (scene.picture.paint?.draw ?? drawResidualLines)(context, scene);
 	if (scene.rays) drawEpipolars(context, scene);
 	drawPoints(context, scene);
 	scene.picture.proposal?.draw(context, scene);
 	if (scene.boxes) scene.picture.predictions?.draw(context, scene);
 	drawExpected(context, scene);
 	drawBall(context, scene);
-	drawMendMarks(context, scene);
+	drawSuggestionMarks(context, scene);
 	drawSelectedPoint(context, scene);
 	drawGhosts(context, scene);
 	drawPins(context, scene);

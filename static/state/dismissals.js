@@ -3,7 +3,7 @@
 
 import { group, solution, submitDismissal } from './group.js';
 import { did, didAgain, forget, tookBack } from './last_action.js';
-import { toldFinding } from './mends.js';
+import { shownFinding } from './suggestions.js';
 import { returnTo } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { openFindings } from './open_findings.js';
@@ -25,14 +25,14 @@ export function dismiss(finding, dismissed) {
 }
 
 /** Dismiss the finding that the card speaks about, else the first that is open. */
-export function dismissTold() {
-	const finding = toldFinding.value ?? openFindings(solution.value)[0];
+export function dismissShown() {
+	const finding = shownFinding.value ?? openFindings(solution.value)[0];
 	if (finding) dismiss(finding, true);
 	else announce('No finding is open in this group.');
 }
 
 /** Return to the group and do the opposite of what was done. @param {DismissalDone} action */
-export async function takeDismissalBack(action) {
+export async function undoDismissal(action) {
 	forget(action);
 	if (!(await returnTo(action.group))) return;
 	if (submitDismissal(action.finding, !action.dismissed)) {

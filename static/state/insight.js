@@ -35,7 +35,7 @@ import { focused } from './workspace.js';
  */
 /** @template T @typedef {{key: string, id: number, items: T[]}} Known   id: of the group or view; key: of its state */
 
-/** Whether the solver is still trying out what would mend the group on screen. */
+/** Whether the solver is still trying out what would correct the group on screen. */
 export const isSearching = signal(false);
 
 /** People who go through easy groups stay shorter than this. */
@@ -49,7 +49,7 @@ export const influence = signal(/** @type {Known<Influence> | null} */ (null));
 /** @type {Kept<string, Known<any>>} */
 const kept = new Kept(40);
 const PATHS = {
-	remedies: (/** @type {number} */ group) => `/groups/${group}/remedies`,
+	remedies: (/** @type {number} */ group) => `/groups/${group}/suggestions`,
 	influence: (/** @type {number} */ view) => `/views/${view}/influence`,
 };
 /** Addresses that this server does not have. @type {Set<string>} */

@@ -8,7 +8,7 @@ import { computed, effect, signal, untracked } from '@preact/signals';
 
 import { listen } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
-import { deleteLease, postNext, putHandIn, putLease } from '../api/work.js';
+import { deleteLease, postNext, putSubmission, putLease } from '../api/work.js';
 import { navigate, page } from '../lib/router.js';
 import { settle } from './group.js';
 import { me, mustLogIn } from './me.js';
@@ -16,7 +16,7 @@ import { batchId, currentId, goNext, reviewAddress } from './navigation.js';
 import { announce, complain, dismiss, inform } from './notice.js';
 import { outbox } from './outbox.js';
 
-/** @import {HandedBackJson} from '../api/takes.js' */
+/** @import {ReturnedJson} from '../api/independent_annotations.js' */
 /** @import {BatchJson, LeaseJson, Part, Presence} from '../api/work.js' */
 
 /**
@@ -26,8 +26,8 @@ import { outbox } from './outbox.js';
  * @property {Part | null} part
  * @property {Presence[]} here everybody who has it open
  * @property {string} sentence why it is not mine
- * @property {string | null} [handedInBy] who has handed it in
- * @property {HandedBackJson | null} [back] why its annotator has it back
+ * @property {string | null} [submittedBy] who has handed it in
+ * @property {ReturnedJson | null} [back] why its annotator has it back
  * @property {number | null} [place] of the groups that I annotate on my own, from 1
  * @property {number | null} [of] how many these are; null: nobody is told
  */
@@ -50,7 +50,7 @@ export const others = computed(() => (lease.value?.here ?? []).filter(({ person 
 /** @param {LeaseJson} answer @param {number} id */
 function got(answer, id) {
 	batch.value = answer.batch;
-	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', handedInBy: answer.handed_in_by, back: answer.handed_back, place: answer.place, of: answer.of };
+	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', submittedBy: answer.handed_in_by, back: answer.handed_back, place: answer.place, of: answer.of };
 }
 
 /** @param {number} id @param {number} group */
@@ -184,12 +184,12 @@ function arrived(group) {
 }
 
 /** Whether the group on screen can be handed in here. */
-export const canHandIn = computed(() => lease.value?.part === 'annotator' && lease.value.state === 'mine');
+export const canSubmit = computed(() => lease.value?.part === 'annotator' && lease.value.state === 'mine');
 
 /** Done: hand the group in, and go on. */
-export async function handInAndNext() {
+export async function submitAndOpenNext() {
 	const held = lease.value;
-	if (!held || !canHandIn.value || isMoving.value) return;
+	if (!held || !canSubmit.value || isMoving.value) return;
 	settle();
 	await arrived(held.group);
 	if (outbox.value.some((item) => item.group === held.group)) {
@@ -197,7 +197,7 @@ export async function handInAndNext() {
 		return;
 	}
 	try {
-		await putHandIn(held.batch, held.group);
+		await putSubmission(held.batch, held.group);
 		announce('Submitted.');
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;

@@ -43,7 +43,7 @@ function sessionText() {
 }
 
 /** Do not show it in this window again until it changes. */
-export function putBannerAway() {
+export function hideBanner() {
 	putAway.value = JSON.stringify(banner.value);
 	try {
 		sessionStorage.setItem(PUT_AWAY, putAway.value);
@@ -53,18 +53,18 @@ export function putBannerAway() {
 }
 
 /** What the server says. @param {BannerJson | null | undefined} said */
-export function tellBanner(said) {
+export function publishBanner(said) {
 	if (said !== undefined && JSON.stringify(said) !== JSON.stringify(banner.value)) banner.value = said;
 }
 
 /** Follow the notice, and the time. */
 export function startMaintenance() {
 	const said = document.documentElement.dataset.banner;
-	if (said) tellBanner(JSON.parse(said));
-	listen('maintenance', (/** @type {{banner: BannerJson | null}} */ event) => tellBanner(event.banner), () => {
+	if (said) publishBanner(JSON.parse(said));
+	listen('maintenance', (/** @type {{banner: BannerJson | null}} */ event) => publishBanner(event.banner), () => {
 		// On the server of a team the window asks who is there then, and is told.
 		if (document.documentElement.hasAttribute('data-team')) return;
-		getSession().then((session) => tellBanner(session.maintenance), () => {
+		getSession().then((session) => publishBanner(session.maintenance), () => {
 			// The next event, or the next page, says it.
 		});
 	});

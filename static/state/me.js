@@ -6,7 +6,7 @@ import { computed, effect, signal, untracked } from '@preact/signals';
 import { cameIn, forbidden, loggedOut } from '../api/client.js';
 import { connected } from '../api/events.js';
 import { deleteSession, getSession } from '../api/people.js';
-import { tellBanner } from './maintenance.js';
+import { publishBanner } from './maintenance.js';
 import { inform } from './notice.js';
 
 /** @import {Action, SessionJson, WaysIn} from '../api/people.js' */
@@ -57,15 +57,15 @@ function rightsOf({ role, datasets: every }) {
 /** Hear of other rights: when something was refused, when the stream begins anew, when somebody comes back to the window. */
 export function startRights() {
 	if (!isTeam) return;
-	effect(() => { if (connected.value || forbidden.value) untracked(askWhoIsThere); });
-	addEventListener('focus', () => { if (!mustLogIn.value) askWhoIsThere(); });
+	effect(() => { if (connected.value || forbidden.value) untracked(loadSession); });
+	addEventListener('focus', () => { if (!mustLogIn.value) loadSession(); });
 }
 
 /** Ask the server who is there. @returns {Promise<SessionJson | null>} null: it did not say */
-export async function askWhoIsThere() {
+export async function loadSession() {
 	const session = await getSession().catch(() => null);
 	if (session?.ways) ways.value = session.ways;
-	tellBanner(session?.maintenance);
+	publishBanner(session?.maintenance);
 	if (session?.name) welcome({ ...session, ways: null, moment: null, maintenance: null });
 	return session;
 }

@@ -10,7 +10,7 @@ import { stored } from '../lib/storage.js';
 import { loadDatasets } from './datasets.js';
 import { follow } from './jobs.js';
 import { actions } from './last_action.js';
-import { askWhoIsThere, isTeam } from './me.js';
+import { loadSession, isTeam } from './me.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
 
@@ -42,7 +42,7 @@ export async function startPractice(again = false) {
 		if (job.state === 'done') {
 			endFirstSteps();
 			// A team's server has made a dataset in which one may judge, whatever one may elsewhere.
-			if (isTeam) await Promise.all([askWhoIsThere(), loadDatasets()]);
+			if (isTeam) await Promise.all([loadSession(), loadDatasets()]);
 			navigate(`/review/${job.result.first}`);
 		} else makingFailed.value = job.problem?.detail ?? `The job was ${job.state}.`;
 	} catch (error) {

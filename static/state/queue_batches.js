@@ -15,7 +15,7 @@ import { openQueue, queue } from './queue.js';
 /** @import {BatchDone} from './last_action.js' */
 
 /** Say what a bulk verdict did, and offer to take it back. @param {BulkResult} result @param {string} state @param {string} dataset */
-export function tellBatch({ batch, changed, refused }, state, dataset) {
+export function announceBatch({ batch, changed, refused }, state, dataset) {
 	const left = refused.reduce((sum, { groups }) => sum + groups, 0);
 	const text = batchText(changed, state);
 	const rest = left ? ` ${count(left)} ${left === 1 ? 'stays as it was' : 'stay as they were'}.` : '';
@@ -26,17 +26,17 @@ export function tellBatch({ batch, changed, refused }, state, dataset) {
 	/** @type {BatchDone} */
 	const action = { kind: 'batch', dataset, batch, text };
 	did(action);
-	inform(`${text}.${rest}`, { label: 'Undo', run: () => takeBatchBack(action) });
+	inform(`${text}.${rest}`, { label: 'Undo', run: () => undoBatch(action) });
 }
 
 /** Give every group of a batch the verdict back that it had before. @param {BatchDone} action */
-export async function takeBatchBack(action) {
+export async function undoBatch(action) {
 	try {
 		const { restored, kept } = await undoVerdicts(action.batch);
 		forget(action);
 		if (restored > 0) tookBack(action);
 		const text = `${count(restored)} ${restored === 1 ? 'verdict is' : 'verdicts are'} undone.${stayed(kept, 'reviewed since')}`;
-		inform(text, restored > 0 ? { label: 'Redo', run: () => giveBatchAgain(action) } : undefined);
+		inform(text, restored > 0 ? { label: 'Redo', run: () => redoBatch(action) } : undefined);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
 		// Somebody else may have taken it back, or it is gone with its dataset.
@@ -47,7 +47,7 @@ export async function takeBatchBack(action) {
 }
 
 /** Give the verdicts of a batch again that was taken back. @param {BatchDone} action */
-export async function giveBatchAgain(action) {
+export async function redoBatch(action) {
 	try {
 		const { batch, changed, kept, refused } = await redoVerdicts(action.batch);
 		const failing = refused.reduce((sum, { groups }) => sum + groups, 0);
@@ -63,7 +63,7 @@ export async function giveBatchAgain(action) {
 				undone.value = [...undone.value, action];
 				didAgain(action, again);
 			} else did(again);
-			inform(`${again.text} again.${rest}`, { label: 'Undo', run: () => takeBatchBack(again) });
+			inform(`${again.text} again.${rest}`, { label: 'Undo', run: () => undoBatch(again) });
 		}
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;

@@ -12,7 +12,7 @@ import { refuses } from './rights.js';
 import { pointerPlace } from './workspace.js';
 
 /** @import {ThreadJson} from '../api/threads.js' */
-/** @import {PlaceOfComment} from '../views/talk/comment_field.js' */
+/** @import {PlaceOfComment} from '../views/comments/comment_field.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 /** People who go through easy groups stay shorter than this, ms. */

@@ -11,7 +11,7 @@ import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain } from './notice.js';
 import { discard, outbox } from './outbox.js';
 import { isAway, untilTakenUp, wake } from './sending.js';
-import { giveVerdictAgain, takeVerdictBack } from './verdicts.js';
+import { redoVerdict, undoVerdict } from './verdicts.js';
 
 /** @import {EditDone} from './last_action.js' */
 
@@ -66,17 +66,17 @@ async function undoOne() {
 	const action = next.value;
 	if (action === null) announce('Nothing to undo.');
 	else if (action === 'here') undoHere();
-	else if (action.kind === 'verdict') await takeVerdictBack(action);
+	else if (action.kind === 'verdict') await undoVerdict(action);
 	else if (action.kind === 'edit') await undoThere(action);
 	else if (action.kind === 'dismissal') {
 		// Findings are the review's: the queue opens without them.
-		const { takeDismissalBack } = await import('./dismissals.js');
-		await takeDismissalBack(action);
+		const { undoDismissal } = await import('./dismissals.js');
+		await undoDismissal(action);
 	}
 	else {
 		// Bulk verdicts are the queue's: the review screen opens without them.
-		const { takeBatchBack } = await import('./queue_batches.js');
-		await takeBatchBack(action);
+		const { undoBatch } = await import('./queue_batches.js');
+		await undoBatch(action);
 	}
 }
 
@@ -106,14 +106,14 @@ export function redo() {
 
 async function redoOne() {
 	const action = nextAgain(undone.value, here.value);
-	if (action?.kind === 'verdict') await giveVerdictAgain(action);
+	if (action?.kind === 'verdict') await redoVerdict(action);
 	else if (action?.kind === 'dismissal') {
 		const { dismissAgain } = await import('./dismissals.js');
 		await dismissAgain(action);
 	}
 	else if (action?.kind === 'batch') {
-		const { giveBatchAgain } = await import('./queue_batches.js');
-		await giveBatchAgain(action);
+		const { redoBatch } = await import('./queue_batches.js');
+		await redoBatch(action);
 	}
 	else if (isAway.value) complain('Redo needs the server, which cannot be reached.');
 	else if (action) await redoThere(action);

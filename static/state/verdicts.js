@@ -7,7 +7,7 @@ import { navigate } from '../lib/router.js';
 import { doubt } from './advice.js';
 import { conflict } from './conflict.js';
 import { group, groupDocument, onRefused, settle, submit, submitVerdict } from './group.js';
-import { frozen } from './hand_back.js';
+import { frozen } from './return_group.js';
 import { actions, did, didAgain, forget, forgetUndone, tookBack } from './last_action.js';
 import { batchId, currentId, goNext, query, queueAddress, returnTo, reviewAddress } from './navigation.js';
 import { isMoving, nextOfBatch } from './leases.js';
@@ -158,7 +158,7 @@ export function addNote(text) {
 }
 
 /** Take a verdict of this window back, and return to its group. @param {VerdictDone} action */
-export async function takeVerdictBack(action) {
+export async function undoVerdict(action) {
 	forget(action);
 	if (!(await returnTo(action.group)) || !group.value) return;
 	const { state, reason } = group.value.verdict;
@@ -172,7 +172,7 @@ export async function takeVerdictBack(action) {
 }
 
 /** Give a verdict again that was taken back, on its group. @param {VerdictDone} action */
-export async function giveVerdictAgain(action) {
+export async function redoVerdict(action) {
 	if (!(await returnTo(action.group)) || !group.value) return;
 	const { state, reason } = group.value.verdict;
 	if (state !== action.before.state || reason !== action.before.reason) {

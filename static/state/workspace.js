@@ -43,7 +43,7 @@ export const projections = stored('projections', true);
 export const boxes = stored('boxes', true);
 export const gain = stored('whisker-gain', 5);
 /** Whether whiskers lead to the paint in the picture instead of to what was clicked. */
-export const paintWhiskers = stored('paint-whiskers', false);
+export const residualLines = stored('paint-whiskers', false);
 /** Which 3D ball is drawn and measured: the one that the policy exports, mean of pairs or most likely point, or the other. */
 export const estimator = stored('estimator', /** @type {'exported' | 'other'} */ ('exported'));
 /** Whether the gates show what they ask of the group, and by how much. */

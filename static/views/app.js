@@ -14,7 +14,7 @@ import { helpOpen, openHelp } from '../state/workspace.js';
 import { Announcer } from './bars.js';
 import { Header } from './header.js';
 import { LazyPage, loadPage } from './lazy_page.js';
-import { openBell } from './talk/bell_button.js';
+import { openNotifications } from './comments/notifications_button.js';
 import { LoginAgain, LoginPage } from './login.js';
 import { ReviewPage } from './review_page.js';
 import { explainTerms } from './term.js';
@@ -26,7 +26,7 @@ const FETCH_AHEAD_AFTER = 1500;
 const GLOBAL_KEYS = [
 	{ keys: ['?', 'Shift+?'], label: 'Help: keys, legend, words, guide, practice', group: 'Everywhere', shown: '?', run: openHelp },
 	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
-	{ keys: ['Shift+b'], label: 'Notifications', group: 'Everywhere', when: () => isTeam, run: openBell },
+	{ keys: ['Shift+b'], label: 'Notifications', group: 'Everywhere', when: () => isTeam, run: openNotifications },
 	// Pages with a search field of their own bind it to that.
 	{ keys: ['/'], label: 'Search', group: 'Everywhere', run: openPalette },
 ];

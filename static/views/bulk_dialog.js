@@ -10,7 +10,7 @@ import { withValue } from '../lib/field.js';
 import { count, plural, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { reviewAddress } from '../state/navigation.js';
-import { readAgain, tellBatch } from '../state/queue_batches.js';
+import { readAgain, announceBatch } from '../state/queue_batches.js';
 import { clearTicks } from '../state/queue_ticks.js';
 import { REASONS } from '../state/reasons.js';
 import { FormDialog } from './dialog.js';
@@ -122,7 +122,7 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 		if (why) return;
 		setState({ busy: 'Deciding…', error: '' });
 		try {
-			tellBatch(await postVerdicts(dataset.id, { q: asked, ...ask, expected: would }), verdict, dataset.name);
+			announceBatch(await postVerdicts(dataset.id, { q: asked, ...ask, expected: would }), verdict, dataset.name);
 			onClose();
 			if (chosen) clearTicks();
 			readAgain();

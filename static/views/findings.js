@@ -5,13 +5,13 @@ import { html } from 'htm/preact';
 
 import { findingTitle } from '../state/advice.js';
 import { dismiss } from '../state/dismissals.js';
-import { mends, toldFinding } from '../state/mends.js';
+import { suggestions, shownFinding } from '../state/suggestions.js';
 import { openFindings } from '../state/open_findings.js';
 import { pointTo } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { pageAddress } from './dataset_menu.js';
 import { When } from './when.js';
-import { carryOut } from './mend_actions.js';
+import { carryOut } from './suggestion_actions.js';
 
 /** @import {FindingJson, GroupDocument, SolutionJson} from '../api/types.js' */
 
@@ -20,7 +20,7 @@ function Finding({ group, finding }) {
 	const view = group.views.find((candidate) => candidate.key === finding.view);
 	const sure = finding.confidence === null ? '' : ` (${Math.round(finding.confidence * 100)} % sure)`;
 	const title = findingTitle(group, finding);
-	const offered = mends.value.filter((mend) => mend.sentence === finding.sentence && mend.view === finding.view);
+	const offered = suggestions.value.filter((suggestion) => suggestion.sentence === finding.sentence && suggestion.view === finding.view);
 	const checked = finding.dismissed;
 	return html`
 		<li class="finding" data-kind=${finding.kind} data-dismissed=${Boolean(checked)}>
@@ -33,7 +33,7 @@ function Finding({ group, finding }) {
 			${html`
 				<p class="finding__fixes">
 					<button type="button" data-needs="review" class="button button--small" title=${checked ? 'Let this finding count again' : 'This finding was checked and is fine: it no longer flags the group'} onClick=${() => dismiss(finding, !checked)}>${checked ? 'Look again' : 'Checked, fine'}<span class="hidden-text"> ${title}</span></button>
-					${offered.map((mend) => html`<button type="button" data-needs="annotate" class="button button--fix" onClick=${() => carryOut(mend)}>${mend.label}</button>`)}
+					${offered.map((suggestion) => html`<button type="button" data-needs="annotate" class="button button--fix" onClick=${() => carryOut(suggestion)}>${suggestion.label}</button>`)}
 				</p>`}
 		</li>
 	`;
@@ -46,9 +46,9 @@ export function PitchLink({ dataset }) {
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */
 export function Findings({ group, solution }) {
-	const findings = solution.findings.filter((finding) => finding !== toldFinding.value);
+	const findings = solution.findings.filter((finding) => finding !== shownFinding.value);
 	if (findings.length === 0) return null;
-	const more = toldFinding.value !== null;
+	const more = shownFinding.value !== null;
 	const open = openFindings({ ...solution, findings }).length;
 	return html`
 		<section class="card" aria-label="Findings">

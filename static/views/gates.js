@@ -4,14 +4,14 @@
 import { html } from 'htm/preact';
 
 import { ballOf } from '../geometry/preview.js';
-import { mends } from '../state/mends.js';
+import { suggestions } from '../state/suggestions.js';
 import { gatesOpen, pointTo } from '../state/workspace.js';
 import { gateLabel, gateMargin } from './gate_names.js';
-import { carryOut } from './mend_actions.js';
+import { carryOut } from './suggestion_actions.js';
 import { uncertainViews } from './view_state.js';
 
 /** @import {GateJson, GroupDocument, SolutionJson} from '../api/types.js' */
-/** @import {Mend} from '../state/mends.js' */
+/** @import {Suggestion} from '../state/suggestions.js' */
 
 /** More remedies than these nobody reads. */
 const MOST = 4;
@@ -41,7 +41,7 @@ function stateOf(group, gate, before, uncertain) {
 	return { state: 'failed', glyph: '✗', word: 'failed' };
 }
 
-/** @param {{group: GroupDocument, remedy: Mend}} props */
+/** @param {{group: GroupDocument, remedy: Suggestion}} props */
 function RemedyRow({ group, remedy }) {
 	return html`
 		<li class="remedy" data-passes=${remedy.passes}>
@@ -53,7 +53,7 @@ function RemedyRow({ group, remedy }) {
 
 /** What the solver has tried out, beside what the card on top offers. @param {{group: GroupDocument}} props */
 function Remedies({ group }) {
-	const tried = mends.value.filter(({ title }) => title === null).toSorted((a, b) => Number(b.passes) - Number(a.passes)).slice(0, MOST);
+	const tried = suggestions.value.filter(({ title }) => title === null).toSorted((a, b) => Number(b.passes) - Number(a.passes)).slice(0, MOST);
 	if (tried.length === 0) return null;
 	return html`
 		<section class="remedies" aria-label="What would help">

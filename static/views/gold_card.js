@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { deleteGold, getGold, patchGold } from '../api/takes.js';
+import { deleteGold, getGold, patchGold } from '../api/independent_annotations.js';
 import { useAttempt } from '../lib/attempt.js';
 import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
@@ -14,7 +14,7 @@ import { FormError } from './form_error.js';
 import { Term } from './term.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
-/** @import {GoldGroupJson, GoldResultJson, MiddleJson, PersonResultsJson} from '../api/takes.js' */
+/** @import {GoldGroupJson, GoldResultJson, MedianIntervalJson, PersonResultsJson} from '../api/independent_annotations.js' */
 
 /** What annotators of a gold group may begin with. */
 export const STARTS = [['imported', 'the imported annotations'], ['without_balls', 'lines without balls'], ['bare', 'pictures only']];
@@ -22,7 +22,7 @@ export const STARTS = [['imported', 'the imported annotations'], ['without_balls
 const FROM = { verdict: 'its annotations when it was marked', sample: 'the values it was generated from', version: 'a frozen version' };
 const WIDE = 160, HIGH = 28;
 
-/** A median with its interval; few numbers have none. @param {MiddleJson} one @param {number} digits */
+/** A median with its interval; few numbers have none. @param {MedianIntervalJson} one @param {number} digits */
 function middleText({ count, median, low, high }, digits) {
 	if (median === null) return '–';
 	const of = low === null || high === null ? `${count} only` : `${low.toFixed(digits)} to ${high.toFixed(digits)}`;

@@ -5,15 +5,15 @@ import { html } from 'htm/preact';
 import { useEffect, useRef } from 'preact/hooks';
 
 import { sentenceOf } from '../api/problem.js';
-import { getGuidelines } from '../api/takes.js';
+import { getGuidelines } from '../api/independent_annotations.js';
 import { useResource } from '../lib/resource.js';
 import { groupDocument } from '../state/group.js';
-import { guidelinesShown } from '../state/takes.js';
+import { guidelinesShown } from '../state/independent_annotations.js';
 import { GuidelinesText } from './guidelines_text.js';
 import { GuidelinesVersions, versionAt } from './guidelines_versions.js';
 import { When } from './when.js';
 
-/** @import {GuidelinesJson} from '../api/takes.js' */
+/** @import {GuidelinesJson} from '../api/independent_annotations.js' */
 /** @import {GroupDocument} from '../api/types.js' */
 
 /** Under which version the group was judged, where that is another one than now. @param {{found: GuidelinesJson, group: GroupDocument}} props */

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
 import { postUpload } from '../api/imports.js';
-import { getGuidelines, postGuidelinePicture, putGuidelines } from '../api/takes.js';
+import { getGuidelines, postGuidelinePicture, putGuidelines } from '../api/independent_annotations.js';
 import { useAttempt } from '../lib/attempt.js';
 import { plural } from '../lib/format.js';
 import { pictureLine } from '../lib/guideline_parts.js';
@@ -17,7 +17,7 @@ import { GuidelinesVersions } from './guidelines_versions.js';
 import { Trouble } from './page_frame.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
-/** @import {GuidelinesJson} from '../api/takes.js' */
+/** @import {GuidelinesJson} from '../api/independent_annotations.js' */
 
 /** @param {{one: DatasetJson, found: GuidelinesJson, close: () => void}} props */
 function Editor({ one, found, close }) {

@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { pictureAddress } from '../api/takes.js';
+import { pictureAddress } from '../api/independent_annotations.js';
 import { partsOf } from '../lib/guideline_parts.js';
 import { MarkdownBlocks } from './help/guide.js';
 

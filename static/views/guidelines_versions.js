@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
-import { getGuidelines, putGuidelines } from '../api/takes.js';
+import { getGuidelines, putGuidelines } from '../api/independent_annotations.js';
 import { useAttempt } from '../lib/attempt.js';
 import { useResource } from '../lib/resource.js';
 import { wordChanges } from '../lib/word_changes.js';
@@ -12,7 +12,7 @@ import { FormError } from './form_error.js';
 import { GuidelinesText } from './guidelines_text.js';
 import { When } from './when.js';
 
-/** @import {GuidelinesJson} from '../api/takes.js' */
+/** @import {GuidelinesJson} from '../api/independent_annotations.js' */
 
 /** Letters of an unchanged passage that are shown on either side of a change. */
 const AROUND = 160;

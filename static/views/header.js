@@ -8,7 +8,7 @@ import { groupDocument } from '../state/group.js';
 import { myName } from '../state/me.js';
 import { lastGroup, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { openHelp } from '../state/workspace.js';
-import { BellButton } from './talk/bell_button.js';
+import { NotificationsButton } from './comments/notifications_button.js';
 import { DatasetMenu, pageAddress } from './dataset_menu.js';
 
 /** @import {ComponentChildren} from 'preact' */
@@ -48,7 +48,7 @@ export function Header({ current, of, children }) {
 			<${DatasetMenu} current=${current} name=${name} />
 			<${Navigation} current=${current} name=${name} />
 			${children ?? html`<span class="header__middle"></span>`}
-			<${BellButton} />
+			<${NotificationsButton} />
 			${myName.value ? html`<a class="header__person" href="/account" title="Your account, sessions and password" aria-current=${current === 'account' ? 'page' : undefined}>${myName.value}</a>` : null}
 			<button class="header__help" type="button" aria-label="Help" title="Help: keys, legend, words, guide, practice" onClick=${openHelp}><kbd>?</kbd></button>
 		</header>

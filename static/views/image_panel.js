@@ -11,7 +11,7 @@ import { filterOf } from '../state/adjustments.js';
 import { conflict } from '../state/conflict.js';
 import { drawAt, insertAt } from '../state/drawing.js';
 import { draft } from '../state/group.js';
-import { mend } from '../state/mends.js';
+import { suggestion } from '../state/suggestions.js';
 import { panPanel, viewportOf, zoomPanel } from '../state/viewports.js';
 import {
 	boxes, drawing, editing, focused, focusView, gain, isSmall, otherInstant, overlaysHidden, pointerPlace, projections,
@@ -135,7 +135,7 @@ export function ImagePanel({ picture, area, sizes }) {
 	useLayoutEffect(() => stage.current?.show(frame.image), [frame.image]);
 	// Where nobody has drawn the ball, the other views' rays say where to look.
 	const rays = draft.value?.kind === 'ball' || selected.value?.kind === 'ball' || view.balls.length === 0;
-	const meant = mend.value?.view === view.key && !draft.value ? mend.value : null;
+	const meant = suggestion.value?.view === view.key && !draft.value ? suggestion.value : null;
 	const draws = drawing.value?.view === view.key && drawing.value.what !== 'ask';
 	const scene = useMemo(() => ({
 		picture, viewport, rays, selected: selected.value, hidden: overlaysHidden.value || instant !== null,

@@ -31,8 +31,8 @@ const LOADERS = {
 	login: async () => (await import('./sign_on_page.js')).SignOnPage,
 	join: async () => (await import('./join_page.js')).JoinPage,
 	work: async () => (await import('./work/work_page.js')).WorkPage,
-	history: async () => (await import('./past/history_page.js')).HistoryPage,
-	audit: async () => (await import('./past/audit_page.js')).AuditPage,
+	history: async () => (await import('./history/history_page.js')).HistoryPage,
+	audit: async () => (await import('./history/audit_page.js')).AuditPage,
 	jobs: async () => (await import('./jobs_page.js')).JobsPage,
 };
 

@@ -6,9 +6,9 @@ import { html } from 'htm/preact';
 import { ago } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { groupDocument } from '../state/group.js';
-import { askHandBack, canHandBack, frozen, submitAndNext } from '../state/hand_back.js';
-import { isCopy } from '../state/takes.js';
-import { batch, canHandIn, isMoving, lease, nextOfBatch, others, takeOver } from '../state/leases.js';
+import { askReturn, canReturn, frozen, submitAndNext } from '../state/return_group.js';
+import { isCopy } from '../state/independent_annotations.js';
+import { batch, canSubmit, isMoving, lease, nextOfBatch, others, takeOver } from '../state/leases.js';
 
 /** Others who are here, in the header. */
 export function Presence() {
@@ -17,18 +17,18 @@ export function Presence() {
 	return html`<span class="pill" role="status">${others.value.map(({ person, since }) => `${person} opened this ${ago(Date.parse(since), now)}`).join(', ')}</span>`;
 }
 
-/** Who handed something back, when and why. @param {{back: import('../api/takes.js').HandedBackJson}} props */
-export function HandedBack({ back }) {
+/** Who handed something back, when and why. @param {{back: import('../api/independent_annotations.js').ReturnedJson}} props */
+export function ReturnedNote({ back }) {
 	const now = useNow(20_000);
 	return html`<strong>${back.by}</strong> returned this ${ago(Date.parse(back.at), now)}${back.reason ? html`: “${back.reason}”` : '.'}`;
 }
 
 /** The button of who annotates: done, and on; of who reviews: back to them. */
-export function HandIn() {
-	if (canHandBack.value && !isCopy(groupDocument.value)) {
-		return html`<button class="button" type="button" title="Return this group to its annotator, with a reason (Shift U)" onClick=${askHandBack}>Return to ${lease.value?.handedInBy}… <kbd>⇧U</kbd></button>`;
+export function SubmitButton() {
+	if (canReturn.value && !isCopy(groupDocument.value)) {
+		return html`<button class="button" type="button" title="Return this group to its annotator, with a reason (Shift U)" onClick=${askReturn}>Return to ${lease.value?.submittedBy}… <kbd>⇧U</kbd></button>`;
 	}
-	if (!canHandIn.value) return null;
+	if (!canSubmit.value) return null;
 	return html`<button class="button button--primary" type="button" aria-disabled=${isMoving.value || frozen.value !== ''} title=${frozen.value || 'Submit this group for review (Shift F)'} onClick=${submitAndNext}>Submit and next <kbd>⇧F</kbd></button>`;
 }
 
@@ -36,7 +36,7 @@ export function HandIn() {
 export function LeaseBar() {
 	const now = useNow(20_000);
 	const held = lease.value;
-	if (held?.state === 'mine' && held.back) return html`<div class="bar" data-tone="info" role="status"><p><${HandedBack} back=${held.back} /> Submit it again when it is fixed.</p></div>`;
+	if (held?.state === 'mine' && held.back) return html`<div class="bar" data-tone="info" role="status"><p><${ReturnedNote} back=${held.back} /> Submit it again when it is fixed.</p></div>`;
 	if (!held || held.state === 'mine') return null;
 	const [other] = others.value;
 	const since = other ? `${ago(Date.parse(other.since), now)}` : '';

@@ -10,7 +10,7 @@ import { ApiError } from '../api/problem.js';
 import { beginSignOn } from '../api/sign_on.js';
 import { withForm } from '../lib/field.js';
 import { outbox } from '../state/outbox.js';
-import { askWhoIsThere, me, ways, welcome } from '../state/me.js';
+import { loadSession, me, ways, welcome } from '../state/me.js';
 import { plural } from '../lib/format.js';
 import { FormError } from './form_error.js';
 import { MaintenanceBar } from './maintenance_bar.js';
@@ -111,7 +111,7 @@ export function EntryPage({ title, heading, wide = false, children }) {
 	useEffect(() => { document.title = `${title} · Touchline`; }, [title]);
 	useEffect(() => {
 		// Before anybody has logged in no stream tells of another notice of maintenance.
-		const timer = setInterval(askWhoIsThere, ASK_AGAIN);
+		const timer = setInterval(loadSession, ASK_AGAIN);
 		return () => clearInterval(timer);
 	}, []);
 	return html`

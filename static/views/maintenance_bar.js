@@ -6,7 +6,7 @@ import { html } from 'htm/preact';
 import { deleteMaintenance, putMaintenance } from '../api/maintenance.js';
 import { useAttempt } from '../lib/attempt.js';
 import { withForm } from '../lib/field.js';
-import { banner, putBannerAway, shownBanner, tellBanner } from '../state/maintenance.js';
+import { banner, hideBanner, shownBanner, publishBanner } from '../state/maintenance.js';
 import { FormError } from './form_error.js';
 
 /** @param {string} at */
@@ -19,7 +19,7 @@ export function MaintenanceBar() {
 		<div class="maintenance" aria-live="polite">${one ? html`
 			<div class="bar" data-tone="warn">
 				<p><strong>Maintenance:</strong> ${one.text}${one.until ? html` <span class="maintenance__until">(until ${timeText(one.until)})</span>` : null}</p>
-				<button class="button" type="button" aria-label="Dismiss the notice of maintenance" onClick=${putBannerAway}>Dismiss</button>
+				<button class="button" type="button" aria-label="Dismiss the notice of maintenance" onClick=${hideBanner}>Dismiss</button>
 			</div>` : null}
 		</div>
 	`;
@@ -33,12 +33,12 @@ export function MaintenanceCard() {
 	const one = banner.value;
 	const set = withForm(async (said, form) => {
 		const wanted = { text: String(said.get('text')), starts: timeOf(said.get('starts')), until: timeOf(said.get('until')) };
-		if (await attempt(putMaintenance(wanted), tellBanner)) form.reset();
+		if (await attempt(putMaintenance(wanted), publishBanner)) form.reset();
 	});
 	return html`
 		<section class="card" aria-labelledby="people-maintenance">
 			<h2 id="people-maintenance">Maintenance notice</h2>
-			${one ? html`<p>Set now: “${one.text}”${one.starts ? `, from ${timeText(one.starts)}` : ''}${one.until ? `, until ${timeText(one.until)}` : ''}. <button class="button button--small" type="button" disabled=${busy} onClick=${() => attempt(deleteMaintenance(), () => tellBanner(null))}>Clear</button></p>` : null}
+			${one ? html`<p>Set now: “${one.text}”${one.starts ? `, from ${timeText(one.starts)}` : ''}${one.until ? `, until ${timeText(one.until)}` : ''}. <button class="button button--small" type="button" disabled=${busy} onClick=${() => attempt(deleteMaintenance(), () => publishBanner(null))}>Clear</button></p>` : null}
 			<form class="form" onSubmit=${set}>
 				<div class="form__row"><label for="maintenance-text">Text</label><input class="field" id="maintenance-text" name="text" required maxlength="300" autocomplete="off" placeholder="Upgrade at 18:00, about ten minutes" /><small>Everybody sees it on every page, also before they log in.</small></div>
 				<div class="form__columns">

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useEffect } from 'preact/hooks';
 
 import { getJobs } from '../api/jobs.js';
-import { getDatasetPaint, readDatasetPaint, takeDatasetPaintBack } from '../api/paint.js';
+import { getDatasetPaint, readDatasetPaint, revertPaint } from '../api/paint.js';
 import { capital, count, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
 import { isOver } from '../state/jobs.js';
@@ -84,7 +84,7 @@ export function PaintCard({ dataset }) {
 						busy=${busy} act=${() => send(() => readDatasetPaint(dataset.id, null))} kind=${left ? 'button--primary' : ''}
 						title=${left ? `${plural(left, 'picture')} to read; pictures that fit are only compared` : 'Every picture is compared with what was read of it'}
 					>${isRead ? 'Read again' : 'Read the pictures'}<//>
-					${isRead ? html`<${JobButton} busy=${busy} act=${() => send(() => takeDatasetPaintBack(dataset.id))} title="Restores the previous cameras of all groups">Undo the last reading<//>` : null}
+					${isRead ? html`<${JobButton} busy=${busy} act=${() => send(() => revertPaint(dataset.id))} title="Restores the previous cameras of all groups">Undo the last reading<//>` : null}
 				</p>` : html`
 				<p class="paint-card__actions">The policy finds cameras from the lines alone; the paint of ${plural(pictures, 'picture')} could place them more exactly. <a class="link" href=${pageAddress(dataset.name, 'policy')}>Choose the policy <em>touchline</em></a>, then read the pictures here.</p>`}
 			${job ? html`<div class="paint-card__actions"><${JobProgress} job=${job} /></div>` : null}

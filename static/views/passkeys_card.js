@@ -8,7 +8,7 @@ import { deletePasskey, getPasskeys, makePasskey, passkeysWork } from '../api/pa
 import { ApiError } from '../api/problem.js';
 import { useAttempt } from '../lib/attempt.js';
 import { withForm } from '../lib/field.js';
-import { askWhoIsThere } from '../state/me.js';
+import { loadSession } from '../state/me.js';
 import { FormError } from './form_error.js';
 import { proof } from './proof.js';
 import { Codes, OneField } from './second_factor.js';
@@ -29,10 +29,10 @@ function usePasskeys(changed) {
 		items, codes, leaving, error, busy, setLeaving,
 		unavailable: unavailable ?? (passkeysWork() ? null : 'This browser does not support passkeys.'),
 		/** @param {string} name @param {string} password */
-		make: (name, password) => act(makePasskey(name, password || null), (done) => { setCodes(done.codes); read(); changed(); if (!done.codes.length) askWhoIsThere(); }),
+		make: (name, password) => act(makePasskey(name, password || null), (done) => { setCodes(done.codes); read(); changed(); if (!done.codes.length) loadSession(); }),
 		/** @param {PasskeyJson} one @param {string} password */
 		remove: (one, password) => act(deletePasskey(one.id, password || null), () => { setLeaving(null); read(); changed(); }),
-		close: () => { setCodes([]); askWhoIsThere(); },
+		close: () => { setCodes([]); loadSession(); },
 	};
 }
 

@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useRef, useState } from 'preact/hooks';
 
-import { acceptNoise, takeNoiseBack } from '../api/match_estimates.js';
+import { acceptNoise, revertNoise } from '../api/match_estimates.js';
 import { getPolicies, getPolicy, putPolicy, putPolicyText } from '../api/policies.js';
 import { withValue } from '../lib/field.js';
 import { saveText } from '../lib/save_text.js';
@@ -98,7 +98,7 @@ function NoiseOf({ one, policy, busy, send }) {
 				${changesOf(noise) ? html`<p class="note">The button sets ${changesOf(noise)}.</p>` : null}
 				<p class="buttons">
 					${isNews(noise) ? html`<${JobButton} busy=${busy} act=${() => act(() => acceptNoise(one.id))}>Use the estimates and solve<//>` : null}
-					${noise.used?.length ? html`<${JobButton} busy=${busy} act=${() => act(() => takeNoiseBack(one.id))}>Use one noise for all balls<//>` : null}
+					${noise.used?.length ? html`<${JobButton} busy=${busy} act=${() => act(() => revertNoise(one.id))}>Use one noise for all balls<//>` : null}
 				</p>`)}
 		<//>
 	`;

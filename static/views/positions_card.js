@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { getPositions, sharePositions, takePositionsBack } from '../api/match_estimates.js';
+import { getPositions, sharePositions, revertPositions } from '../api/match_estimates.js';
 import { matchName } from '../lib/match_name.js';
 import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
@@ -45,7 +45,7 @@ export function Positions({ dataset }) {
 				<${MatchPosition}
 					key=${one.match} one=${one} used=${value.used} busy=${busy}
 					onShare=${() => send(() => sharePositions(dataset, one.match))}
-					onBack=${() => send(() => takePositionsBack(dataset, one.match))}
+					onBack=${() => send(() => revertPositions(dataset, one.match))}
 				/>`)}
 			note=${value.used ? null : html`<p>The policy does not use them: switch on <em>Use the shared position of a match</em>.</p>`}
 		/>

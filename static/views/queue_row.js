@@ -10,7 +10,7 @@ import { activeRow } from '../state/queue.js';
 import { reasonText } from '../state/reasons.js';
 import { isTicked, tickTo, ticks, turnTick } from '../state/queue_ticks.js';
 import { GATE_TITLES } from './gate_names.js';
-import { OpenComments } from './talk/open_comments.js';
+import { OpenComments } from './comments/open_comments.js';
 
 /** @import {GroupRow} from '../api/types.js' */
 

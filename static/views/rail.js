@@ -19,7 +19,7 @@ import { ViewTable } from './view_table.js';
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
 const FirstSteps = lazy(async () => (await import('./first_steps.js')).FirstSteps);
-const CommentsCard = lazy(async () => (await import('./talk/comments_card.js')).CommentsCard);
+const CommentsCard = lazy(async () => (await import('./comments/comments_card.js')).CommentsCard);
 const LessonCard = lazy(async () => (await import('./lesson_card.js')).LessonCard);
 
 /**

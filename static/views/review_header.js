@@ -12,7 +12,7 @@ import { redo, redoable, undo, undoable } from '../state/undo.js';
 import { batchId, goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
 import { standing } from '../state/walk.js';
 import { batch, lease } from '../state/leases.js';
-import { isCopy } from '../state/takes.js';
+import { isCopy } from '../state/independent_annotations.js';
 import { changedElsewhere } from '../state/live.js';
 import { lasting } from '../state/outbox.js';
 import { isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
@@ -20,7 +20,7 @@ import { openThreads } from '../state/threads.js';
 import { isBlind } from '../state/verdicts.js';
 import { Header } from './header.js';
 import { Presence } from './lease_bar.js';
-import { OpenComments } from './talk/open_comments.js';
+import { OpenComments } from './comments/open_comments.js';
 
 /** @import {Standing} from '../state/walk.js' */
 

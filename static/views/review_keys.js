@@ -5,33 +5,33 @@ import { ballName } from '../geometry/estimator.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { capital } from '../lib/format.js';
 import { toggleOccluded, toggleOutOfView } from '../state/ball_edits.js';
-import { dismissTold } from '../state/dismissals.js';
+import { dismissShown } from '../state/dismissals.js';
 import { drawHere, endDrawing, placeExpected, startDrawing } from '../state/drawing.js';
 import { moveCross } from '../state/drawing_cross.js';
 import { swapSides } from '../state/edits.js';
 import { draft, group, groupDocument, solution, submit, withdraw } from '../state/group.js';
-import { askHandBack, askTakeOver, canHandBack, canTakeOver, submitAndNext } from '../state/hand_back.js';
+import { askReturn, askTakeOver, canReturn, canTakeOver, submitAndNext } from '../state/return_group.js';
 import { redo, undo } from '../state/undo.js';
 import { backToInstant, stepInstant } from '../state/instants.js';
-import { canHandIn } from '../state/leases.js';
-import { isHeld, mend, mends, turnMend } from '../state/mends.js';
+import { canSubmit } from '../state/leases.js';
+import { isHeld, suggestion, suggestions, nextSuggestion } from '../state/suggestions.js';
 import { goBy, goFlagged, goNext, goPrevious, historyAddress } from '../state/navigation.js';
 import { announce, dismiss, notice } from '../state/notice.js';
 import { revertSelected } from '../state/revert.js';
 import { swapWarning, swappedViews } from '../state/sides.js';
-import { annotateOwn, guidelinesShown, markGold } from '../state/takes.js';
+import { annotateOwn, guidelinesShown, markGold } from '../state/independent_annotations.js';
 import { accept, askReason, askViewReason, cancelAsking, defer } from '../state/verdicts.js';
 import { filled, fitAll, fitPanel, isZoomed, toggleFilled, viewportOf, zoomTo } from '../state/viewports.js';
 import {
 	asking, boxes, cycleEstimator, cycleGain, drawing, editing, equalViews, estimator, focused, focusView, gain,
-	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, paintWhiskers, pinPlace, pointerPlace, projections,
+	gatesOpen, loupe, maximised, otherInstant, overlaysHidden, residualLines, pinPlace, pointerPlace, projections,
 	selected, stripCollapsed, toggleMaximised,
 } from '../state/workspace.js';
 import { navigate } from '../lib/router.js';
 import { compose } from '../state/threads.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 import { EDITOR_DOOR } from './calibration/open.js';
-import { mendNow } from './mend_actions.js';
+import { applySuggestion } from './suggestion_actions.js';
 import { acceptAll, acceptInHand, hasPredictions } from './prediction_parts.js';
 import { acceptProposed } from './proposal_parts.js';
 import { SCENE_KEYS } from './scene3d/scene3d.js';
@@ -210,7 +210,7 @@ const VERDICT = [
 	{ keys: ['s'], label: 'Defer and next', group: 'Verdict', needs: 'review', run: defer },
 	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', needs: 'annotate', run: useView },
 	{ keys: ['Shift+x'], label: 'Leave the focused view out; then a digit for the reason', group: 'Verdict', needs: 'annotate', run: askViewReason },
-	{ keys: ['Shift+s'], label: 'Dismiss the finding on the card: checked, fine', group: 'Verdict', needs: 'review', run: dismissTold },
+	{ keys: ['Shift+s'], label: 'Dismiss the finding on the card: checked, fine', group: 'Verdict', needs: 'review', run: dismissShown },
 	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', needs: 'review', run: askNote },
 	{ keys: ['Shift+c'], label: 'Comment at the pointer, or on the group', group: 'Verdict', needs: 'annotate', run: compose },
 ];
@@ -219,8 +219,8 @@ const VERDICT = [
 const NAVIGATE = [
 	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
 	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
-	{ keys: ['Shift+f'], label: 'Submit the group and go to the next, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canHandIn.value, run: () => { submitAndNext(); } },
-	{ keys: ['Shift+u'], label: 'Return the group to its annotator, with a reason', group: 'Verdict', needs: 'review', when: () => canHandBack.value, run: askHandBack },
+	{ keys: ['Shift+f'], label: 'Submit the group and go to the next, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canSubmit.value, run: () => { submitAndNext(); } },
+	{ keys: ['Shift+u'], label: 'Return the group to its annotator, with a reason', group: 'Verdict', needs: 'review', when: () => canReturn.value, run: askReturn },
 	{ keys: ['Shift+r'], label: 'Take over an independent annotation into the group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
 	{ keys: ['v'], label: 'Ten groups on', group: 'Navigate', run: () => { goBy(1, FAR); } },
 	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', run: () => { goBy(-1, FAR); } },
@@ -264,8 +264,8 @@ const VIEW = [
 	{
 		keys: ['Shift+w'], label: 'Error lines to the paint in the pictures, or to the annotated points', group: 'View',
 		run: () => {
-			paintWhiskers.value = !paintWhiskers.value;
-			announce(paintWhiskers.value ? 'Error lines lead to the paint.' : 'Error lines lead to the annotated points.');
+			residualLines.value = !residualLines.value;
+			announce(residualLines.value ? 'Error lines lead to the paint.' : 'Error lines lead to the annotated points.');
 		},
 	},
 	{ keys: ['Shift+t'], label: 'History of the group: who changed what, with pictures', group: 'View', run: openHistory },
@@ -295,11 +295,11 @@ const EDIT = [
 	},
 	{
 		keys: ['Enter'], label: 'Apply the fix that the card on the right offers', group: 'Edit', needs: 'annotate', once: true,
-		when: () => !editing.value && (mend.value !== null || isHeld.value), run: mendNow,
+		when: () => !editing.value && (suggestion.value !== null || isHeld.value), run: applySuggestion,
 	},
 	{
 		keys: ['Shift+Enter'], label: 'Show another fix', group: 'Edit',
-		when: () => mend.value !== null && mends.value.length > 1, run: () => turnMend(1),
+		when: () => suggestion.value !== null && suggestions.value.length > 1, run: () => nextSuggestion(1),
 	},
 	{
 		// Where the card offers nothing, Enter leads in.

@@ -11,9 +11,9 @@ import { picturesOf } from '../overlays/scene.js';
 import { absent } from '../state/arrival.js';
 import { conflict } from '../state/conflict.js';
 import { group, groupDocument, isPreview, solution } from '../state/group.js';
-import { question } from '../state/hand_back.js';
+import { question } from '../state/return_group.js';
 import { sceneShown } from '../state/scene3d.js';
-import { guidelinesShown, isCopy } from '../state/takes.js';
+import { guidelinesShown, isCopy } from '../state/independent_annotations.js';
 import { threads, withThreads } from '../state/threads.js';
 import { estimator, focused, loupe, maximised } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
@@ -30,8 +30,8 @@ import { usePaint } from './view_paint.js';
 
 const ConflictBar = lazy(async () => (await import('./conflict_bar.js')).ConflictBar);
 const Guidelines = lazy(async () => (await import('./guidelines.js')).Guidelines);
-const HandBackDialog = lazy(async () => (await import('./hand_back_dialog.js')).HandBackDialog);
-const TakeBar = lazy(async () => (await import('./take_bar.js')).TakeBar);
+const ReturnDialog = lazy(async () => (await import('./return_dialog.js')).ReturnDialog);
+const IndependentAnnotationBar = lazy(async () => (await import('./independent_annotation_bar.js')).IndependentAnnotationBar);
 const Loupe = lazy(async () => (await import('./loupe.js')).Loupe);
 
 /** What is focused or shown alone must exist in this group; before there is one, nothing is known. @param {string[]} letters */
@@ -90,9 +90,9 @@ export function ReviewPage() {
 	return html`
 		<div class="review" ref=${root}>
 			<${ReviewHeader} />
-			<div class="bars">${isCopy(groupDocument.value) ? html`<${TakeBar} />` : null}<${NoticeBar} /><${LeaseBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
+			<div class="bars">${isCopy(groupDocument.value) ? html`<${IndependentAnnotationBar} />` : null}<${NoticeBar} /><${LeaseBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
 			<${Workspace} />
-			${question.value ? html`<${HandBackDialog} />` : null}
+			${question.value ? html`<${ReturnDialog} />` : null}
 			${guidelinesShown.value ? html`<${Guidelines} />` : null}
 		</div>
 	`;

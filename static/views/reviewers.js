@@ -8,7 +8,7 @@ import { getBatches, getReviewers } from '../api/queue.js';
 import { ago, count } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
 import { useResource } from '../lib/resource.js';
-import { batchText, giveBatchAgain, takeBatchBack } from '../state/queue_batches.js';
+import { batchText, redoBatch, undoBatch } from '../state/queue_batches.js';
 import { Popover } from './popover.js';
 
 /** @import {DatasetJson} from '../api/types.js' */
@@ -49,12 +49,12 @@ function Batches({ dataset }) {
 	const items = batches.value?.items ?? [];
 	/** @param {typeof items[number]} batch */
 	async function undo({ id, changed, state }) {
-		await takeBatchBack({ kind: 'batch', dataset: dataset.name, batch: id, text: batchText(changed, state) });
+		await undoBatch({ kind: 'batch', dataset: dataset.name, batch: id, text: batchText(changed, state) });
 		batches.reload();
 	}
 	/** @param {typeof items[number]} batch */
 	async function redo({ id, changed, state }) {
-		await giveBatchAgain({ kind: 'batch', dataset: dataset.name, batch: id, text: batchText(changed, state) });
+		await redoBatch({ kind: 'batch', dataset: dataset.name, batch: id, text: batchText(changed, state) });
 		batches.reload();
 	}
 	if (items.length === 0) return null;

@@ -8,7 +8,7 @@ import { beginSecondFactor, confirmSecondFactor, deleteSecondFactor, getSecondFa
 import { ApiError } from '../api/problem.js';
 import { useAttempt } from '../lib/attempt.js';
 import { withForm } from '../lib/field.js';
-import { askWhoIsThere } from '../state/me.js';
+import { loadSession } from '../state/me.js';
 import { FormError } from './form_error.js';
 import { proof } from './proof.js';
 
@@ -62,7 +62,7 @@ function useFactor(again = 0) {
 		begin: (/** @type {string} */ password) => act(beginSecondFactor(password || null), setMade),
 		confirm: (/** @type {string} */ code) => act(confirmSecondFactor(code), (done) => { setCodes(done.codes); setMade(null); read(); }),
 		remove: (/** @type {string} */ password) => act(deleteSecondFactor(password || null), read),
-		close: () => { setCodes(null); askWhoIsThere(); },
+		close: () => { setCodes(null); loadSession(); },
 	};
 }
 

@@ -10,7 +10,7 @@ import { withTick, withValue } from '../lib/field.js';
 const OFF = 'This threshold is off: tick the box to use it';
 
 /** What becomes of a value that equals its threshold. */
-const ASKED = /** @type {{[asks: string]: string}} */ ({
+const COMPARISONS = /** @type {{[comparison: string]: string}} */ ({
 	'more than': 'Passes above this value; one that equals it does not, as in the paper', 'at least': 'Passes from this value on', 'at most': 'Passes up to this value',
 });
 
@@ -96,7 +96,7 @@ export function Threshold({ field, value, present, switched, change, idle }) {
 	}
 	return html`
 		<div class="threshold" data-changed=${changed}>
-			<label class="threshold__label" for=${id} title=${ASKED[field.asks ?? ''] ?? ''}>${field.label}${idle ? html`<small class="threshold__idle">${idle}</small>` : null}</label>
+			<label class="threshold__label" for=${id} title=${COMPARISONS[field.comparison ?? ''] ?? ''}>${field.label}${idle ? html`<small class="threshold__idle">${idle}</small>` : null}</label>
 			${field.optional ? html`
 				<label class="threshold__switch">
 					<input type="checkbox" checked=${value !== null} onChange=${withTick((ticked) => change(ticked ? switched : null))} />

@@ -6,14 +6,14 @@ import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
 import { useKeys } from '../lib/hooks.js';
 import { doubt, suggestedReason } from '../state/advice.js';
-import { frozen } from '../state/hand_back.js';
+import { frozen } from '../state/return_group.js';
 import { REASONS } from '../state/reasons.js';
 import {
 	accept, addNote, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
 } from '../state/verdicts.js';
 import { asking, pinPlace } from '../state/workspace.js';
 import { pinText } from '../lib/pins.js';
-import { HandIn } from './lease_bar.js';
+import { SubmitButton } from './lease_bar.js';
 import { SwapAsk } from './swap_ask.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
@@ -134,7 +134,7 @@ export function VerdictButtons({ group }) {
 	return html`
 		<div class="verdicts">
 			<${Ask} group=${group} />
-			<${HandIn} />
+			<${SubmitButton} />
 			<div class="verdicts__buttons">
 				<button
 					class="button button--accept" type="button" data-needs="review" onClick=${accept}

@@ -4,14 +4,14 @@
 import { html } from 'htm/preact';
 
 import { capital } from '../lib/format.js';
-import { dismissTold } from '../state/dismissals.js';
-import { mend, toldFinding } from '../state/mends.js';
+import { dismissShown } from '../state/dismissals.js';
+import { suggestion, shownFinding } from '../state/suggestions.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { pointTo } from '../state/workspace.js';
 import { PitchLink } from './findings.js';
 import { headline } from './verdict_text.js';
-import { MendBox } from './mend_box.js';
+import { SuggestionBox } from './suggestion_box.js';
 
 /** @import {GroupDocument, SolutionJson, VerdictJson} from '../api/types.js' */
 /** @import {Remark} from './verdict_text.js' */
@@ -39,8 +39,8 @@ function RemarkLink({ group, solution, remark: { view, letter, marking } }) {
 
 /** @param {{group: GroupDocument, solution: SolutionJson | null, live: boolean}} props */
 export function VerdictCard({ group, solution, live }) {
-	const { tone, over, title, text, remarks = [] } = headline(group, solution, mend.value);
-	const sure = toldFinding.value?.confidence ?? null;
+	const { tone, over, title, text, remarks = [] } = headline(group, solution, suggestion.value);
+	const sure = shownFinding.value?.confidence ?? null;
 	const { verdict } = group;
 	return html`
 		<section class="card verdict-card" data-tone=${tone === 'ok' && isBlind(group) ? 'warn' : tone} data-live=${live} aria-label="Result">
@@ -49,8 +49,8 @@ export function VerdictCard({ group, solution, live }) {
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
 			${remarks.map((remark) => html`<p class="verdict-card__text" data-remark=${remark.letter}><${RemarkLink} group=${group} solution=${solution} remark=${remark} />${' '}${remark.text}</p>`)}
 			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
-			<${MendBox} group=${group} solution=${solution} />
-			${toldFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="This finding was checked and is fine; Ctrl Z opens it again" onClick=${dismissTold}>Checked, fine <kbd>⇧S</kbd></button></p>` : null}
+			<${SuggestionBox} group=${group} solution=${solution} />
+			${shownFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="This finding was checked and is fine; Ctrl Z opens it again" onClick=${dismissShown}>Checked, fine <kbd>⇧S</kbd></button></p>` : null}
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">

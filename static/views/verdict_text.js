@@ -5,13 +5,13 @@ import { ballOf, diagonal } from '../geometry/preview.js';
 import { capital, pixelText, words } from '../lib/format.js';
 import { ballError } from '../overlays/scene.js';
 import { findingTitle, saysApart } from '../state/advice.js';
-import { toldFinding } from '../state/mends.js';
+import { shownFinding } from '../state/suggestions.js';
 import { openFindings } from '../state/open_findings.js';
 import { GATE_TITLES, gateLabel } from './gate_names.js';
 import { gradeOfView, uncertainViews } from './view_state.js';
 
 /** @import {GroupDocument, SolutionJson, ViewJson} from '../api/types.js' */
-/** @import {Mend} from '../state/mends.js' */
+/** @import {Suggestion} from '../state/suggestions.js' */
 
 /** @typedef {{view: string, letter: string, marking: string | null, text: string}} Remark   about a view, or a marking of it */
 /** @typedef {{tone: 'ok' | 'warn' | 'bad' | 'unseen', over: string, title: string, text: string, remarks?: Remark[]}} Headline */
@@ -28,7 +28,7 @@ function asked(group, solution, name) {
 /**
  * What there is to say about a group: the finding that the offered mend is for, else the one that explains most.
  *
- * @param {GroupDocument} group @param {SolutionJson | null} solution @param {Mend | null} offered
+ * @param {GroupDocument} group @param {SolutionJson | null} solution @param {Suggestion | null} offered
  * @returns {Headline}
  */
 export function headline(group, solution, offered) {
@@ -36,7 +36,7 @@ export function headline(group, solution, offered) {
 	return solution ? { ...found, remarks: [...uncertain(group, solution), ...(found.remarks ?? [])] } : found;
 }
 
-/** @param {GroupDocument} group @param {SolutionJson | null} solution @param {Mend | null} offered @returns {Headline} */
+/** @param {GroupDocument} group @param {SolutionJson | null} solution @param {Suggestion | null} offered @returns {Headline} */
 function sentences(group, solution, offered) {
 	if (!solution && offered?.title) return { tone: 'unseen', over: 'Not solved', title: offered.title, text: offered.sentence };
 	if (!solution) {
@@ -44,7 +44,7 @@ function sentences(group, solution, offered) {
 	}
 	const used = solution.ball?.views.length ?? 0;
 	const all = group.views.length;
-	const first = toldFinding.value;
+	const first = shownFinding.value;
 	const told = first ? { title: findingTitle(group, first), sentence: first.sentence } : offered?.title ? offered : null;
 	if (!solution.passes) {
 		const failing = solution.first_failing;
@@ -137,7 +137,7 @@ function unused(group, solution) {
 
 /** Cameras that the lines do not determine, unless the card speaks about them anyway. @param {GroupDocument} group @param {SolutionJson} solution @returns {Remark[]} */
 function uncertain(group, solution) {
-	const told = toldFinding.value;
+	const told = shownFinding.value;
 	return uncertainViews(group, solution)
 		.filter(({ view }) => !(told?.kind === 'under_constrained' && told.view === view.key))
 		.map(({ view, guess }) => ({ view: view.key, letter: view.letter, marking: null, text: `has an uncertain camera: its lines do not determine the ${guess}.` }));

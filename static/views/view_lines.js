@@ -70,12 +70,12 @@ export function Undrawn({ picture: { view, markings } }) {
 		${missing.length ? html`
 			<p class="view-lines__missing">${missing.length} visible, not drawn:</p>
 			<ul class="view-lines__undrawn">${missing.map(({ marking }) => html`
-				<li key=${marking}>${marking} <button class="mend__more" type="button" data-needs="annotate" title="Something hides it, or it is worn: JaC does not count it as missing" aria-label=${`${marking} is not visible`} onClick=${() => submit(markNotVisible(view, marking, true))}>not visible</button></li>`)}
+				<li key=${marking}>${marking} <button class="suggestion__more" type="button" data-needs="annotate" title="Something hides it, or it is worn: JaC does not count it as missing" aria-label=${`${marking} is not visible`} onClick=${() => submit(markNotVisible(view, marking, true))}>not visible</button></li>`)}
 			</ul>` : null}
 		${hidden.length ? html`
 			<p class="view-lines__missing">Marked as not visible:</p>
 			<ul class="view-lines__undrawn">${hidden.map((marking) => html`
-				<li key=${marking}>${marking} <button class="mend__more" type="button" data-needs="annotate" aria-label=${`${marking} is visible`} onClick=${() => submit(markNotVisible(view, marking, false))}>is visible</button></li>`)}
+				<li key=${marking}>${marking} <button class="suggestion__more" type="button" data-needs="annotate" aria-label=${`${marking} is visible`} onClick=${() => submit(markNotVisible(view, marking, false))}>is visible</button></li>`)}
 			</ul>` : null}
 	`;
 }

@@ -3,25 +3,25 @@
 
 import { useEffect, useMemo, useState } from 'preact/hooks';
 
-import { paintWhiskers } from '../state/workspace.js';
+import { residualLines } from '../state/workspace.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
 /** @import {KnownPaint} from '../state/review_paint.js' */
 
-/** @typedef {typeof import('../overlays/paint_whiskers.js').viewPaint} Draw */
+/** @typedef {typeof import('../overlays/residual_lines.js').viewPaint} Draw */
 
 /**
  * @param {ViewPicture[]} pictures @param {GroupDocument | null} saved
  * @returns {ViewPicture[]}
  */
 export function usePaint(pictures, saved) {
-	const wanted = paintWhiskers.value;
+	const wanted = residualLines.value;
 	const [read, setRead] = useState(/** @type {{group: number, known: KnownPaint, draw: Draw} | null} */ (null));
 	useEffect(() => {
 		if (!wanted || !saved) return undefined;
 		const controller = new AbortController();
-		Promise.all([import('../state/review_paint.js'), import('../overlays/paint_whiskers.js')]).then(([{ readAllPaint }, { viewPaint }]) => (
+		Promise.all([import('../state/review_paint.js'), import('../overlays/residual_lines.js')]).then(([{ readAllPaint }, { viewPaint }]) => (
 			readAllPaint(saved, controller.signal, (known) => setRead({ group: saved.id, known, draw: viewPaint }))
 		));
 		return () => controller.abort();

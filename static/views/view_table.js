@@ -7,7 +7,7 @@ import { gradeOfSize } from '../geometry/residual.js';
 import { fixed, percent, pixels } from '../lib/format.js';
 import { submit } from '../state/group.js';
 import { leftOutText } from '../state/reasons.js';
-import { focused, focusView, paintWhiskers } from '../state/workspace.js';
+import { focused, focusView, residualLines } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { Term } from './term.js';
 import { errorOf, gradesOf, jacOf, paintOf, unusedErrors } from './view_state.js';
@@ -54,10 +54,10 @@ function isUnmeasured({ view, solved }) {
 function PaintLine({ picture }) {
 	const { solved, view, paint: read } = picture;
 	const paint = paintOf(solved, read?.found);
-	if (!paint && isUnmeasured(picture) && !paintWhiskers.value) {
+	if (!paint && isUnmeasured(picture) && !residualLines.value) {
 		return html`
 			<tr class="numbers__aside" data-paint=${view.letter}>
-				<td colspan="7">paint: not compared with the camera <button class="mend__more" type="button" data-needs="annotate" aria-label=${`Compare the camera of view ${view.letter} with its paint`} onClick=${() => { paintWhiskers.value = true; }}>compare</button></td>
+				<td colspan="7">paint: not compared with the camera <button class="suggestion__more" type="button" data-needs="annotate" aria-label=${`Compare the camera of view ${view.letter} with its paint`} onClick=${() => { residualLines.value = true; }}>compare</button></td>
 			</tr>`;
 	}
 	if (!paint) return null;

@@ -117,7 +117,7 @@ def left_out(
         seen = observe(make_lines({marking: lines[marking]}), PITCH, size)
         parameters = ResectionProblem.of(size, policies[0]).parameters(found.camera)
         half = size.diagonal / 2
-        offsets, slopes = residuals(parameters, seen.curves, seen.sightings(), half)
+        offsets, slopes = residuals(parameters, seen.curves, seen.curve_points(), half)
         told = []
         for policy in policies:
             noise = view_line_noise(found, _used(found, rest), PITCH, size, policy)

@@ -80,7 +80,7 @@ def _measured(home: Path, groups: int) -> tuple[dict[str, float], float]:
 def _yields(store: Store) -> dict[str, float]:
     """Counted once, as a server does after its start; then first and later looks."""
     start = time.perf_counter()
-    YieldStore(store).keep_up(1)
+    YieldStore(store).update_table(1)
     found = {"yield counted anew": 1000 * (time.perf_counter() - start)}
     yields = YieldStore(store)
     start = time.perf_counter()

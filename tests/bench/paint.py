@@ -30,7 +30,7 @@ from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.agreement import agreement
 from app.paint.grass import field_of_play
 from app.paint.ridges import line_like
-from app.paint.snap import Snapped, snap
+from app.paint.snap import SnappedCamera, snap
 from app.paint.view_paint import paint_of
 from app.sample.render import render
 from app.sample.scene import Scene
@@ -69,7 +69,7 @@ class Shot:
     lines: Lines
     size: ImageSize
     clicked: Calibration
-    snapped: Snapped
+    snapped: SnappedCamera
     milliseconds: float
     solved: Calibration | None = None
     """Through a dataset: solved with what was kept of the picture."""
@@ -153,7 +153,7 @@ def shots_of(scene: Scene) -> Iterator[tuple[str, Shot]]:
         )
 
 
-def _snap(image: np.ndarray, found: Calibration) -> tuple[np.ndarray, Snapped, float]:
+def _snap(image: np.ndarray, found: Calibration) -> tuple[np.ndarray, SnappedCamera, float]:
     assert found.camera is not None
     known = None if found.covariance is None else np.reshape(found.covariance, (8, 8))
     began = time.thread_time()

@@ -25,7 +25,7 @@ from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import propose_rig
 from app.solving.solve import solve
 from app.solving.source_noise import BallSource, SourceFactors, estimate_sources
-from app.solving.triangulate import sights_of
+from app.solving.triangulate import ball_observations
 from tests.bench.table import print_table
 
 PERCENTILE, EXPECTED = 95, 1.96
@@ -153,7 +153,7 @@ def _misses(group: Group) -> tuple[Miss, ...]:
     if solution.ball is None:
         return ()
     calibrations = [view.calibration for view in solution.views]
-    return misses_of(solution.ball, sights_of(group.views, calibrations))
+    return misses_of(solution.ball, ball_observations(group.views, calibrations))
 
 
 def _with_stations(group: Group, change: Callable[[Station], Station]) -> Group:

@@ -8,7 +8,7 @@ from typing import Any
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "fixes.md"
 TEXT = """
-What the browser's buttons do, as requests. Findings (`views[].findings`, `GET /findings`) and remedies (`GET /groups/{id}/remedies`) say in
+What the browser's buttons do, as requests. Findings (`views[].findings`, `GET /findings`) and remedies (`GET /groups/{id}/suggestions`) say in
 `fix.action`, or `edit.action`, what they propose, and in `offers` hold the edit that does it, or in `guide` say where a person has to look or draw.
 Buttons and pictures are made of `offers`, `guide` and their captions alone: callers do not need to know the actions. Every request below takes `If-Match` with the
 **group's** ETag and answers the whole group, solved; `POST /groups/{id}/undo` takes it back. A static camera's lines belong to its station:
@@ -122,7 +122,7 @@ def fixes_page() -> str:
         "\n".join(["| `action` | what it does | edit |", "|---|---|---|", *actions]),
         "## Findings",
         "\n".join(["| kind | proposes | what else to do |", "|---|---|---|", *findings]),
-        "Remedies propose `move_point`, `drop_point`, `drop_marking`, `include_view`, `exclude_view`, `relabel`, `swap_sides`, `pick_ball` and "
+        "Suggestions propose `move_point`, `drop_point`, `drop_marking`, `include_view`, `exclude_view`, `relabel`, `swap_sides`, `pick_ball` and "
         "`free_picture` where the solver has tried out that they help, and `look_ball` and `draw_marking` where a person has to look.",
     ]
     return "\n\n".join(parts) + "\n"

@@ -12,10 +12,10 @@ from playwright.sync_api import Page, expect
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.agreement.service import after_hand_in
+from app.features.agreement.service import after_submission
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
-from app.features.independent_annotations.service import begin_take
+from app.features.independent_annotations.service import begin_annotation
 from app.features.people import links
 from app.features.people.members import give_role
 from app.features.people.roles import Role
@@ -71,11 +71,11 @@ def verdict(page: Page, group: int = 1) -> Any:
 
 def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
     """Hand in what a person made of a group; its ball moved by so many pixels."""
-    copy = begin_take(store, group, person=person).group
+    copy = begin_annotation(store, group, person=person).group
     state = load(store, copy)
     view = next(view for view in state.group.views if view.ball and view.ball.box)
     if moved and view.ball and view.ball.box:
         ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
         state = submit(store, copy, SetBall(view.key, ball), if_match=state.etag, actor=person)
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
-    return after_hand_in(store, copy)
+    return after_submission(store, copy)

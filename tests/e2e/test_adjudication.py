@@ -10,8 +10,8 @@ from playwright.sync_api import Page, expect
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.agreement.service import after_hand_in
-from app.features.independent_annotations.service import begin_take, hand_in
+from app.features.agreement.service import after_submission
+from app.features.independent_annotations.service import begin_annotation, submit_annotation
 from tests.e2e.screen import passing, until, withdraw_verdict
 from tests.e2e.team import annotate
 from tests.e2e.test_access import serious_in_both
@@ -66,9 +66,9 @@ def test_two_who_agree_without_a_verdict_are_told_alike_by_queue_and_agreement(
     store = Store.open(Settings(home=home))
     try:
         for person in ("kim", "lou"):
-            take = begin_take(store, group, person=person)
-            hand_in(store, take.id, actor=person)
-            came_to = after_hand_in(store, take.group)
+            take = begin_annotation(store, group, person=person)
+            submit_annotation(store, take.id, actor=person)
+            came_to = after_submission(store, take.group)
         assert came_to == "agreed"
     finally:
         store.close()

@@ -173,7 +173,7 @@ class TestBatches:
         judged(crew.log_in("bob"), first, "rejected", reason="bad_calibration")
         carl = crew.log_in("carl")
         sent(carl, "PUT", f"/batches/{friday}/groups/{second}/lease", {"take_over": False})
-        sent(carl, "PUT", f"/batches/{friday}/groups/{second}/hand-in")
+        sent(carl, "PUT", f"/batches/{friday}/groups/{second}/submission")
         # From then on its annotators do not see the groups themselves.
         page.reload()
         carry_out(page, gold, {})

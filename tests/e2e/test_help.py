@@ -108,8 +108,8 @@ class TestFound:
     def test_each_part_has_an_address(self, open_page: OpenPage) -> None:
         page = open_page("/help/words")
         expect(page.get_by_role("tab", name="Glossary")).to_have_attribute("aria-selected", "true")
-        page.get_by_label("Find a word").fill("lineage")
-        expect(page.locator(".help-words dt")).to_have_text(["lineage"])
+        page.get_by_label("Find a word").fill("revision chain")
+        expect(page.locator(".help-words dt")).to_have_text(["revision chain"])
         page.get_by_role("tab", name="Legend").click()
         expect(page.locator(".legend__row").first).to_be_visible()
         expect(page).to_have_url(re.compile("/help/legend$"))
@@ -327,7 +327,7 @@ class TestFiveKeys:
     def mend(screen: Screen, lesson: Lesson, scene: Scene) -> int:
         page = screen.page
         before = screen.document()["etag"]
-        expect(page.locator(".mend .button--fix")).to_be_visible()
+        expect(page.locator(".suggestion .button--fix")).to_be_visible()
         screen.press("Enter")
         # It may lead to a place, which it shows with the next frame.
         screen.drawn()

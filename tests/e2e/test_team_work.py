@@ -9,7 +9,7 @@ from typing import Any
 from playwright.sync_api import Page, expect
 
 from app.db.store import Store
-from app.features.batches.leases import Leases, Worker
+from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, make_batch
 from app.features.people.roles import Role
 from tests.e2e.screen import TWO_FRAMES, Screen, hears, holding, until
@@ -245,9 +245,9 @@ class TestWork:
 
         def submitted(store: Store) -> tuple[int, int]:
             batch = make_batch(store, "sample", new, actor="local").id
-            leases, sina = Leases(store), Worker("sina")
+            leases, sina = Leases(store), BatchMember("sina")
             copy = leases.next(batch, sina).group
-            leases.hand_in(batch, copy, sina, actor="sina")
+            leases.submit(batch, copy, sina, actor="sina")
             return batch, copy
 
         batch, copy = in_store(team_home, submitted)
@@ -285,7 +285,10 @@ def judge_alone(page: Page, batch: str, keys: list[str], *, unseen: dict[str, in
     for name, other in unseen.items():
         assert page.request.get(f"/api/v1/groups/{other}").status == 404
         assert name not in page.locator("main").inner_text()
-    assert len(page.request.get("/api/v1/datasets/sample/takes").json()["items"]) == 1
+    assert (
+        len(page.request.get("/api/v1/datasets/sample/independent-annotations").json()["items"])
+        == 1
+    )
     for key in keys:
         screen.press(key)
         screen.drawn()

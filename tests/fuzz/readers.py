@@ -143,7 +143,7 @@ class Readers:
         done = import_source(self.store, "fuzz", source, self.settings, dry_run=True)
         _require_said(done.report)
         json_text(done.values()).encode()
-        done.nothing_read()
+        done.nothing_read_error()
         if whole and kind not in ("cameras", "touchline"):
             _use(list(islice(_groups_of(source, self.settings), GROUPS)))
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.imports.edits_export import carry_out
+from app.features.imports.edits_export import export_edits
 from app.features.imports.ingest import ingest
 from app.features.policies.text import policy_to_yaml
 from app.formats.camera_json import camera_to_json
@@ -96,7 +96,7 @@ def _carried(folder: Path) -> Iterator[Case]:
     store = Store.open(Settings(home=folder / "home"))
     try:
         ingest(store, "seed", [broadcast(), static()], source="seed", actor="local")
-        carry_out(store, "seed", folder / "touchline")
+        export_edits(store, "seed", folder / "touchline")
         yield Case("touchline", _files(folder / "touchline"))
     finally:
         store.close()

@@ -172,8 +172,8 @@ def api_schema(application: FastAPI) -> schemathesis.BaseSchema:
 
 TAKES = (
     ("GET", "take"),
-    ("POST", "hand-in"),
-    ("POST", "hand-back"),
+    ("POST", "submission"),
+    ("POST", "return"),
     ("POST", "adoption"),
     ("DELETE", "gold"),
     ("PATCH", "gold"),
@@ -375,7 +375,7 @@ class TestOperations:
             # Of ordinary groups; own annotations and gold groups have tests of their own.
             silent -= {f"{name} /api/v1/groups/{{group}}/{rest}" for name, rest in TAKES}
             silent -= {f"{verb} /api/v1/groups/{{group}}/adjudication" for verb in ("GET", "POST")}
-            silent -= {"POST /api/v1/groups/{group}/adjudication/hand-back"}
+            silent -= {"POST /api/v1/groups/{group}/adjudication/return"}
             # Of a sample beside its truth, or a version with what people agreed upon.
             silent -= {"POST /api/v1/datasets/{dataset}/gold"}
             silent -= {"POST /api/v1/datasets/{dataset}/guidelines/pictures"}

@@ -52,7 +52,7 @@ FULL = (
     "listEvaluations", "listSavedViews", "listThreads", "listWebhooks", "listWebhookDeliveries",
     "listBatches", "listBatchGroups", "getMyWork", "getTeamWork", "listUsers", "listMembers",
     "listTokens", "listSessions", "listDatasets", "listUploads", "listVerdictBatches", "getAudit",
-    "getBell", "getHistory", "listRecordings", "listShots", "listPolicies", "listQueryFields", "listEvaluationFrames",
+    "getNotifications", "getHistory", "listRecordings", "listShots", "listPolicies", "listQueryFields", "listEvaluationFrames",
 )  # fmt: skip
 """Lists of which the home has several things, so that their second pages are looked at."""
 

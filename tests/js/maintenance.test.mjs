@@ -3,7 +3,7 @@ import { test } from 'node:test';
 
 globalThis.sessionStorage = { getItem: () => null, setItem() {} };
 globalThis.document = { addEventListener() {}, removeEventListener() {}, hidden: true, documentElement: { dataset: {}, hasAttribute: () => false } };
-const { banner, isTime, nextChange, putBannerAway, shownBanner, tellBanner } = await import('../../static/state/maintenance.js');
+const { banner, isTime, nextChange, hideBanner, shownBanner, publishBanner } = await import('../../static/state/maintenance.js');
 
 const AT = Date.parse('2030-01-01T12:00:00Z');
 const one = { text: 'Upgrade', starts: '2030-01-01T12:00:00Z', until: '2030-01-01T13:00:00Z' };
@@ -21,16 +21,16 @@ test('the next change is its beginning, then its end, then none', () => {
 
 test('one that was put away comes back when it changes', () => {
 	const plain = { text: 'Upgrade', starts: null, until: null };
-	tellBanner(plain);
+	publishBanner(plain);
 	assert.deepEqual(shownBanner.value, plain);
-	putBannerAway();
+	hideBanner();
 	assert.equal(shownBanner.value, null);
-	tellBanner({ ...plain });
+	publishBanner({ ...plain });
 	assert.equal(shownBanner.value, null);
-	tellBanner({ ...plain, text: 'Later' });
+	publishBanner({ ...plain, text: 'Later' });
 	assert.equal(shownBanner.value?.text, 'Later');
-	tellBanner(undefined);
+	publishBanner(undefined);
 	assert.equal(banner.value?.text, 'Later');
-	tellBanner(null);
+	publishBanner(null);
 	assert.equal(shownBanner.value, null);
 });

@@ -1,11 +1,11 @@
 import assert from 'node:assert/strict';
 import { afterEach, describe, it } from 'node:test';
 
-import { takePositionsBack } from '../../static/api/match_estimates.js';
+import { revertPositions } from '../../static/api/match_estimates.js';
 
 const { fetch } = globalThis;
 
-describe('takePositionsBack', () => {
+describe('revertPositions', () => {
 	afterEach(() => { globalThis.fetch = fetch; });
 
 	it('is sent under a key, so that a repetition takes back no more', async () => {
@@ -15,7 +15,7 @@ describe('takePositionsBack', () => {
 			sent.push(request);
 			return new Response('{}');
 		});
-		await takePositionsBack(3, 'a b');
+		await revertPositions(3, 'a b');
 		const [[address, { method, headers }]] = sent;
 		assert.deepEqual([address, method], ['/api/v1/datasets/3/positions?match=a+b', 'DELETE']);
 		assert.match(headers['idempotency-key'], /^[0-9a-f]{32}$/);

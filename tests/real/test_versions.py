@@ -18,7 +18,7 @@ from app.features.datasets.tables import GroupModel
 from app.features.exports.service import export
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
-from app.features.imports.merge import carry_in
+from app.features.imports.merge import merge_edits
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze
@@ -66,7 +66,7 @@ def homes(tmp_path_factory: pytest.TempPathFactory):
     carried = tmp_path_factory.mktemp("carried") / "issia.zip"
     export(one, "issia", "touchline", carried)
     report = Report()
-    carry_in(two, "other", carried, report, DEFAULT_LIMITS, source="a", actor="ben")
+    merge_edits(two, "other", carried, report, DEFAULT_LIMITS, source="a", actor="ben")
     assert report.problems == []
     solve_dataset(two, "other")
     yield one, two

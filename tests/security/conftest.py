@@ -31,7 +31,7 @@ from tests.integration.conftest import picture
 from tests.provider import CLIENT, SECRET, Provider, providing
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Asker
-from tests.security.door import Door
+from tests.security.door import ClassLimiter
 from tests.security.table import CORPUS
 from tests.security.team import Team
 from tests.videos import write_video
@@ -187,7 +187,7 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
         # Everybody of these tests comes from one address within a minute.
         patch.setattr(tries, "OF_AN_ADDRESS", parse("1000/minute"))
         patch.setattr(tries, "CHALLENGES_OF_AN_ADDRESS", parse("1000/minute"))
-        passwords._nobodys.cache_clear()
+        passwords._placeholder_hash.cache_clear()
         app = create_app(settings)
         with listen("127.0.0.1", 0) as (socket, address):
             server = make_server(app)
@@ -199,18 +199,18 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
             yield made
             server.should_exit = True
             thread.join(SECONDS)
-        passwords._nobodys.cache_clear()
+        passwords._placeholder_hash.cache_clear()
 
 
 @pytest.fixture
-def door(team: Team, provider: Provider) -> Iterator[Door]:
+def door(team: Team, provider: Provider) -> Iterator[ClassLimiter]:
     provider.behave()
-    yield Door(team, provider)
+    yield ClassLimiter(team, provider)
     provider.behave()
 
 
 @pytest.fixture
-def ruled(door: Door, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+def ruled(door: ClassLimiter, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Lets the operator have said something else of whom to let in."""
 
     def rule(**other: Any) -> None:

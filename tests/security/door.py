@@ -20,7 +20,7 @@ BEGIN, FINISH = f"{API}/session/sign-on/begin", f"{API}/session/sign-on"
 
 
 @dataclass
-class Door:
+class ClassLimiter:
     """Somebody before the team's server, who comes by the provider."""
 
     team: Team

@@ -39,7 +39,7 @@ def team(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
 
 def begun(team: Apart, name: str) -> dict[str, object]:
     """The document of somebody's own copy of the one group."""
-    take = team.ask(name, "POST", "/groups/1/takes")
+    take = team.ask(name, "POST", "/groups/1/independent-annotations")
     assert take.status_code == 201, take.text
     found = team.ask(name, "GET", f"/groups/{take.json()['group']}")
     assert found.status_code == 200, found.text
@@ -94,13 +94,13 @@ def test_its_person_and_the_leads_see_it_and_no_list_has_it(team: Apart) -> None
     for name in ("berta", "lea", "anna"):
         names = [one["name"] for one in team.ask(name, "GET", "/datasets").json()["items"]]
         assert names == ["demo"]
-    mine = team.ask("anna", "GET", "/datasets/demo/takes").json()["items"]
-    every = team.ask("lea", "GET", "/datasets/demo/takes").json()["items"]
+    mine = team.ask("anna", "GET", "/datasets/demo/independent-annotations").json()["items"]
+    every = team.ask("lea", "GET", "/datasets/demo/independent-annotations").json()["items"]
     assert {one["person"] for one in mine} <= {"anna"}
     assert "berta" in {one["person"] for one in every}
-    for target in (f"{at}/hand-in", f"{at}/adoption", f"{at}/hand-back"):
+    for target in (f"{at}/submission", f"{at}/adoption", f"{at}/return"):
         assert team.ask("anna", "POST", target).status_code == 404
-    taken = team.ask("berta", "POST", f"{at}/hand-in")
+    taken = team.ask("berta", "POST", f"{at}/submission")
     assert taken.status_code == 200, taken.text
     assert team.ask("berta", "POST", f"{at}/adoption").status_code == 403
     adopted = team.ask("lea", "POST", f"{at}/adoption")

@@ -17,7 +17,7 @@ import pytest
 
 from app.features.imports.ingest import ingest
 from app.features.independent_annotations import known_truth as mixing
-from app.features.independent_annotations.queries import GOLD, takes_in
+from app.features.independent_annotations.queries import GOLD, annotations_in
 from app.features.people.roles import Role
 from app.features.solutions.service import solve_dataset
 from app.soccer.media import Media
@@ -33,8 +33,8 @@ SAID = {
     f"PATCH {API}/views/{{view}}/ball": {"box": [*BALL[:3], 30.0]},
     f"PATCH {API}/views/{{view}}": {"included": False},
     f"PUT {API}/groups/{{group}}/verdict": {"state": "deferred"},
-    f"POST {API}/groups/{{group}}/hand-back": {"reason": "mine"},
-    f"POST {API}/batches/{{batch}}/groups/{{group}}/hand-back": {"reason": "mine"},
+    f"POST {API}/groups/{{group}}/return": {"reason": "mine"},
+    f"POST {API}/batches/{{batch}}/groups/{{group}}/return": {"reason": "mine"},
 }
 """Bodies with which routes get to what they would change."""
 PEOPLE = {"olaf": Role.ANNOTATOR, "rita": Role.REVIEWER, "anna": Role.ANNOTATOR}
@@ -191,7 +191,7 @@ def play(team: Apart, person: str, batch: int) -> Played:
         etag = {"If-Match": document["etag"]}
         drawn = team.ask(person, "PATCH", f"/views/{view['id']}/ball", {"box": BALL}, **etag)
         assert drawn.status_code == 200, drawn.text
-        done = team.ask(person, "PUT", f"/batches/{batch}/groups/{copy}/hand-in")
+        done = team.ask(person, "PUT", f"/batches/{batch}/groups/{copy}/submission")
         assert done.status_code == 200, done.text
         found |= features_of("hand-in", done)
         for about in (True, False):
@@ -201,7 +201,7 @@ def play(team: Apart, person: str, batch: int) -> Played:
         played.found.append(found)
         played.pictures.append(pictures_of(team, person, document))
     with team.store.read() as session:
-        takes = {take.copy_id: take for take in takes_in(session, 1, person)}
+        takes = {take.copy_id: take for take in annotations_in(session, 1, person)}
     for copy in played.copies:
         played.gold.append(takes[copy].kind == GOLD)
         played.originals.append(takes[copy].group_id)
@@ -310,7 +310,7 @@ class TestGold:
         person, cheat = "olaf", played
         ask = made.team.ask
         with made.team.store.read() as session:
-            before = takes_in(session, 1, person)
+            before = annotations_in(session, 1, person)
         for copy in (cheat.copies[cheat.gold.index(True)], cheat.copies[cheat.gold.index(False)]):
             document = ask(person, "GET", f"/groups/{copy}").json()
             etag = {"If-Match": document["etag"]}
@@ -321,11 +321,11 @@ class TestGold:
                 ("PATCH", f"/views/{view}", {"included": False}),
                 ("POST", f"/groups/{copy}/undo", None),
                 ("POST", f"/groups/{copy}/redo", None),
-                ("POST", f"/groups/{copy}/hand-in", None),
-                ("POST", f"/groups/{copy}/hand-back", {"reason": "mine"}),
-                ("DELETE", f"/batches/{batch}/groups/{copy}/hand-in", None),
-                ("PUT", f"/batches/{batch}/groups/{copy}/hand-in", None),
-                ("POST", f"/batches/{batch}/groups/{copy}/hand-back", {"reason": "mine"}),
+                ("POST", f"/groups/{copy}/submission", None),
+                ("POST", f"/groups/{copy}/return", {"reason": "mine"}),
+                ("DELETE", f"/batches/{batch}/groups/{copy}/submission", None),
+                ("PUT", f"/batches/{batch}/groups/{copy}/submission", None),
+                ("POST", f"/batches/{batch}/groups/{copy}/return", {"reason": "mine"}),
                 ("PUT", f"/groups/{copy}/verdict", state),
                 ("PUT", f"/groups/{copy}/verdict", {"state": "deferred"}),
                 ("POST", f"/datasets/{dataset}/verdicts", {"q": f"id:{copy}", "state": "deferred"}),
@@ -337,13 +337,13 @@ class TestGold:
             (one,) = ask(person, "POST", f"/datasets/{dataset}/edits", bulk).json()["items"]
             assert (one["outcome"], one["status"]) == ("refused", 409)
         with made.team.store.read() as session:
-            assert takes_in(session, 1, person) == before
+            assert annotations_in(session, 1, person) == before
 
     def test_every_refused_change_of_a_copy_reads_the_same(
         self, made: Gold, played: Played
     ) -> None:
         with made.team.store.read() as session:
-            takes = {take.copy_id: take for take in takes_in(session, 1, "olaf")}
+            takes = {take.copy_id: take for take in annotations_in(session, 1, "olaf")}
         gold = played.copies[played.gold.index(True)]
         ordinary = played.copies[played.gold.index(False)]
         assert (takes[gold].settled, takes[ordinary].settled is None) == (None, False)
@@ -365,7 +365,7 @@ class TestReviewers:
             for group in (*groups, *made.golden):
                 assert ask("rita", "GET", f"/groups/{group}").status_code == 404
             assert ask("rita", "GET", "/datasets/demo/versions").status_code == 403
-            assert ask("rita", "POST", f"/groups/{copy}/hand-in").status_code == 200
+            assert ask("rita", "POST", f"/groups/{copy}/submission").status_code == 200
         assert ask("rita", "POST", f"/batches/{batch}/next", {}).json()["group"] is None
         assert ask("rita", "GET", f"/groups/{groups[0]}").status_code == 200
 
@@ -380,7 +380,7 @@ class TestReviewers:
         given = ask("anna", "POST", f"/batches/{plain}/next", {}).json()["group"]
         assert given == other and ask("anna", "GET", f"/groups/{other}").status_code == 200
         # Nor are the originals opened by the batch whose copies she annotates.
-        for target in ("hand-in", "lease"):
+        for target in ("submission", "lease"):
             at = f"/batches/{blind}/groups/{made.ordinary[3]}/{target}"
             assert ask("anna", "PUT", at, {} if target == "lease" else None).status_code == 404
         for batch in (blind, plain):

@@ -36,7 +36,7 @@ RANKS = [role.value for role in Role]
 SCOPE_OF = dict(zip(RANKS, ("read", "read", "annotate", "review", "lead", "admin"), strict=True))
 """The scope that lets a token do what a role may."""
 OTHERWISE = {f"POST {API}/exports": "export"}
-OF_PEOPLE = ("/session", "/sessions", "/tokens", "/bell")
+OF_PEOPLE = ("/session", "/sessions", "/tokens", "/notifications")
 """What no token may: sessions, passwords, tokens, and what a person is told."""
 LET_IN = {
     "read": {200, 404, 422},
@@ -244,7 +244,7 @@ class TestSessions:
         team.add("here-only", Role.NONE)
         assert team.ask("GET", f"{API}/jobs/1", role="here-only").status == 404
         assert by_threads == ["require_allowed", "missing"]
-        with team.store.peek():
+        with team.store.read_without_waiting():
             assert team.ask("GET", address, role="reviewer").status == 200
         assert by_threads == ["require_allowed", "missing", "_look_up"]
         assert team.ask("GET", address, Cookie="touchline-session=nobody").status == 401

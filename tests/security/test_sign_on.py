@@ -12,17 +12,19 @@ import pytest
 
 from app.features.people.devices import Attempts
 from app.features.people.links import make_first_link
-from app.features.people.logins import Way
+from app.features.people.logins import LoginMethod
 from app.features.people.roles import Role
 from app.features.people.second_factor import SecondFactors
 from app.features.people.service import change_person, find_person
 from app.features.people.sign_on import LASTS
-from tests.security.door import BEGIN, FINISH, Door, assert_refused, name_in, session_in
+from tests.security.door import BEGIN, FINISH, ClassLimiter, assert_refused, name_in, session_in
 from tests.security.team import API, SECRET, cookie_in
 
 
 class TestComingIn:
-    def test_an_invitation_links_the_account_which_logs_in_from_then_on(self, door: Door) -> None:
+    def test_an_invitation_links_the_account_which_logs_in_from_then_on(
+        self, door: ClassLimiter
+    ) -> None:
         link = door.invite("anna")
         entered = door.enter(link=link, to="/review/3?q=ball:low")
         assert name_in(entered) == "anna"
@@ -37,7 +39,7 @@ class TestComingIn:
         said = json.loads(door.team.ask("GET", f"{API}/audit", role="admin").body)["items"]
         assert "anna: logged in by single sign-on" in [one["sentence"] for one in said]
 
-    def test_the_session_that_a_browser_had_before_ends(self, door: Door) -> None:
+    def test_the_session_that_a_browser_had_before_ends(self, door: ClassLimiter) -> None:
         door.join("pinned")
         before = session_in(door.enter())
         address, cookie = door.begin()
@@ -46,7 +48,7 @@ class TestComingIn:
         assert door.team.ask("GET", f"{API}/sessions", Cookie=before).status == 401
         assert door.team.ask("GET", f"{API}/sessions", Cookie=session_in(after)).status == 200
 
-    def test_somebody_links_their_own_account_and_unlinks_it(self, door: Door) -> None:
+    def test_somebody_links_their_own_account_and_unlinks_it(self, door: ClassLimiter) -> None:
         cookie = door.team.add("lena", Role.LEAD)
         door.provider.who = {"sub": "s-lena", "email": "lena@club.example"}
         own = f"{API}/session/identity"
@@ -67,7 +69,7 @@ class TestComingIn:
         assert door.team.ask("GET", own, Cookie=entered).status == 401, "it began with the account"
         assert_refused(door.enter(), word="no person here is linked")
 
-    def test_the_first_admin_may_come_by_it(self, door: Door, monkeypatch: Any) -> None:
+    def test_the_first_admin_may_come_by_it(self, door: ClassLimiter, monkeypatch: Any) -> None:
         monkeypatch.setattr("app.features.people.links.count_able", lambda *_: 0)
         link = make_first_link(door.team.store, actor="local")
         assert link is not None
@@ -77,7 +79,7 @@ class TestComingIn:
         assert find_person(door.team.store, "root").role is Role.ADMIN
 
     def test_who_is_linked_is_taken_from_them_by_an_admin_or_with_their_rights(
-        self, door: Door
+        self, door: ClassLimiter
     ) -> None:
         door.join("gone")
         session = session_in(door.enter())
@@ -92,11 +94,13 @@ class TestComingIn:
 
 
 class TestStrangers:
-    def test_nobody_is_let_in_whom_nobody_here_knows(self, door: Door) -> None:
+    def test_nobody_is_let_in_whom_nobody_here_knows(self, door: ClassLimiter) -> None:
         door.provider.who = {"sub": "s-stranger", "preferred_username": "stranger"}
         assert_refused(door.enter(), word="no person here is linked")
 
-    def test_neither_name_nor_address_takes_over_an_account(self, door: Door, ruled: Any) -> None:
+    def test_neither_name_nor_address_takes_over_an_account(
+        self, door: ClassLimiter, ruled: Any
+    ) -> None:
         door.team.add("victim", Role.LEAD)
         claims = {"preferred_username": "victim", "name": "victim", "email": "victim@club.example"}
         for verified in (False, True):
@@ -107,7 +111,7 @@ class TestStrangers:
             ruled(new_role=None)
 
     def test_somebody_new_gets_the_role_that_the_operator_said(
-        self, door: Door, ruled: Any
+        self, door: ClassLimiter, ruled: Any
     ) -> None:
         ruled(new_role=Role.VIEWER, domains=frozenset({"club.example"}))
         door.provider.who = {"sub": "s-new", "preferred_username": "Nora.New@club.example"}
@@ -116,7 +120,7 @@ class TestStrangers:
         assert find_person(door.team.store, "nora.new").role is Role.VIEWER
         assert name_in(door.enter()) == "nora.new"
 
-    def test_only_a_verified_address_counts(self, door: Door, ruled: Any) -> None:
+    def test_only_a_verified_address_counts(self, door: ClassLimiter, ruled: Any) -> None:
         ruled(new_role=Role.VIEWER, domains=frozenset({"club.example"}))
         for claims in (
             {"email": "eve@club.example", "email_verified": False},
@@ -128,7 +132,7 @@ class TestStrangers:
             door.provider.who = {"sub": "s-eve", "preferred_username": "eve", **claims}
             assert_refused(door.enter(), word="e-mail address")
 
-    def test_who_leaves_the_group_comes_in_no_more(self, door: Door, ruled: Any) -> None:
+    def test_who_leaves_the_group_comes_in_no_more(self, door: ClassLimiter, ruled: Any) -> None:
         door.join("greta")
         ruled(group_claim="groups", groups=frozenset({"football"}))
         door.provider.who["groups"] = ["staff", "football"]
@@ -136,13 +140,13 @@ class TestStrangers:
         door.provider.who["groups"] = ["staff"]
         assert_refused(door.enter(), word="groups")
 
-    def test_who_is_disabled_stays_out(self, door: Door) -> None:
+    def test_who_is_disabled_stays_out(self, door: ClassLimiter) -> None:
         door.join("dora")
         person = find_person(door.team.store, "dora")
         change_person(door.team.store, person.id, actor="local", disabled=True)
         assert_refused(door.enter(), word="disabled")
 
-    def test_an_account_is_one_persons(self, door: Door) -> None:
+    def test_an_account_is_one_persons(self, door: ClassLimiter) -> None:
         door.join("one")
         link = door.invite("two")
         assert_refused(door.enter(link=link), 409, "another person")
@@ -156,7 +160,9 @@ class TestStrangers:
 
 
 class TestState:
-    def test_an_answer_is_of_the_browser_that_asked_and_counts_once(self, door: Door) -> None:
+    def test_an_answer_is_of_the_browser_that_asked_and_counts_once(
+        self, door: ClassLimiter
+    ) -> None:
         door.join("sam")
         address, cookie = door.begin()
         told = door.back(address)
@@ -169,7 +175,9 @@ class TestState:
         assert name_in(door.finish(told, cookie)) == "sam"
         assert_refused(door.finish(told, cookie), word="another browser")
 
-    def test_a_code_counts_once_and_only_with_the_secret_of_its_login(self, door: Door) -> None:
+    def test_a_code_counts_once_and_only_with_the_secret_of_its_login(
+        self, door: ClassLimiter
+    ) -> None:
         door.join("cody")
         first, mine = door.begin()
         used = door.back(first)
@@ -180,14 +188,16 @@ class TestState:
         third, cookie = door.begin()
         assert_refused(door.finish({**door.back(third), "code": fresh["code"]}, cookie))
 
-    def test_it_waits_ten_minutes(self, door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_it_waits_ten_minutes(
+        self, door: ClassLimiter, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         door.join("tim")
         address, cookie = door.begin()
         told, clock = door.back(address), door.sign_on._begun._clock
         monkeypatch.setattr(door.sign_on._begun, "_clock", lambda: clock() + LASTS)
         assert_refused(door.finish(told, cookie), word="too long")
 
-    def test_its_cookie_is_out_of_reach_and_short(self, door: Door) -> None:
+    def test_its_cookie_is_out_of_reach_and_short(self, door: ClassLimiter) -> None:
         sent = door.team.ask("POST", BEGIN, {}).headers["set-cookie"].lower()
         assert "httponly" in sent and "samesite=strict" in sent
         assert f"max-age={LASTS // timedelta(seconds=1)}" in sent
@@ -198,12 +208,12 @@ class TestState:
         assert ended.headers.get_list("set-cookie")[0].startswith('touchline_sign_on=""; ')
         assert "Max-Age=0" in ended.headers.get_list("set-cookie")[0]
 
-    def test_nobody_is_sent_elsewhere_then(self, door: Door) -> None:
+    def test_nobody_is_sent_elsewhere_then(self, door: ClassLimiter) -> None:
         outside = ("https://evil.example", "//evil.example", "/\\evil.example", "/\t/evil.example")
         for to in (*outside, "groups"):
             assert_refused(door.team.ask("POST", BEGIN, {"to": to}), 400, "/to")
 
-    def test_another_provider_does_not_answer_in_its_place(self, door: Door) -> None:
+    def test_another_provider_does_not_answer_in_its_place(self, door: ClassLimiter) -> None:
         door.join("ida")
         address, cookie = door.begin()
         told = door.back(address)
@@ -214,7 +224,7 @@ class TestState:
 
 class TestSecondFactor:
     @pytest.fixture
-    def codes(self, door: Door) -> list[str]:
+    def codes(self, door: ClassLimiter) -> list[str]:
         """Recovery codes of fay, who comes by the provider."""
         door.join("fay", Role.LEAD)
         cookie = session_in(door.enter())
@@ -227,7 +237,7 @@ class TestSecondFactor:
         return found
 
     def test_is_asked_for_as_after_a_password_unless_the_provider_vouches(
-        self, door: Door, ruled: Any, codes: list[str], monkeypatch: pytest.MonkeyPatch
+        self, door: ClassLimiter, ruled: Any, codes: list[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         # Counted in the database, as processes do that share one.
         attempts = Attempts(door.team.store)
@@ -250,7 +260,7 @@ class TestSecondFactor:
         assert name_in(door.enter()) == "fay"
 
     def test_one_that_is_required_is_enrolled_first_unless_the_provider_vouches(
-        self, door: Door, ruled: Any
+        self, door: ClassLimiter, ruled: Any
     ) -> None:
         door.join("ned")
         factors = SecondFactors(door.team.store)
@@ -264,7 +274,7 @@ class TestSecondFactor:
             factors.require(False, actor="local")
 
     def test_takes_a_fresh_login_where_there_is_no_password(
-        self, door: Door, monkeypatch: pytest.MonkeyPatch
+        self, door: ClassLimiter, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         door.join("fresh")
         cookie, own = session_in(door.enter()), f"{API}/session/second-factor"
@@ -276,7 +286,7 @@ class TestSecondFactor:
 
 
 class TestOnly:
-    def test_nothing_else_lets_in_and_what_did_ends(self, door: Door, ruled: Any) -> None:
+    def test_nothing_else_lets_in_and_what_did_ends(self, door: ClassLimiter, ruled: Any) -> None:
         door.join("oksana")
         entered = session_in(door.enter())
         asked = {
@@ -291,6 +301,6 @@ class TestOnly:
         assert ways == {"password": False, "sign_on": "Club"}
         logins = door.team.app.state.team.logins
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(logins, "_only", Way.SIGN_ON)
+            patch.setattr(logins, "_only", LoginMethod.SIGN_ON)
             assert door.team.ask("GET", f"{API}/sessions", role="viewer").status == 401
             assert door.team.ask("GET", f"{API}/sessions", Cookie=entered).status == 200

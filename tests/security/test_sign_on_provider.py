@@ -20,7 +20,7 @@ from app.features.people import provider as provider_answers
 from tests.provider import CLIENT, Provider, send_away, tell
 from tests.provider import SECRET as CLIENT_SECRET
 from tests.security.asking import Answer
-from tests.security.door import BEGIN, Door, assert_refused, name_in
+from tests.security.door import BEGIN, ClassLimiter, assert_refused, name_in
 from tests.security.team import cookie_in
 
 
@@ -43,7 +43,7 @@ def public_keys(provider: Provider) -> list[bytes]:
 
 
 class TestToken:
-    def test_says_what_was_asked_or_nobody_comes_in(self, door: Door) -> None:
+    def test_says_what_was_asked_or_nobody_comes_in(self, door: ClassLimiter) -> None:
         door.join("tom")
         now = int(time.time())
         for changed in (
@@ -66,13 +66,13 @@ class TestToken:
             door.provider.changed = changed
             assert_refused(door.enter(), word="not vouch")
 
-    def test_the_clocks_may_differ_by_a_minute(self, door: Door) -> None:
+    def test_the_clocks_may_differ_by_a_minute(self, door: ClassLimiter) -> None:
         door.join("clara")
         now = int(time.time())
         door.provider.changed = {"exp": now - 40, "iat": now - 300}
         assert name_in(door.enter()) == "clara"
 
-    def test_is_signed_by_the_provider_and_by_nobody_else(self, door: Door) -> None:
+    def test_is_signed_by_the_provider_and_by_nobody_else(self, door: ClassLimiter) -> None:
         door.join("ken")
         other = jwk.RSAKey.generate_key(2048, {"kid": "first"})
         signed = door.provider.signed
@@ -92,7 +92,7 @@ class TestToken:
             assert_refused(door.enter(), word="not vouch")
 
     def test_new_keys_of_the_provider_are_asked_for_but_not_by_everybodys_word(
-        self, door: Door
+        self, door: ClassLimiter
     ) -> None:
         door.join("nina")
         kept = door.sign_on._provider._keys
@@ -112,14 +112,14 @@ class TestProvider:
     """One that does not do as it should."""
 
     @pytest.fixture(autouse=True)
-    def forgetful(self, door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forgetful(self, door: ClassLimiter, monkeypatch: pytest.MonkeyPatch) -> None:
         """Nothing is remembered of it."""
         there = door.sign_on._provider
         monkeypatch.setattr(there, "_description", None)
         monkeypatch.setattr(there, "_keys", None)
 
     def test_that_never_ends_holds_nobody_up(
-        self, door: Door, monkeypatch: pytest.MonkeyPatch
+        self, door: ClassLimiter, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(provider_answers, "SECONDS", 2.0)
         answered, heard_out = threading.Event(), []
@@ -140,7 +140,7 @@ class TestProvider:
         assert_refused(refused, 409, "does not answer")
         assert not heard_out
 
-    def test_that_talks_too_much_is_not_heard_out(self, door: Door) -> None:
+    def test_that_talks_too_much_is_not_heard_out(self, door: ClassLimiter) -> None:
         sent = []
 
         def talk(handler: Any) -> None:
@@ -155,7 +155,7 @@ class TestProvider:
         assert sum(sent) < 10 * 2**20
 
     @pytest.mark.parametrize("path", ["/.well-known/openid-configuration", "/token", "/keys"])
-    def test_that_sends_us_elsewhere_is_not_followed(self, door: Door, path: str) -> None:
+    def test_that_sends_us_elsewhere_is_not_followed(self, door: ClassLimiter, path: str) -> None:
         door.provider.instead["/elsewhere"] = lambda handler: tell(handler, {"keys": []})
         there = f"{door.provider.address}/elsewhere"
         door.provider.instead[path] = lambda handler: send_away(handler, there)
@@ -164,25 +164,25 @@ class TestProvider:
         assert "/elsewhere" not in door.provider.asked
 
     @pytest.mark.parametrize("name", ["token_endpoint", "jwks_uri", "authorization_endpoint"])
-    def test_that_names_foreign_addresses_is_refused(self, door: Door, name: str) -> None:
+    def test_that_names_foreign_addresses_is_refused(self, door: ClassLimiter, name: str) -> None:
         path = "/.well-known/openid-configuration"
         for there in ("http://127.0.0.2:9/x", "https://127.0.0.1/x", "file:///etc/passwd", 7):
             described = {**door.provider.described(), name: there}
             door.provider.instead[path] = lambda handler, said=described: tell(handler, said)
             assert_refused(self.ends(door), 409, "TOUCHLINE_SSO_HOSTS")
 
-    def test_that_calls_itself_otherwise_is_refused(self, door: Door) -> None:
+    def test_that_calls_itself_otherwise_is_refused(self, door: ClassLimiter) -> None:
         described = {**door.provider.described(), "issuer": "https://evil.example"}
         path = "/.well-known/openid-configuration"
         door.provider.instead[path] = lambda handler: tell(handler, described)
         assert_refused(self.ends(door), 409, "does not answer as the provider")
 
     @pytest.mark.parametrize("said", [b"[1]", b"<html>", b'{"a":' * 9000, b"\xff"])
-    def test_that_talks_nonsense_is_refused(self, door: Door, said: bytes) -> None:
+    def test_that_talks_nonsense_is_refused(self, door: ClassLimiter, said: bytes) -> None:
         door.provider.instead["/token"] = lambda handler: tell(handler, said)
         assert_refused(self.ends(door), 409, "does not answer")
 
-    def ends(self, door: Door) -> Answer:
+    def ends(self, door: ClassLimiter) -> Answer:
         begun = door.team.ask("POST", BEGIN, {})
         if begun.status != 200:
             return begun

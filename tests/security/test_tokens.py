@@ -14,7 +14,7 @@ from sqlalchemy import update
 from app.features.imports.ingest import ensure_dataset
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.people import access_tokens
-from app.features.people.access_tokens import new_text
+from app.features.people.access_tokens import new_token_text
 from app.features.people.roles import Role, Scope
 from app.features.people.service import change_person, find_person
 from app.features.people.tables import AccessTokenModel
@@ -46,7 +46,7 @@ class TestTokens:
         assert team.ask("DELETE", f"{API}/tokens/{ended}", role="viewer").status == 404
         assert team.ask("DELETE", f"{API}/tokens/{ended}", role="keeps").status == 204
         told = set()
-        for bearer in (gone, expired, f"Bearer {new_text()}"):
+        for bearer in (gone, expired, f"Bearer {new_token_text()}"):
             answer = self.ask(team, bearer)
             assert answer.status == 401
             assert answer.headers["www-authenticate"].startswith("Bearer")
@@ -183,7 +183,7 @@ class TestTokens:
             assert (answer.status, b"no token sets a password" in answer.body) == (403, True)
         me = find_person(team.store, "admin").id
         own = team.ask("POST", f"{API}/users/{me}/link", role="admin")
-        assert (own.status, b"for themselves" in own.body) == (403, True)
+        assert (own.status, b"for yourself" in own.body) == (403, True)
 
     def test_no_token_makes_people_or_changes_their_rights(self, team: Team) -> None:
         sent = {"Authorization": team.bearer("admin"), "Origin": ""}
@@ -244,7 +244,7 @@ class TestTokens:
     ) -> None:
         monkeypatch.setattr(tries, "TOKENS_OF_AN_ADDRESS", parse("4/minute"))
         team.forget_tries()
-        guesses = [self.ask(team, f"Bearer {new_text()}") for _ in range(5)]
+        guesses = [self.ask(team, f"Bearer {new_token_text()}") for _ in range(5)]
         assert [answer.status for answer in guesses] == [401] * 4 + [429]
         assert 0 < int(guesses[-1].headers["retry-after"]) <= 60
         assert self.ask(team, team.bearer("read")).status == 200

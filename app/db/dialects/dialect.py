@@ -32,7 +32,7 @@ class Sharing(Protocol):
 
     is_shared: bool
 
-    def take(self, name: str) -> bool:
+    def claim(self, name: str) -> bool:
         """Claim something; False where another process, or this one, has it. Waits for nobody.
 
         Raises:
@@ -42,13 +42,13 @@ class Sharing(Protocol):
     def holds(self, name: str) -> bool:
         """Whether a claim of this process still stands."""
 
-    def give_back(self, name: str) -> None:
+    def release(self, name: str) -> None:
         """End a claim; one that is lost already is none."""
 
-    def tell(self, session: Session, word: str) -> None:
+    def publish(self, session: Session, word: str) -> None:
         """Say a word to the others once a transaction is kept."""
 
-    def hear(self, hearer: Hearer) -> None:
+    def subscribe(self, hearer: Hearer) -> None:
         """Call a function with what others say, once ``listen`` was called; it must be quick."""
 
     def listen(self) -> None:
@@ -63,7 +63,7 @@ class Alone:
 
     is_shared = False
 
-    def take(self, name: str) -> bool:
+    def claim(self, name: str) -> bool:
         """See ``Sharing``."""
         return True
 
@@ -71,13 +71,13 @@ class Alone:
         """See ``Sharing``."""
         return True
 
-    def give_back(self, name: str) -> None:
+    def release(self, name: str) -> None:
         """See ``Sharing``."""
 
-    def tell(self, session: Session, word: str) -> None:
+    def publish(self, session: Session, word: str) -> None:
         """See ``Sharing``."""
 
-    def hear(self, hearer: Hearer) -> None:
+    def subscribe(self, hearer: Hearer) -> None:
         """See ``Sharing``."""
 
     def listen(self) -> None:
@@ -89,11 +89,11 @@ class Alone:
 
 WRITE = {"touchline_write": True}
 """Options of an engine whose transactions take the write lock at their start."""
-GLANCE = {"touchline_glance": True}
+AUTOCOMMIT = {"touchline_glance": True}
 """Options of an engine that begins no transactions: each statement is one."""
 
 
-def unkeepable_text() -> InputError:
+def unstorable_text() -> InputError:
     """What is said of a text that one of the databases cannot keep; both refuse it."""
     return InputError(
         "a text holds a character that the database cannot keep, such as U+0000",
@@ -145,10 +145,10 @@ class Dialect(Protocol):
     def reading(self, engine: Engine) -> Engine:
         """The same engine for transactions that see one snapshot and keep nothing."""
 
-    def glancing(self, engine: Engine) -> Engine:
+    def autocommit_engine(self, engine: Engine) -> Engine:
         """The same engine without transactions: each statement is one, and sees one snapshot."""
 
-    def peeking(self, settings: Settings) -> Engine | None:
+    def nonblocking_engine(self, settings: Settings) -> Engine | None:
         """An engine without transactions whose one connection never waits; None where each statement
         has to, because the database is reached over a network."""
 

@@ -29,7 +29,7 @@ from sqlalchemy.dialects.postgresql.psycopg import PGDialect_psycopg
 from sqlalchemy.exc import ArgumentError, DataError, DBAPIError, NoSuchModuleError, OperationalError
 
 from app.config import Settings
-from app.db.dialects.dialect import GLANCE, Failure, Sharing
+from app.db.dialects.dialect import AUTOCOMMIT, Failure, Sharing
 from app.db.dialects.postgresql_sharing import Reported, ServerSharing
 from app.db.session import Session
 from app.errors import InputError, StorageError
@@ -87,7 +87,7 @@ SCAN = "queue_scanned"
 have to keep it up at every edit."""
 
 
-def carry_out(cursor: Any, statement: str, *, new: bool) -> str:
+def run_sqlite_statement(cursor: Any, statement: str, *, new: bool) -> str:
     """Carry out what only SQLite understands; returns the statement that is left to be executed.
 
     Args:
@@ -221,11 +221,11 @@ class PostgreSQL:
         """See ``Dialect``."""
         return engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
 
-    def glancing(self, engine: Engine) -> Engine:
+    def autocommit_engine(self, engine: Engine) -> Engine:
         """See ``Dialect``."""
-        return engine.execution_options(**GLANCE, isolation_level="AUTOCOMMIT")
+        return engine.execution_options(**AUTOCOMMIT, isolation_level="AUTOCOMMIT")
 
-    def peeking(self, settings: Settings) -> None:
+    def nonblocking_engine(self, settings: Settings) -> None:
         """See ``Dialect``."""
 
     def sharing(self, engine: Engine, reported: Reported) -> Sharing:
@@ -293,7 +293,7 @@ class PostgreSQL:
         def translate(
             _connection: Any, cursor: Any, statement: str, parameters: Any, *_: Any
         ) -> tuple[str, Any]:
-            return carry_out(cursor, statement, new=new), parameters
+            return run_sqlite_statement(cursor, statement, new=new), parameters
 
         event.listen(connection, "before_cursor_execute", translate, retval=True)
         try:

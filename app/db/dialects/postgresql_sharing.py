@@ -22,7 +22,7 @@ log = structlog.get_logger("touchline.store")
 CHANNEL = "touchline"
 MOST_LETTERS = 7000
 """PostgreSQL carries no more than 8,000 bytes; longer words are not said."""
-GLANCE_SECONDS = 0.5
+POLL_SECONDS = 0.5
 """Between two looks whether the process ends."""
 AGAIN_SECONDS = 1.0
 """Until a broken line is taken up again."""
@@ -51,7 +51,7 @@ class ServerSharing:
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def take(self, name: str) -> bool:
+    def claim(self, name: str) -> bool:
         """See ``Sharing``."""
         with self._lock, self._reported():
             if name in self._held or self._closing.is_set():
@@ -73,7 +73,7 @@ class ServerSharing:
                 return False
             return name in self._held
 
-    def give_back(self, name: str) -> None:
+    def release(self, name: str) -> None:
         """See ``Sharing``."""
         with self._lock:
             if name in self._held:
@@ -85,13 +85,13 @@ class ServerSharing:
                     # With the connection the claim is gone, too.
                     log.warning("a claim ended with its connection", error=error.message)
 
-    def tell(self, session: Session, word: str) -> None:
+    def publish(self, session: Session, word: str) -> None:
         """See ``Sharing``."""
-        said = f"{self._origin} {word}"
-        if len(said.encode()) <= MOST_LETTERS:
-            session.execute(_NOTIFY, {"channel": CHANNEL, "said": said})
+        message = f"{self._origin} {word}"
+        if len(message.encode()) <= MOST_LETTERS:
+            session.execute(_NOTIFY, {"channel": CHANNEL, "said": message})
 
-    def hear(self, hearer: Hearer) -> None:
+    def subscribe(self, hearer: Hearer) -> None:
         """See ``Sharing``."""
         self._hearers.append(hearer)
 
@@ -134,7 +134,7 @@ class ServerSharing:
         while not self._closing.is_set():
             try:
                 with self._engine.connect() as connection:
-                    self._follow(connection)
+                    self._reconnect_loop(connection)
             except Exception as error:
                 log.warning(
                     "notifications of other processes cannot be received",
@@ -142,13 +142,13 @@ class ServerSharing:
                 )
                 self._closing.wait(AGAIN_SECONDS)
 
-    def _follow(self, connection: Connection) -> None:
+    def _reconnect_loop(self, connection: Connection) -> None:
         try:
             connection.execute(text(f"LISTEN {CHANNEL}"))
             self._hear(AGAIN)
             driver: Any = connection.connection.driver_connection
             while not self._closing.is_set():
-                for notice in driver.notifies(timeout=GLANCE_SECONDS):
+                for notice in driver.notifies(timeout=POLL_SECONDS):
                     origin, _, word = notice.payload.partition(" ")
                     if origin != self._origin:
                         self._hear(word)

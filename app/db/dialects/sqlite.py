@@ -14,7 +14,7 @@ from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.db.dialects.dialect import GLANCE, Alone, Failure, unkeepable_text
+from app.db.dialects.dialect import AUTOCOMMIT, Alone, Failure, unstorable_text
 from app.db.session import Session
 from app.errors import StorageError
 
@@ -76,15 +76,15 @@ class SQLite:
         """See ``Dialect``; a deferred transaction sees one snapshot already."""
         return engine
 
-    def glancing(self, engine: Engine) -> Engine:
+    def autocommit_engine(self, engine: Engine) -> Engine:
         """See ``Dialect``."""
-        return engine.execution_options(**GLANCE)
+        return engine.execution_options(**AUTOCOMMIT)
 
-    def peeking(self, settings: Settings) -> Engine:
+    def nonblocking_engine(self, settings: Settings) -> Engine:
         """See ``Dialect``; readers of a write-ahead log wait for nobody, but while it is recovered."""
         engine = _make_engine(settings, True, pool_size=1, max_overflow=0, pool_timeout=0)
         event.listen(engine, "connect", _wait_for_nobody)
-        return engine.execution_options(**GLANCE)
+        return engine.execution_options(**AUTOCOMMIT)
 
     def sharing(
         self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
@@ -171,7 +171,7 @@ def _refuse_null_characters(
     for row in values if many else (values,):
         for value in row.values() if isinstance(row, dict) else row:
             if isinstance(value, str) and "\0" in value:
-                raise unkeepable_text()
+                raise unstorable_text()
 
 
 def _wait_for_nobody(connection: Any, _record: object) -> None:
@@ -200,14 +200,14 @@ def _begin(connection: Connection) -> None:
     driver, until = _driver(connection), monotonic() + BUSY_SECONDS
     driver.execute(_WAIT_NOT)
     try:
-        while not _begun(connection, last=monotonic() >= until):
+        while not _could_begin(connection, last=monotonic() >= until):
             sleep(AGAIN_S)
     finally:
         driver.execute(_WAIT)
     connection.info[_BEFORE] = driver.total_changes
 
 
-def _begun(connection: Connection, *, last: bool) -> bool:
+def _could_begin(connection: Connection, *, last: bool) -> bool:
     """Whether a write could begin; the last time that it could not is an error."""
     try:
         connection.exec_driver_sql("BEGIN IMMEDIATE")

@@ -156,10 +156,10 @@ def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
     """
     with engine.connect() as connection:
         anchor = anchor_of(connection)
-    said = read_anchor(settings.database_file)
-    if anchor is None or anchor == said:
+    stored = read_anchor(settings.database_file)
+    if anchor is None or anchor == stored:
         return
-    if alone or said is None or _without_end(said) != _without_end(anchor):
+    if alone or stored is None or _without_end(stored) != _without_end(anchor):
         make_anchor(settings.database_file, anchor)
 
 

@@ -9,15 +9,15 @@ from app.db.store import Store
 from app.errors import ForbiddenError, NotFoundError
 from app.features.agreement.compare import Comparison, compare_states, read_limits
 from app.features.agreement.queries import OPEN, agreements_of, agreements_on
-from app.features.agreement.service import ready_takes, settle
+from app.features.agreement.service import settle, submitted_annotations
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved
 from app.features.groups.view_paint import PaintFollower
-from app.features.independent_annotations.adopt import adopt_take
-from app.features.independent_annotations.queries import Take
-from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import TakeView
+from app.features.independent_annotations.adopt import adopt_annotation
+from app.features.independent_annotations.queries import IndependentAnnotation
+from app.features.independent_annotations.return_work import return_annotation
+from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.people.members import list_members
 from app.features.people.roles import Action, lets
 from app.finite import Moment
@@ -53,7 +53,7 @@ class Case:
 
     original: GroupState
     batch: int | None
-    takes: tuple[Take, ...]
+    takes: tuple[IndependentAnnotation, ...]
     comparison: Comparison
     refused: str | None
     own: bool
@@ -67,7 +67,9 @@ def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
     found = []
     for row in rows:
         batch = row.batch_id or None
-        people = tuple(take.person for take in ready_takes(store, row.group_id, batch))
+        people = tuple(
+            annotation.person for annotation in submitted_annotations(store, row.group_id, batch)
+        )
         found.append(
             OpenCase(
                 row.group_id, row.number, batch, people, row.worst, row.disagreements, row.found
@@ -88,18 +90,18 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
         limits = read_limits(session, original.dataset_id)
     if row is None:
         raise NotFoundError(f"nothing of group {group_id} waits for a decision")
-    takes = ready_takes(store, group_id, row.batch_id or None)
-    if len(takes) < 2:
+    annotations = submitted_annotations(store, group_id, row.batch_id or None)
+    if len(annotations) < 2:
         raise NotFoundError(f"nothing of group {group_id} waits for a decision")
-    states = [load_solved(store, take.copy_id) for take in takes]
-    own = person_of(actor) in {take.person for take in takes}
+    states = [load_solved(store, annotation.copy_id) for annotation in annotations]
+    own = person_of(actor) in {annotation.person for annotation in annotations}
     refused = None
-    if own and (others := _others(store, original.dataset_id, takes)):
+    if own and (others := _possible_judges(store, original.dataset_id, annotations)):
         refused = f"you annotated this group yourself; {_named(others)} can decide"
     return Case(
         original,
         row.batch_id or None,
-        tuple(takes),
+        tuple(annotations),
         compare_states(states, limits),
         refused,
         own,
@@ -128,7 +130,7 @@ def decide(
     case = get_case(store, group_id, actor=actor)
     if case.refused is not None:
         raise ForbiddenError(case.refused)
-    place = next((at for at, take in enumerate(case.takes) if take.id == take_id), None)
+    place = next((at for at, annotation in enumerate(case.takes) if annotation.id == take_id), None)
     if place is None:
         raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
     return settle(
@@ -144,8 +146,12 @@ def decide(
     )
 
 
-def take_over(
-    store: Store, take: Take, *, actor: str, paint: PaintFollower | None = None
+def adopt_into_group(
+    store: Store,
+    annotation: IndependentAnnotation,
+    *,
+    actor: str,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     """Take an annotation and its verdict over into the group; where it waits for a decision, this is it.
 
@@ -154,20 +160,27 @@ def take_over(
     """
     with store.read() as session:
         waits = any(
-            (row.state, row.batch_id) == (OPEN, take.batch_id or 0)
-            for row in agreements_on(session, take.group_id)
+            (row.state, row.batch_id) == (OPEN, annotation.batch_id or 0)
+            for row in agreements_on(session, annotation.group_id)
         )
     if not waits:
-        return adopt_take(store, take.id, actor=actor, paint=paint)
-    ready = ready_takes(store, take.group_id, take.batch_id)
+        return adopt_annotation(store, annotation.id, actor=actor, paint=paint)
+    ready = submitted_annotations(store, annotation.group_id, annotation.batch_id)
     return settle(
-        store, take.group_id, take.batch_id, ready, take, outcome="take", actor=actor, paint=paint
+        store,
+        annotation.group_id,
+        annotation.batch_id,
+        ready,
+        annotation,
+        outcome="take",
+        actor=actor,
+        paint=paint,
     )
 
 
-def hand_back(
+def return_for_correction(
     store: Store, group_id: int, take_id: int, reason: str = "", *, actor: str
-) -> TakeView:
+) -> DisclosedAnnotation:
     """Hand one of the annotations that disagree back to its person; the group waits no longer.
 
     Raises:
@@ -177,17 +190,19 @@ def hand_back(
     case = get_case(store, group_id, actor=actor)
     if case.refused is not None:
         raise ForbiddenError(case.refused)
-    take = next((one for one in case.takes if one.id == take_id), None)
-    if take is None:
+    annotation = next((one for one in case.takes if one.id == take_id), None)
+    if annotation is None:
         raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
-    if take.person == person_of(actor) != LOCAL_USER:
+    if annotation.person == person_of(actor) != LOCAL_USER:
         raise ForbiddenError("you submitted this annotation yourself", hint="A lead can return it.")
-    return hand_back_take(store, take_id, reason, actor=actor)
+    return return_annotation(store, take_id, reason, actor=actor)
 
 
-def _others(store: Store, dataset: int, takes: Sequence[Take]) -> list[str]:
+def _possible_judges(
+    store: Store, dataset: int, annotations: Sequence[IndependentAnnotation]
+) -> list[str]:
     """Who may judge in a dataset and annotated none of these."""
-    takers = {take.person for take in takes}
+    takers = {annotation.person for annotation in annotations}
     return [
         one.name
         for one in list_members(store, dataset)

@@ -76,15 +76,15 @@ def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Com
                 hint="Compare two annotations of the same frames.",
                 pointer="/with",
             )
-        verdicts = (_judged(first), _judged(second))
+        verdicts = (_verdict_of(first), _verdict_of(second))
         pairs.append(AnnotationPair(a, b, distance, disagreements(distance, verdicts, limits)))
     pairs.sort(key=lambda pair: (-_weight(pair.disagreements), -len(pair.disagreements)))
     return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
 
 
-def _judged(state: GroupState) -> str | None:
-    said = state.verdict.state
-    return None if said == "unreviewed" else said
+def _verdict_of(state: GroupState) -> str | None:
+    verdict = state.verdict.state
+    return None if verdict == "unreviewed" else verdict
 
 
 def _weight(found: Sequence[Disagreement]) -> float:
@@ -96,9 +96,9 @@ def _worst_views(states: Sequence[GroupState], pairs: Sequence[AnnotationPair]) 
     order: dict[str, tuple[float, float]] = {view.key: (0, 0) for view in states[0].group.views}
     for pair in pairs:
         for view in pair.distance.views:
-            said = [item for item in pair.disagreements if item.view == view.view]
+            in_view = [item for item in pair.disagreements if item.view == view.view]
             weight, apart = order.get(view.view, (0.0, 0.0))
-            order[view.view] = (max(weight, _weight(said)), max(apart, view.largest_px))
+            order[view.view] = (max(weight, _weight(in_view)), max(apart, view.largest_px))
     return tuple(sorted(order, key=lambda key: [-value for value in order[key]]))
 
 

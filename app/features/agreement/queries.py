@@ -11,7 +11,7 @@ from app.db.session import Session
 from app.features.agreement.tables import AgreementLimitsModel, AgreementModel
 from app.features.batches.tables import BatchModel
 from app.features.independent_annotations.queries import INDEPENDENT
-from app.features.independent_annotations.tables import TakeModel
+from app.features.independent_annotations.tables import IndependentAnnotationModel
 from app.features.queue.tables import QueueModel
 
 AGREED, OPEN, DECIDED = "agreed", "open", "decided"
@@ -89,38 +89,53 @@ def decide_agreement(
 
 def settle_rest(session: Session, take_ids: Sequence[int], at: str) -> None:
     """Takes that were compared and not taken are over."""
-    rest = (TakeModel.id.in_(take_ids), TakeModel.settled.is_(None))
-    session.execute(update(TakeModel).where(*rest).values(settled=at))
+    rest = (
+        IndependentAnnotationModel.id.in_(take_ids),
+        IndependentAnnotationModel.settled.is_(None),
+    )
+    session.execute(update(IndependentAnnotationModel).where(*rest).values(settled=at))
 
 
 def never_compared(session: Session) -> list[tuple[int, int | None]]:
     """Group and batch (None: none) of annotations that several people handed in and nobody compared."""
-    take, row = TakeModel, AgreementModel
-    same = (row.group_id == take.group_id) & (row.batch_id == func.coalesce(take.batch_id, 0))
-    ready = (take.kind == INDEPENDENT, take.handed_in.is_not(None), take.settled.is_(None))
+    annotation, row = IndependentAnnotationModel, AgreementModel
+    same = (row.group_id == annotation.group_id) & (
+        row.batch_id == func.coalesce(annotation.batch_id, 0)
+    )
+    ready = (
+        annotation.kind == INDEPENDENT,
+        annotation.handed_in.is_not(None),
+        annotation.settled.is_(None),
+    )
     statement = (
-        select(take.group_id, take.batch_id)
+        select(annotation.group_id, annotation.batch_id)
         .outerjoin(row, same)
         .where(*ready, row.group_id.is_(None))
-        .group_by(take.group_id, take.batch_id)
+        .group_by(annotation.group_id, annotation.batch_id)
         .having(func.count() > 1)
-        .order_by(take.group_id)
+        .order_by(annotation.group_id)
     )
     return [(found.group_id, found.batch_id) for found in session.execute(statement)]
 
 
-def never_taken_over(session: Session) -> list[int]:
+def never_adopted(session: Session) -> list[int]:
     """Copies that were submitted in batches which ask for one annotation a group, and wait."""
-    take = TakeModel
-    ready = (take.kind == INDEPENDENT, take.handed_in.is_not(None), take.settled.is_(None))
-    statement = select(take.copy_id).join(BatchModel, BatchModel.id == take.batch_id)
+    annotation = IndependentAnnotationModel
+    ready = (
+        annotation.kind == INDEPENDENT,
+        annotation.handed_in.is_not(None),
+        annotation.settled.is_(None),
+    )
+    statement = select(annotation.copy_id).join(BatchModel, BatchModel.id == annotation.batch_id)
     return list(session.scalars(statement.where(*ready, BatchModel.verdicts == 1)))
 
 
-def verdicts_asked(session: Session, batch_id: int) -> int | None:
+def required_verdicts(session: Session, batch_id: int) -> int | None:
     """How many annotations of each group a batch asks for; None where there is no such batch."""
-    asked: int | None = session.scalar(select(BatchModel.verdicts).where(BatchModel.id == batch_id))
-    return asked
+    verdicts: int | None = session.scalar(
+        select(BatchModel.verdicts).where(BatchModel.id == batch_id)
+    )
+    return verdicts
 
 
 def limits_of(session: Session, dataset_id: int) -> Any | None:

@@ -22,8 +22,8 @@ from app.features.agreement.summary import agreement_csv, agreement_of
 from app.features.groups.routes import ETAG, group_answer
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
-from app.features.independent_annotations.schemas import TakeHandBack
-from app.features.independent_annotations.service import TakeView
+from app.features.independent_annotations.schemas import AnnotationReturn
+from app.features.independent_annotations.service import DisclosedAnnotation
 from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
@@ -147,13 +147,15 @@ def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -
 
 
 @router.post(
-    "/groups/{group}/adjudication/hand-back",
-    operation_id="handBackAdjudicated",
+    "/groups/{group}/adjudication/return",
+    operation_id="returnForCorrection",
     status_code=204,
     responses=responses(403, 404, 409, 413, 415),
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(no_content)
-def hand_back(group: Id, back: TakeHandBack, store: AppStore, actor: Actor) -> TakeView:
+def return_annotation(
+    group: Id, back: AnnotationReturn, store: AppStore, actor: Actor
+) -> DisclosedAnnotation:
     """Hand one of the annotations back to its person; it is compared again when it is handed in."""
-    return adjudicate.hand_back(store, group, back.take, back.reason, actor=actor)
+    return adjudicate.return_for_correction(store, group, back.take, back.reason, actor=actor)

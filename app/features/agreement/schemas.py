@@ -143,7 +143,7 @@ class WaitingList(ListDocument[OpenCase]):
     """Groups that wait for a decision, those that disagree most first."""
 
 
-class CaseTake(Document):
+class CaseAnnotation(Document):
     """Somebody's own annotation of a group; its place is that in `comparison.groups`."""
 
     id: int
@@ -157,7 +157,7 @@ class CaseDocument(Document):
 
     group: GroupDocument
     batch: int | None
-    takes: list[CaseTake]
+    takes: list[CaseAnnotation]
     comparison: GroupComparisonDocument
     refused: str | None = Field(
         description="Why the logged-in person may not decide; null: they may."

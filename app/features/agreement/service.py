@@ -21,36 +21,40 @@ from app.features.agreement.queries import (
     OPEN,
     agreements_on,
     decide_agreement,
+    never_adopted,
     never_compared,
-    never_taken_over,
     put_agreement,
+    required_verdicts,
     settle_rest,
-    verdicts_asked,
 )
 from app.features.batches.completion_queries import settle_in_batch
-from app.features.batches.own import take_over_handed_in
+from app.features.batches.own_annotations import adopt_submitted
 from app.features.batches.service import get_batch
 from app.features.groups.state import GroupState
 from app.features.groups.submit import solved
 from app.features.groups.view_paint import PaintFollower
-from app.features.independent_annotations.adopt import adopt_take, give_verdict_of
-from app.features.independent_annotations.queries import INDEPENDENT, Take, takes_of_group
-from app.features.independent_annotations.service import find_take_of
+from app.features.independent_annotations.adopt import adopt_annotation, give_verdict_of
+from app.features.independent_annotations.queries import (
+    INDEPENDENT,
+    IndependentAnnotation,
+    annotations_of_group,
+)
+from app.features.independent_annotations.service import find_annotation_of_copy
 from app.features.solutions.codec import to_json
 from app.features.webhooks.queries import DISPUTED, announce, stamp
 from app.soccer.actors import SCRIPT
 
 log = structlog.get_logger("touchline.agreement")
 
-ASKED = 2
+REQUIRED = 2
 """Annotations that are compared where no batch says how many."""
 BY_ITSELF = f"{SCRIPT}agreement"
 """Who takes over what agrees."""
 
 
 @dataclass(frozen=True)
-class PairOfTakes:
-    """Two takes of a group, by their ids and people, and how far they lie apart."""
+class AnnotationComparison:
+    """Two independent annotations of a group, by their ids and people, and how far they lie apart."""
 
     a: int
     b: int
@@ -60,13 +64,13 @@ class PairOfTakes:
 
 
 @dataclass(frozen=True)
-class Weighed:
+class StoredComparison:
     """All that is kept of a comparison."""
 
-    pairs: tuple[PairOfTakes, ...]
+    pairs: tuple[AnnotationComparison, ...]
 
 
-def after_hand_in(store: Store, copy_id: int, paint: PaintFollower | None = None) -> str | None:
+def after_submission(store: Store, copy_id: int, paint: PaintFollower | None = None) -> str | None:
     """What follows from a copy that was submitted: where nobody else annotates the group it is taken
     over, else the group is weighed; None where there is nothing to weigh yet.
 
@@ -76,20 +80,20 @@ def after_hand_in(store: Store, copy_id: int, paint: PaintFollower | None = None
     Returns:
         ``agreed``: the first annotation was taken over; ``open``: somebody has to decide.
     """
-    take = find_take_of(store, copy_id)
-    if take is None or take.kind != INDEPENDENT or take.handed_in is None:
+    annotation = find_annotation_of_copy(store, copy_id)
+    if annotation is None or annotation.kind != INDEPENDENT or annotation.handed_in is None:
         return None
     try:
-        if take.batch_id is not None:
-            take_over_handed_in(store, get_batch(store, take.batch_id), take.person)
-        return weigh(store, take.group_id, take.batch_id, paint)
+        if annotation.batch_id is not None:
+            adopt_submitted(store, get_batch(store, annotation.batch_id), annotation.person)
+        return compare_submitted(store, annotation.group_id, annotation.batch_id, paint)
     except ReviewError as error:
         # It is tried again with the person's next group, and when the server starts.
         log.warning("a submitted annotation waits to be taken over", copy=copy_id, error=str(error))
         return None
 
 
-def weigh(
+def compare_submitted(
     store: Store, group_id: int, batch_id: int | None, paint: PaintFollower | None = None
 ) -> str | None:
     """Compare what was handed in of a group; where it agrees, the first annotation is taken over.
@@ -97,25 +101,29 @@ def weigh(
     Each pair is compared, and all of them have to agree. ``paint`` reads the paint of edited lines
     again, as for every edit. May be called again at any time: what was compared already stays.
     """
-    takes = ready_takes(store, group_id, batch_id)
+    annotations = submitted_annotations(store, group_id, batch_id)
     with store.read() as session:
-        asked = ASKED if batch_id is None else verdicts_asked(session, batch_id) or ASKED
-        known = _known(session, group_id, batch_id)
-    if len(takes) < max(ASKED, asked) or (known and known.state != OPEN):
+        required = (
+            REQUIRED if batch_id is None else required_verdicts(session, batch_id) or REQUIRED
+        )
+        known = _stored_agreement(session, group_id, batch_id)
+    if len(annotations) < max(REQUIRED, required) or (known and known.state != OPEN):
         return None
     original = solved(store, group_id)
     with store.read() as session:
         limits = read_limits(session, original.dataset_id)
-    found = compare_states([solved(store, take.copy_id) for take in takes], limits)
-    values = _values(original, takes, found)
+    found = compare_states(
+        [solved(store, annotation.copy_id) for annotation in annotations], limits
+    )
+    values = _values(original, annotations, found)
     if not any(pair.disagreements for pair in found.pairs):
         try:
             settle(
                 store,
                 group_id,
                 batch_id,
-                takes,
-                takes[0],
+                annotations,
+                annotations[0],
                 outcome="take",
                 actor=BY_ITSELF,
                 paint=paint,
@@ -127,10 +135,10 @@ def weigh(
         except ReviewError:
             # Somebody changed the original at the same moment: that person or another one decides.
             pass
-    return OPEN if _keep(store, takes, values) else None
+    return OPEN if _open_case(store, annotations, values) else None
 
 
-def weigh_left(store: Store, paint: PaintFollower | None = None) -> int:
+def compare_left(store: Store, paint: PaintFollower | None = None) -> int:
     """Compare what was handed in before a server was stopped, and was not compared any more; and
     take over what waits for that.
 
@@ -138,37 +146,40 @@ def weigh_left(store: Store, paint: PaintFollower | None = None) -> int:
         How many groups were compared.
     """
     with store.read() as session:
-        left, waiting = never_compared(session), never_taken_over(session)
+        left, waiting = never_compared(session), never_adopted(session)
     for copy_id in waiting:
-        after_hand_in(store, copy_id, paint)
+        after_submission(store, copy_id, paint)
     compared = 0
     for group_id, batch_id in left:
         try:
-            compared += weigh(store, group_id, batch_id, paint) is not None
+            compared += compare_submitted(store, group_id, batch_id, paint) is not None
         except ReviewError as error:
             log.error("annotations could not be compared", group=group_id, error=str(error))
     return compared
 
 
-def ready_takes(store: Store, group_id: int, batch_id: int | None) -> list[Take]:
+def submitted_annotations(
+    store: Store, group_id: int, batch_id: int | None
+) -> list[IndependentAnnotation]:
     """What was handed in of a group in a batch (None: in none), and not decided about, in order."""
     with store.read() as session:
-        takes = takes_of_group(session, group_id)
+        annotations = annotations_of_group(session, group_id)
     found = [
-        take
-        for take in takes
-        if (take.batch_id, take.kind, take.settled) == (batch_id, INDEPENDENT, None)
-        and take.handed_in is not None
+        annotation
+        for annotation in annotations
+        if (annotation.batch_id, annotation.kind, annotation.settled)
+        == (batch_id, INDEPENDENT, None)
+        and annotation.handed_in is not None
     ]
-    return sorted(found, key=lambda take: (take.handed_in or "", take.id))
+    return sorted(found, key=lambda annotation: (annotation.handed_in or "", annotation.id))
 
 
 def settle(
     store: Store,
     group_id: int,
     batch_id: int | None,
-    takes: Sequence[Take],
-    taken: Take,
+    annotations: Sequence[IndependentAnnotation],
+    taken: IndependentAnnotation,
     *,
     outcome: str,
     actor: str,
@@ -193,7 +204,7 @@ def settle(
         "outcome": outcome,
         "take": taken.id,
         "person": taken.person,
-        "of": sorted(take.person for take in takes),
+        "of": sorted(annotation.person for annotation in annotations),
     }
     values["state"] = AGREED if itself else DECIDED
 
@@ -201,7 +212,7 @@ def settle(
         if found is not None:
             put_agreement(session, found)
         dataset = decide_agreement(session, group_id, batch_id or 0, values)
-        settle_rest(session, [take.id for take in takes], at)
+        settle_rest(session, [annotation.id for annotation in annotations], at)
         if batch_id is not None:
             settle_in_batch(session, batch_id, group_id, actor=actor, at=at)
         append(session, [Entry(KIND, actor, at, body, dataset, group_id)])
@@ -209,32 +220,38 @@ def settle(
             note = f"as {taken.person} judged it"
             give_verdict_of(session, taken, actor=actor, note=note)
 
-    return adopt_take(store, taken.id, actor=actor, paint=paint, also=done)
+    return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=done)
 
 
-def _known(session: Session, group_id: int, batch_id: int | None) -> Any | None:
+def _stored_agreement(session: Session, group_id: int, batch_id: int | None) -> Any | None:
     """What a group came to in a batch, where its annotations were compared already."""
     rows = agreements_on(session, group_id)
     return next((row for row in rows if row.batch_id == (batch_id or 0)), None)
 
 
-def _keep(store: Store, takes: Sequence[Take], values: Mapping[str, Any]) -> bool:
+def _open_case(
+    store: Store, annotations: Sequence[IndependentAnnotation], values: Mapping[str, Any]
+) -> bool:
     """Let a group wait for a decision; False where somebody went on or decided meanwhile."""
-    group_id, batch_id = values["group_id"], takes[0].batch_id
+    group_id, batch_id = values["group_id"], annotations[0].batch_id
     with store.write() as session:
-        now_there = takes_of_group(session, group_id)
-        known = _known(session, group_id, batch_id)
-        if any(take not in now_there for take in takes) or (known and known.state != OPEN):
+        now_there = annotations_of_group(session, group_id)
+        known = _stored_agreement(session, group_id, batch_id)
+        if any(annotation not in now_there for annotation in annotations) or (
+            known and known.state != OPEN
+        ):
             return False
         put_agreement(session, values)
         if known is None or known.takes != values["takes"]:
-            _announce(session, takes, values)
+            _announce(session, annotations, values)
     return True
 
 
-def _announce(session: Session, takes: Sequence[Take], values: Mapping[str, Any]) -> None:
+def _announce(
+    session: Session, annotations: Sequence[IndependentAnnotation], values: Mapping[str, Any]
+) -> None:
     at, group_id = values["found"], values["group_id"]
-    said = {name: values[name] for name in ("worst", "disagreements")}
+    summary = {name: values[name] for name in ("worst", "disagreements")}
     announce(
         session,
         values["dataset_id"],
@@ -242,33 +259,39 @@ def _announce(session: Session, takes: Sequence[Take], values: Mapping[str, Any]
         f"group{group_id}_disputed{stamp(at)}",
         actor=BY_ITSELF,
         at=at,
-        batch_id=takes[0].batch_id,
-        also={"group": group_id, "people": [take.person for take in takes], **said},
+        batch_id=annotations[0].batch_id,
+        also={
+            "group": group_id,
+            "people": [annotation.person for annotation in annotations],
+            **summary,
+        },
     )
 
 
-def _values(original: GroupState, takes: Sequence[Take], found: Comparison) -> dict[str, Any]:
+def _values(
+    original: GroupState, annotations: Sequence[IndependentAnnotation], found: Comparison
+) -> dict[str, Any]:
     """What is kept of a comparison, as a row that waits for a decision."""
     pairs = tuple(
-        PairOfTakes(
-            takes[pair.a].id,
-            takes[pair.b].id,
-            (takes[pair.a].person, takes[pair.b].person),
-            (takes[pair.a].verdict, takes[pair.b].verdict),
+        AnnotationComparison(
+            annotations[pair.a].id,
+            annotations[pair.b].id,
+            (annotations[pair.a].person, annotations[pair.b].person),
+            (annotations[pair.a].verdict, annotations[pair.b].verdict),
             pair.distance,
         )
         for pair in found.pairs
     )
-    said = [item for pair in found.pairs for item in pair.disagreements]
+    disagreements = [item for pair in found.pairs for item in pair.disagreements]
     return {
         "group_id": original.id,
-        "batch_id": takes[0].batch_id or 0,
+        "batch_id": annotations[0].batch_id or 0,
         "dataset_id": original.dataset_id,
         "state": OPEN,
-        "takes": " ".join(str(take.id) for take in takes),
-        "pairs": pack(to_json(Weighed(pairs))),
-        "worst": max((item.weight for item in said), default=0.0),
-        "disagreements": len(said),
+        "takes": " ".join(str(annotation.id) for annotation in annotations),
+        "pairs": pack(to_json(StoredComparison(pairs))),
+        "worst": max((item.weight for item in disagreements), default=0.0),
+        "disagreements": len(disagreements),
         "found": now(),
         **dict.fromkeys(("outcome", "take_id", "decided", "decided_by")),
     }

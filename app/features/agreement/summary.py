@@ -20,7 +20,7 @@ from app.evaluation.rater_agreement import (
 )
 from app.features.agreement.compare import read_limits
 from app.features.agreement.queries import AGREED, DECIDED, OPEN, agreements_of
-from app.features.agreement.service import PairOfTakes, Weighed
+from app.features.agreement.service import AnnotationComparison, StoredComparison
 from app.features.datasets.service import dataset_id
 from app.features.solutions.codec import from_json
 from app.formats.csv_text import csv_line
@@ -95,15 +95,15 @@ class _Read:
     """A row with its pairs as they were kept."""
 
     row: Any
-    pairs: tuple[PairOfTakes, ...]
+    pairs: tuple[AnnotationComparison, ...]
 
     @property
     def verdicts(self) -> dict[str, str | None]:
         """What each person judged, in the order of their names."""
-        said: dict[str, str | None] = {}
+        verdicts: dict[str, str | None] = {}
         for pair in self.pairs:
-            said |= dict(zip(pair.people, pair.verdicts, strict=True))
-        return dict(sorted(said.items()))
+            verdicts |= dict(zip(pair.people, pair.verdicts, strict=True))
+        return dict(sorted(verdicts.items()))
 
 
 def agreement_of(store: Store, dataset: str | int, batch: int | None = None) -> Agreement:
@@ -118,7 +118,7 @@ def agreement_of(store: Store, dataset: str | int, batch: int | None = None) -> 
     with store.read() as session:
         rows = agreements_of(session, number, batch_id=batch)
         limits = read_limits(session, number)
-    read = [_Read(row, from_json(Weighed, unpack(row.pairs)).pairs) for row in rows]
+    read = [_Read(row, from_json(StoredComparison, unpack(row.pairs)).pairs) for row in rows]
     states = [row.state for row in rows]
     people = sorted({name for one in read for name in one.verdicts})
     judged = [[one.verdicts.get(name) for name in people] for one in read]
@@ -159,7 +159,7 @@ def agreement_csv(found: Agreement) -> str:
         ]
         values = (
             *(one.number, one.group, one.batch, one.state, one.status),
-            *("; ".join(one.people), "; ".join(said or "none" for said in one.verdicts)),
+            *("; ".join(one.people), "; ".join(verdict or "none" for verdict in one.verdicts)),
             *(one.disagreements, one.worst),
             *numbers,
             *(one.outcome, one.taken, one.decided, one.decided_by),
@@ -172,18 +172,18 @@ def _of_two(two: tuple[str, str], read: Sequence[_Read]) -> PeopleAgreement | No
     found = [pair for one in read for pair in one.pairs if tuple(sorted(pair.people)) == two]
     if not found:
         return None
-    said = [dict(zip(pair.people, pair.verdicts, strict=True)) for pair in found]
-    both = [(one[two[0]], one[two[1]]) for one in said]
+    verdicts = [dict(zip(pair.people, pair.verdicts, strict=True)) for pair in found]
+    both = [(one[two[0]], one[two[1]]) for one in verdicts]
     both = [(a, b) for a, b in both if a is not None and b is not None]
     kappa = cohen_kappa([a for a, _ in both], [b for _, b in both])
     return PeopleAgreement(two, len(found), kappa, spreads(pair.distance for pair in found))
 
 
 def _of_all(people: Sequence[str], read: Sequence[_Read]) -> PeopleAgreement:
-    said = [[value for value in one.verdicts.values() if value is not None] for one in read]
-    said = [values for values in said if len(values) > 1]
-    equal = len({len(values) for values in said}) == 1
-    kappa = fleiss_kappa(said) if equal else None
+    verdicts = [[value for value in one.verdicts.values() if value is not None] for one in read]
+    verdicts = [values for values in verdicts if len(values) > 1]
+    equal = len({len(values) for values in verdicts}) == 1
+    kappa = fleiss_kappa(verdicts) if equal else None
     return PeopleAgreement(tuple(people), len(read), kappa, spreads(_distances(read)))
 
 

@@ -20,7 +20,7 @@ JOB = "job"
 """Kind of the log's entries about jobs that somebody asked for."""
 
 
-def note_deed(
+def add_audit_event(
     session: Session, actor: str, did: str, dataset_id: int | None, **what: str | int | None
 ) -> None:
     """Write into the log who did something, in the transaction in which it happens.
@@ -43,12 +43,12 @@ def note_job(
     append(session, [Entry(JOB, actor, now(), body, dataset_id)])
 
 
-def record_deed(
+def record_audit_event(
     store: Store, actor: str, did: str, dataset_id: int | None, **what: str | int | None
 ) -> None:
     """The same where what happens is in no transaction: a file that goes. Answers the request."""
     with store.write() as session:
-        note_deed(session, actor, did, dataset_id, **what)
+        add_audit_event(session, actor, did, dataset_id, **what)
         session.respond(None)
 
 

@@ -13,7 +13,7 @@ from app.db.log import LogModel
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.people.alias_queries import shown_actor
-from app.features.people.visibility_queries import Sight
+from app.features.people.visibility_queries import Visibility
 from app.soccer.actors import TOKEN
 
 
@@ -57,7 +57,7 @@ _SHOWN = shown_actor(LogModel.actor, LogModel.at)
 
 
 def audit_rows(
-    session: Session, asked: AuditQuery, sight: Sight, before: int | None, limit: int
+    session: Session, query: AuditQuery, visibility: Visibility, before: int | None, limit: int
 ) -> list[AuditRow]:
     """Entries that fit, the newest first, of the datasets that somebody sees."""
     statement = (
@@ -77,7 +77,7 @@ def audit_rows(
         )
         .outerjoin(DatasetModel, DatasetModel.id == LogModel.dataset_id)
         .outerjoin(GroupModel, GroupModel.id == LogModel.group_id)
-        .where(*_where(asked, sight, before))
+        .where(*_where(query, visibility, before))
         .order_by(LogModel.id.desc())
         .limit(limit)
     )
@@ -91,24 +91,26 @@ def _row(row: Any) -> AuditRow:
     return AuditRow(**{**values, "label": row.label or key, "body": unpack(row.body)})
 
 
-def _where(asked: AuditQuery, sight: Sight, before: int | None) -> list[ColumnElement[bool]]:
+def _where(
+    query: AuditQuery, visibility: Visibility, before: int | None
+) -> list[ColumnElement[bool]]:
     where: list[ColumnElement[bool]] = []
-    seen = sight.condition(LogModel.dataset_id, literal("somebody"))
+    seen = visibility.condition(LogModel.dataset_id, literal("somebody"))
     if seen is not None:
         where.append(seen)
     if before is not None:
         where.append(LogModel.id < before)
-    if asked.dataset_id is not None:
-        where.append(LogModel.dataset_id == asked.dataset_id)
-    if asked.group_id is not None:
-        where.append(LogModel.group_id == asked.group_id)
-    if asked.person is not None:
-        tokens = _SHOWN.startswith(f"{asked.person}{TOKEN}", autoescape=True)
-        where.append(or_(_SHOWN.in_([asked.person]), tokens))
-    if asked.kinds is not None:
-        where.append(LogModel.kind.in_(asked.kinds))
-    if asked.since is not None:
-        where.append(LogModel.at >= asked.since)
-    if asked.until is not None:
-        where.append(LogModel.at < asked.until)
+    if query.dataset_id is not None:
+        where.append(LogModel.dataset_id == query.dataset_id)
+    if query.group_id is not None:
+        where.append(LogModel.group_id == query.group_id)
+    if query.person is not None:
+        tokens = _SHOWN.startswith(f"{query.person}{TOKEN}", autoescape=True)
+        where.append(or_(_SHOWN.in_([query.person]), tokens))
+    if query.kinds is not None:
+        where.append(LogModel.kind.in_(query.kinds))
+    if query.since is not None:
+        where.append(LogModel.at >= query.since)
+    if query.until is not None:
+        where.append(LogModel.at < query.until)
     return where

@@ -16,7 +16,7 @@ from app.features.audit.queries import AuditQuery
 from app.features.audit.schemas import AuditDocument
 from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
 from app.features.datasets.service import dataset_id
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.finite import MAX_ID
 from app.formats.csv_text import csv_line
 from app.http.access import login_of
@@ -31,16 +31,16 @@ router = APIRouter(prefix="/audit", tags=["users"], route_class=Route)
 COLUMNS = tuple(field.name for field in fields(AuditEntry))
 
 
-async def get_led(request: Request) -> Sight:
+async def get_led(request: Request) -> Visibility:
     """The datasets whose audit whoever asks may read."""
     login = login_of(request.scope)
-    return EVERYTHING if login is None else login.roles.led()
+    return EVERYTHING if login is None else login.roles.led_datasets()
 
 
-Led = Annotated[Sight, Depends(get_led)]
+Led = Annotated[Visibility, Depends(get_led)]
 
 
-def asked_for(
+def audit_query(
     store: AppStore,
     dataset: Annotated[
         str | None, Query(max_length=200, description="Name or id of the dataset.")
@@ -76,7 +76,7 @@ def _text(at: datetime | None) -> str | None:
         return at.replace(tzinfo=UTC).isoformat(timespec="microseconds")
 
 
-Asked = Annotated[AuditQuery, Depends(asked_for)]
+Asked = Annotated[AuditQuery, Depends(audit_query)]
 Search = Annotated[
     str,
     Query(
@@ -92,7 +92,7 @@ Search = Annotated[
 def get_audit(
     store: AppStore,
     led: Led,
-    asked: Asked,
+    query: Asked,
     search: Search = "",
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
     cursor: Cursor = None,
@@ -104,7 +104,7 @@ def get_audit(
     and have a `next` all the same.
     """
     return audit.read_audit(
-        store, asked, led, search=search, before=first_below(cursor, before), limit=limit
+        store, query, led, search=search, before=first_below(cursor, before), limit=limit
     )
 
 
@@ -119,10 +119,10 @@ def get_audit(
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=Where.SOMEWHERE)
 def export_audit(
-    ending: Literal["csv", "jsonl"], store: AppStore, led: Led, asked: Asked, search: Search = ""
+    ending: Literal["csv", "jsonl"], store: AppStore, led: Led, query: Asked, search: Search = ""
 ) -> StreamingResponse:
     """The same, all of it, as a table (no cell of which is a formula) or as JSON Lines."""
-    found = audit.every_entry(store, asked, led, search)
+    found = audit.every_entry(store, query, led, search)
     lines = _csv(found) if ending == "csv" else _json_lines(found)
     kind = "text/csv; charset=utf-8" if ending == "csv" else "application/x-ndjson"
     saved = {"Content-Disposition": f'attachment; filename="touchline-audit.{ending}"'}

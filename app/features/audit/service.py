@@ -13,7 +13,7 @@ from app.errors import NotFoundError
 from app.features.audit.queries import AuditQuery as AuditQuery
 from app.features.audit.queries import AuditRow, audit_rows
 from app.features.comments.queries import find_group
-from app.features.people.visibility_queries import Sight
+from app.features.people.visibility_queries import Visibility
 from app.finite import Moment
 from app.plural import plural
 
@@ -94,8 +94,8 @@ class AuditPage:
 
 def read_audit(
     store: Store,
-    asked: AuditQuery,
-    sight: Sight,
+    query: AuditQuery,
+    visibility: Visibility,
     *,
     search: str = "",
     before: int | None = None,
@@ -105,8 +105,8 @@ def read_audit(
 
     Args:
         store: The database.
-        asked: Of whom, of what and when.
-        sight: The datasets whose audit somebody may read.
+        query: Of whom, of what and when.
+        visibility: The datasets whose audit somebody may read.
         search: Words that all stand in an entry: its sentence, person, dataset or group.
         before: ``next`` of the page before.
         limit: Entries at most. A search looks through ``MOST_LOOKED_AT`` at a time, and may give fewer.
@@ -117,7 +117,7 @@ def read_audit(
     looked = 0
     with store.read() as session:
         while looked < MOST_LOOKED_AT:
-            rows = audit_rows(session, asked, sight, before, batch)
+            rows = audit_rows(session, query, visibility, before, batch)
             for row in rows:
                 entry = _entry(row)
                 if _holds(entry, words):
@@ -139,7 +139,7 @@ def require_group(store: Store, group_id: int) -> None:
 
 
 def every_entry(
-    store: Store, asked: AuditQuery, sight: Sight, search: str = ""
+    store: Store, query: AuditQuery, visibility: Visibility, search: str = ""
 ) -> Iterator[AuditEntry]:
     """All of it, a page at a time, so that a long log fits into memory.
 
@@ -147,7 +147,7 @@ def every_entry(
     """
 
     def page_after(before: int | None) -> AuditPage:
-        return read_audit(store, asked, sight, search=search, before=before, limit=_BATCH)
+        return read_audit(store, query, visibility, search=search, before=before, limit=_BATCH)
 
     def entries(page: AuditPage) -> Iterator[AuditEntry]:
         yield from page.items
@@ -206,18 +206,18 @@ def _plain(row: AuditRow, _body: Mapping[str, Any]) -> str:
 
 def _edit(row: AuditRow, body: Mapping[str, Any]) -> str:
     edit = body.get("edit")
-    said = edit if isinstance(edit, dict) else body
+    edits = edit if isinstance(edit, dict) else body
     verb = {"undo": "undid: ", "redo": "redid: "}.get(row.kind.removeprefix("station_"), "")
-    return verb + "; ".join(_one_edit(row, one) for one in single_edits(said))
+    return verb + "; ".join(_one_edit(row, one) for one in single_edits(edits))
 
 
-def _one_edit(row: AuditRow, said: Mapping[str, Any]) -> str:
-    name = str(said.get("edit", row.kind))
-    view = f" of view {said['view']}" if said.get("view") else ""
-    lines = said.get("lines")
+def _one_edit(row: AuditRow, edit: Mapping[str, Any]) -> str:
+    name = str(edit.get("edit", row.kind))
+    view = f" of view {edit['view']}" if edit.get("view") else ""
+    lines = edit.get("lines")
     names = f": {', '.join(lines)}" if isinstance(lines, dict) and lines else ""
     if name == "include_view":
-        what = "use" if said.get("included") else "leaving out"
+        what = "use" if edit.get("included") else "leaving out"
     else:
         what = name.removeprefix("set_").replace("_", " ")
     return f"{what}{view}{names}"
@@ -232,12 +232,12 @@ def _dismissal(_row: AuditRow, body: Mapping[str, Any]) -> str:
 
 
 def _verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
-    said = [str(body.get("state"))]
+    parts = [str(body.get("state"))]
     if body.get("reason"):
-        said.append(f"because of {str(body['reason']).replace('_', ' ')}")
+        parts.append(f"because of {str(body['reason']).replace('_', ' ')}")
     if body.get("override"):
-        said.append(f"although {str(body['override']).replace('_', ' ')} fails")
-    return " ".join(said) + (f": {body['note']}" if body.get("note") else "")
+        parts.append(f"although {str(body['override']).replace('_', ' ')} fails")
+    return " ".join(parts) + (f": {body['note']}" if body.get("note") else "")
 
 
 def _bulk(row: AuditRow, body: Mapping[str, Any]) -> str:
@@ -249,8 +249,8 @@ def _bulk(row: AuditRow, body: Mapping[str, Any]) -> str:
 def _comment(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = {"said": "commented", "edited": "changed a comment", "deleted": "deleted a comment"}
     did |= {"resolved": "resolved a thread", "reopened": "reopened a thread"}
-    said = did.get(str(body.get("did")), "commented")
-    return f"{said}: {body['text']}" if body.get("text") else said
+    verb = did.get(str(body.get("did")), "commented")
+    return f"{verb}: {body['text']}" if body.get("text") else verb
 
 
 _WAYS = {"passkey": " by passkey", "sign_on": " by single sign-on"}
@@ -268,12 +268,12 @@ def _job(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"requested: {body.get('title')}"
 
 
-def _deed(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _event_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     more = [str(value) for name, value in body.items() if name != "did" and value is not None]
     return f"{body.get('did')}: {', '.join(more)}" if more else str(body.get("did"))
 
 
-_BATCH_DEEDS = {"made": "assigned", "changed": "changed", "closed": "closed", "deleted": "deleted"}
+_BATCH_EVENTS = {"made": "assigned", "changed": "changed", "closed": "closed", "deleted": "deleted"}
 
 
 _STARTS = {
@@ -283,12 +283,12 @@ _STARTS = {
 }
 
 
-def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
+def _own_work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     """What became of batches, of somebody's own annotation, of gold groups and of guidelines; None: none of these."""
     did, person, group = (body.get(name) for name in ("did", "person", "group"))
     why = f": {body['reason']}" if body.get("reason") else ""
     verdict = f", {body['verdict']}" if body.get("verdict") else ""
-    said = {
+    sentences = {
         ("take", "adopted"): f"took over {person}’s independent annotation",
         ("take", "handed in"): f"submitted their independent annotation{verdict}",
         ("take", "handed back"): f"returned to {person}{why}",
@@ -305,19 +305,19 @@ def _own(row: AuditRow, body: Mapping[str, Any]) -> str | None:
         ): f"lets annotators of gold group {group} begin with {_STARTS.get(str(body.get('start')))}",
         ("gold", "unmarked"): f"unmarked gold group {group}",
     }
-    if row.kind == "work" and did in _BATCH_DEEDS and "name" in body:
-        return f"{_BATCH_DEEDS[did]} the batch “{body['name']}”"
+    if row.kind == "work" and did in _BATCH_EVENTS and "name" in body:
+        return f"{_BATCH_EVENTS[did]} the batch “{body['name']}”"
     if row.kind == "gold" and "groups" in body:
         return f"marked {plural(len(body['groups']), 'group')} of a {body['source']} as gold"
     if row.kind == "guideline" and "number" in body:
         return f"wrote version {body['number']} of the guidelines"
-    return said.get((row.kind, str(did)))
+    return sentences.get((row.kind, str(did)))
 
 
 def _work(row: AuditRow, body: Mapping[str, Any]) -> str:
-    said = _own(row, body)
-    if said is not None:
-        return said
+    sentence = _own_work_sentence(row, body)
+    if sentence is not None:
+        return sentence
     parts = ("name", "batch", "group", "take", "person")
     about = [f"{part} {body[part]}" for part in parts if isinstance(body.get(part), (int, str))]
     return f"{row.kind} {body.get('did', 'written')}" + (f": {', '.join(about)}" if about else "")
@@ -340,7 +340,7 @@ _SENTENCES: Mapping[str, Callable[[AuditRow, Mapping[str, Any]], str]] = {
     "comment": _comment,
     "person": _person,
     "job": _job,
-    "deed": _deed,
+    "deed": _event_sentence,
     "policy": _named("set the policy"),
     "freeze": _named("froze the version"),
     "dataset": _named("made the dataset"),

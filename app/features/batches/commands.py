@@ -62,7 +62,7 @@ def give(
 ) -> None:
     """Give out the groups that a query finds now, in its order."""
     day = _day(due)
-    asked: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "name": name,
         "size": size,
         "annotators": annotator or [],
@@ -76,14 +76,14 @@ def give(
     if server is not None:
         from app.terminal.remote import give_values
 
-        body = {**asked, "q": query, "due": None if day is None else day.isoformat()}
+        body = {**fields, "q": query, "due": None if day is None else day.isoformat()}
         with connected(server) as client:
             print_values(give_values(client, dataset, body), json_)
         return
     from app.features.batches.service import NewBatch, make_batch
 
     with opened_store() as store:
-        new = NewBatch(query=query, due=day, **asked)
+        new = NewBatch(query=query, due=day, **fields)
         print_values(_values(make_batch(store, dataset, new, actor=acting())), json_)
 
 
@@ -126,9 +126,9 @@ def gold(
     if server is not None:
         from app.terminal.remote import choose_gold
 
-        asked = {"source": source, "version": version, "q": query, "size": size, "start": start}
+        body = {"source": source, "version": version, "q": query, "size": size, "start": start}
         with connected(server) as client:
-            print_values(choose_gold(client, dataset, asked), json_)
+            print_values(choose_gold(client, dataset, body), json_)
         return
     from app.features.independent_annotations.known_truth import GoldChoice, mark_known
 
@@ -193,10 +193,10 @@ def _line(value: dict[str, Any]) -> str:
     )
 
 
-def _day(said: str | None) -> date | None:
+def _day(text: str | None) -> date | None:
     try:
-        return None if said is None else date.fromisoformat(said)
+        return None if text is None else date.fromisoformat(text)
     except ValueError:
         raise typer.BadParameter(
-            f'"{said}" is no day; write it as 2026-12-24', param_hint="--due"
+            f'"{text}" is no day; write it as 2026-12-24', param_hint="--due"
         ) from None

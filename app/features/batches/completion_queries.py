@@ -59,20 +59,20 @@ def settle_judged(session: Session, states: Mapping[int, str], *, actor: str, at
         if settled is not None:
             session.execute(_CLOSE, given)
             near = [row.id for row in touched if row.is_near]
-            _tell_done(session, near, actor=actor, at=at)
+            _announce_done(session, near, actor=actor, at=at)
 
 
 def settle_in_batch(session: Session, batch_id: int, group_id: int, *, actor: str, at: str) -> None:
     """The work on a group of a batch is over."""
     mine = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
     waits = (*mine, BatchGroupModel.settled.is_(None))
-    told = select(_BATCH.c.id).where(_BATCH.c.id == batch_id, _TELLS, exists().where(*waits))
-    near = list(session.scalars(told))
+    nearly_done = select(_BATCH.c.id).where(_BATCH.c.id == batch_id, _TELLS, exists().where(*waits))
+    near = list(session.scalars(nearly_done))
     session.execute(update(BatchGroupModel).where(*waits).values(settled=at))
-    _tell_done(session, near, actor=actor, at=at)
+    _announce_done(session, near, actor=actor, at=at)
 
 
-def _tell_done(session: Session, batch_ids: Collection[int], *, actor: str, at: str) -> None:
+def _announce_done(session: Session, batch_ids: Collection[int], *, actor: str, at: str) -> None:
     """Tell of those of some batches in which no group waits any more."""
     if not batch_ids:
         return

@@ -14,13 +14,13 @@ from app.db.log import Entry, append
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, HeldGroupError, NotFoundError
-from app.features.batches.own import (
+from app.features.batches.own_annotations import (
     as_seen,
-    hand_in_own,
     next_own,
     own_of,
     own_total,
     returned_to,
+    submit_own,
     takes_part,
 )
 from app.features.batches.queries import (
@@ -28,15 +28,15 @@ from app.features.batches.queries import (
     end_leases,
     forget_ended,
     group_in,
-    hand_in,
     keep_lease,
     leases_on,
+    mark_submitted,
     waiting_group,
 )
-from app.features.batches.service import WORK, Batch, Here, Part, read_batch
-from app.features.independent_annotations.queries import Take
-from app.features.independent_annotations.return_work import checked_reason, note_hand_back
-from app.features.independent_annotations.service import HandedBack, read_handed_back
+from app.features.batches.service import WORK, Batch, Part, Presence, read_batch
+from app.features.independent_annotations.queries import IndependentAnnotation
+from app.features.independent_annotations.return_work import checked_reason, log_return
+from app.features.independent_annotations.service import ReturnedGroup, read_returned
 from app.features.people.visibility_queries import is_blind
 
 LASTS = timedelta(minutes=3)
@@ -44,7 +44,7 @@ LASTS = timedelta(minutes=3)
 
 
 @dataclass(frozen=True)
-class Worker:
+class BatchMember:
     """Who works on a batch.
 
     Attributes:
@@ -89,9 +89,9 @@ class Lease:
     group: int | None
     part: Part | None = None
     until: str | None = None
-    here: tuple[Here, ...] = ()
+    here: tuple[Presence, ...] = ()
     handed_in_by: str | None = None
-    handed_back: HandedBack | None = None
+    handed_back: ReturnedGroup | None = None
     place: int | None = None
     of: int | None = None
 
@@ -107,7 +107,7 @@ class Leases:
     def __init__(self, store: Store, clock: Callable[[], datetime] = lambda: datetime.now(UTC)):
         self._store, self._clock = store, clock
 
-    def next(self, batch_id: int, worker: Worker, *, after: int | None = None) -> Lease:
+    def next(self, batch_id: int, worker: BatchMember, *, after: int | None = None) -> Lease:
         """Take a lease on the next group that waits for somebody, and that nobody has open.
 
         Args:
@@ -127,23 +127,27 @@ class Leases:
             mine = next((group for group in back if group != after), None)
             if mine is not None:
                 row = _group(session, batch, mine)
-                return self._kept(session, batch, row, Part.ANNOTATOR, worker)
-        take = next_own(self._store, batch, worker.name)
-        if take is None:
+                return self._renewed(session, batch, row, Part.ANNOTATOR, worker)
+        annotation = next_own(self._store, batch, worker.name)
+        if annotation is None:
             return Lease(batch, None, Part.ANNOTATOR)
         with self._store.read() as session:
-            return _own(session, batch, take, worker)
+            return _copy_lease(session, batch, annotation, worker)
 
-    def _next(self, session: Session, batch: Batch, worker: Worker, after: int | None) -> Lease:
+    def _next(
+        self, session: Session, batch: Batch, worker: BatchMember, after: int | None
+    ) -> Lease:
         at = self._now()
         forget_ended(session, at)
         found = open_for(session, batch, worker, at, after=after)
         if found is None:
             return Lease(batch, None)
         row, part = found
-        return self._kept(session, batch, row, part, worker)
+        return self._renewed(session, batch, row, part, worker)
 
-    def take(self, batch_id: int, group: int, worker: Worker, *, take_over: bool = False) -> Lease:
+    def take(
+        self, batch_id: int, group: int, worker: BatchMember, *, take_over: bool = False
+    ) -> Lease:
         """Take a lease on a group, or let the one last on that they have.
 
         Args:
@@ -161,17 +165,17 @@ class Leases:
             batch = _open_batch(session, batch_id)
             own = own_of(session, batch, group, worker.name)
             if own is not None:
-                return _own(session, batch, own, worker)
+                return _copy_lease(session, batch, own, worker)
             _require_given(session, batch, group, worker)
             parts, row = _need_parts(batch, worker), _group(session, batch, group)
-            others = _others(session, batch, group, worker, self._now())
+            others = _blocking_leases(session, batch, group, worker, self._now())
             if others and not take_over:
-                here = _here(session, batch, group, self._now())
+                here = _presences(session, batch, group, self._now())
                 raise HeldGroupError(f"{others[0].person} has this group open", here)
             end_leases(session, [row.id for row in others])
-            return self._kept(session, batch, row, _part_in(parts, row), worker)
+            return self._renewed(session, batch, row, _part_in(parts, row), worker)
 
-    def give_back(self, batch_id: int, group: int, worker: Worker) -> Lease:
+    def give_back(self, batch_id: int, group: int, worker: BatchMember) -> Lease:
         """End a lease; it does not matter whether there is one.
 
         Raises:
@@ -180,10 +184,10 @@ class Leases:
         with self._store.write(lasting=False) as session:
             batch = as_seen(session, read_batch(session, batch_id, with_here=False))
             end_lease_of(session, batch_id, group, worker.name)
-            return Lease(batch, group, here=_here(session, batch, group, self._now()))
+            return Lease(batch, group, here=_presences(session, batch, group, self._now()))
 
-    def hand_in(
-        self, batch_id: int, group: int, worker: Worker, *, actor: str, done: bool = True
+    def submit(
+        self, batch_id: int, group: int, worker: BatchMember, *, actor: str, done: bool = True
     ) -> Lease:
         """Say that the annotation of a group is done, so that a reviewer gets it; or that it is not.
 
@@ -198,7 +202,7 @@ class Leases:
         if own is not None:
             lease = Lease(batch, group)
             with self._store.write() as session:
-                hand_in_own(session, own, actor=actor, done=done)
+                submit_own(session, own, actor=actor, done=done)
                 session.respond(lease)
             return lease
         with self._store.write() as session:
@@ -211,14 +215,16 @@ class Leases:
             if row.settled is not None or others:
                 by = row.handed_in_by or "somebody"
                 raise ConflictError(f"{by} has submitted this group", hint="Go on with the next.")
-            hand_in(session, batch_id, group, at=self._now() if done else None, by=worker.name)
+            mark_submitted(
+                session, batch_id, group, at=self._now() if done else None, by=worker.name
+            )
             did = "handed in" if done else "taken back"
             body = {"batch": batch.id, "dataset": batch.dataset_id, "did": did, "group": group}
             append(session, [Entry(WORK, actor, self._now(), body)])
-            return self._ended(session, batch_id, group, worker)
+            return self._ended_lease(session, batch_id, group, worker)
 
-    def hand_back(
-        self, batch_id: int, group: int, worker: Worker, reason: str = "", *, actor: str
+    def return_group(
+        self, batch_id: int, group: int, worker: BatchMember, reason: str = "", *, actor: str
     ) -> Lease:
         """Give a group that was handed in back to who did, and tell them why; they get it next.
 
@@ -227,7 +233,7 @@ class Leases:
             ConflictError: It is not handed in, its work is over, or the batch is closed.
             InputError: The sentence is too long.
         """
-        said = checked_reason(reason)
+        checked = checked_reason(reason)
         with self._store.write() as session:
             batch = _open_batch(session, batch_id)
             row = _group(session, batch, group)
@@ -236,29 +242,33 @@ class Leases:
             if row.handed_in is None:
                 raise ConflictError("this group is not submitted")
             person = row.handed_in_by
-            hand_in(session, batch_id, group, at=None, by=person, returned=True)
-            note_hand_back(session, WORK, group, person, said, actor=actor, batch=batch_id)
-            return self._ended(session, batch_id, group, worker)
+            mark_submitted(session, batch_id, group, at=None, by=person, returned=True)
+            log_return(session, WORK, group, person, checked, actor=actor, batch=batch_id)
+            return self._ended_lease(session, batch_id, group, worker)
 
-    def _ended(self, session: Session, batch_id: int, group: int, worker: Worker) -> Lease:
+    def _ended_lease(
+        self, session: Session, batch_id: int, group: int, worker: BatchMember
+    ) -> Lease:
         """The response once somebody's lease has ended with what they said of the group."""
         end_lease_of(session, batch_id, group, worker.name)
         batch = as_seen(session, read_batch(session, batch_id))
-        lease = Lease(batch, group, here=_here(session, batch, group, self._now()))
+        lease = Lease(batch, group, here=_presences(session, batch, group, self._now()))
         session.respond(lease)
         return lease
 
-    def _kept(self, session: Session, batch: Batch, row: Any, part: Part, worker: Worker) -> Lease:
+    def _renewed(
+        self, session: Session, batch: Batch, row: Any, part: Part, worker: BatchMember
+    ) -> Lease:
         at, group = self._clock(), row.group_id
         until = text_of(at + LASTS)
         keep_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
-        here = _here(session, batch, group, text_of(at))
+        here = _presences(session, batch, group, text_of(at))
         if row.handed_in_by is None:
             return Lease(batch, group, part, until, here)
         if row.handed_in is not None:
             return Lease(batch, group, part, until, here, row.handed_in_by)
         # Who handed it in has it back; their name stays with it.
-        back = read_handed_back(session, [group]).get(group)
+        back = read_returned(session, [group]).get(group)
         return Lease(batch, group, part, until, here, handed_back=back)
 
     def _now(self) -> str:
@@ -266,7 +276,7 @@ class Leases:
 
 
 def open_for(
-    session: Session, batch: Batch, worker: Worker, at: str, *, after: int | None = None
+    session: Session, batch: Batch, worker: BatchMember, at: str, *, after: int | None = None
 ) -> tuple[Any, Part] | None:
     """The row of the group that somebody gets next of a batch, and what they do with it.
 
@@ -304,22 +314,26 @@ def open_for(
     return None
 
 
-def _own(session: Session, batch: Batch, take: Take, worker: Worker) -> Lease:
+def _copy_lease(
+    session: Session, batch: Batch, annotation: IndependentAnnotation, worker: BatchMember
+) -> Lease:
     """Of a copy, which nobody else can have open."""
     of = own_total(session, batch, worker.name)
-    return Lease(batch, take.copy_id, Part.ANNOTATOR, place=take.place, of=of)
+    return Lease(batch, annotation.copy_id, Part.ANNOTATOR, place=annotation.place, of=of)
 
 
-def _others(session: Session, batch: Batch, group: int, worker: Worker, at: str) -> list[Any]:
+def _blocking_leases(
+    session: Session, batch: Batch, group: int, worker: BatchMember, at: str
+) -> list[Any]:
     """The leases of others that stand in somebody's way; none where each has a copy of their own."""
     if batch.verdicts > 1:
         return []
     return [row for row in leases_on(session, group, at) if row.person != worker.name]
 
 
-def _here(session: Session, batch: Batch, group: int, at: str) -> tuple[Here, ...]:
+def _presences(session: Session, batch: Batch, group: int, at: str) -> tuple[Presence, ...]:
     return tuple(
-        Here(group, row.person, row.taken, row.seen)
+        Presence(group, row.person, row.taken, row.seen)
         for row in leases_on(session, group, at)
         if row.batch_id == batch.id or batch.verdicts == 1
     )
@@ -332,7 +346,7 @@ def _open_batch(session: Session, batch_id: int) -> Batch:
     return as_seen(session, batch)
 
 
-def _need_parts(batch: Batch, worker: Worker) -> set[Part]:
+def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
     parts = worker.parts(batch)
     if not parts:
         raise ConflictError(
@@ -348,7 +362,7 @@ def _part_in(parts: set[Part], row: Any) -> Part:
     return Part.REVIEWER
 
 
-def _require_given(session: Session, batch: Batch, group: int, worker: Worker) -> None:
+def _require_given(session: Session, batch: Batch, group: int, worker: BatchMember) -> None:
     """Who works on copies that tell nothing of their originals does not open these by the batch.
 
     Raises:

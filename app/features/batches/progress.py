@@ -12,8 +12,8 @@ from typing import Any
 
 from app.db.session import Session, text_of
 from app.db.store import Store
-from app.features.batches.leases import Worker
-from app.features.batches.own import as_seen, own_left, own_part, takes_part
+from app.features.batches.leases import BatchMember
+from app.features.batches.own_annotations import as_seen, own_left, own_part, takes_part
 from app.features.batches.queries import (
     batches_that_wait,
     datasets_with_batches,
@@ -24,9 +24,9 @@ from app.features.batches.queries import (
 )
 from app.features.batches.service import Batch, Part, read_batch, read_batches
 from app.features.datasets.service import dataset_id
-from app.features.independent_annotations.queries import open_takes, takes_of_batch
-from app.features.independent_annotations.service import HandedBack, read_handed_back
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.independent_annotations.queries import annotations_of_batch, open_annotations
+from app.features.independent_annotations.service import ReturnedGroup, read_returned
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.webhooks.queries import STALLED, announce, listeners, stamp, webhooks_on
 from app.soccer.actors import person_of
 
@@ -34,7 +34,7 @@ BY_ITSELF = "script:batches"
 """Who tells of it."""
 
 
-class Why(StrEnum):
+class StallReason(StrEnum):
     """Why a batch has stalled."""
 
     IDLE = "idle"
@@ -47,7 +47,7 @@ class Why(StrEnum):
 class Stall:
     """Since when a batch stands still, and why."""
 
-    why: Why
+    why: StallReason
     since: str
 
 
@@ -70,13 +70,13 @@ def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> Stall | Non
     if not batch.is_open or batch.settled >= batch.groups:
         return None
     if at - datetime.fromisoformat(last) > timedelta(hours=hours):
-        return Stall(Why.IDLE, last)
+        return Stall(StallReason.IDLE, last)
     if batch.due is not None and batch.due < at.date().isoformat():
-        return Stall(Why.OVERDUE, batch.due)
+        return Stall(StallReason.OVERDUE, batch.due)
     return None
 
 
-def tell_stalls(store: Store, at: datetime) -> int:
+def notify_of_stalls(store: Store, at: datetime) -> int:
     """Tell webhooks of the batches that have stalled, of each stall once; returns how many messages."""
     with store.read() as session:
         wanted = {row.dataset_id for row in webhooks_on(session)}
@@ -85,7 +85,7 @@ def tell_stalls(store: Store, at: datetime) -> int:
     if not found:
         return 0
     with store.write() as session:
-        return sum(_tell(session, batch, stall, at) for batch, stall in found)
+        return sum(_notify_of_stall(session, batch, stall, at) for batch, stall in found)
 
 
 def _stalls(
@@ -96,9 +96,9 @@ def _stalls(
     return [(batch, stall) for batch, stall in found if stall is not None]
 
 
-def _tell(session: Session, batch: Batch, stall: Stall, at: datetime) -> int:
+def _notify_of_stall(session: Session, batch: Batch, stall: Stall, at: datetime) -> int:
     event = f"batch{batch.id}_{stall.why}{stamp(stall.since)}"
-    told = {"why": str(stall.why), "since": stall.since}
+    details = {"why": str(stall.why), "since": stall.since}
     return announce(
         session,
         batch.dataset_id,
@@ -107,7 +107,7 @@ def _tell(session: Session, batch: Batch, stall: Stall, at: datetime) -> int:
         actor=BY_ITSELF,
         at=text_of(at),
         batch_id=batch.id,
-        also=told,
+        also=details,
     )
 
 
@@ -123,7 +123,7 @@ class MyBatch:
     batch: Batch
     parts: list[Part]
     left: int
-    handed_back: list[HandedBack] = field(default_factory=list)
+    handed_back: list[ReturnedGroup] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -162,36 +162,39 @@ class TeamBatch:
 
 
 def my_work(
-    store: Store, worker_in: Callable[[int], Worker], sight: Sight = EVERYTHING
+    store: Store, worker_in: Callable[[int], BatchMember], visibility: Visibility = EVERYTHING
 ) -> list[MyBatch]:
     """Open batches that are somebody's, those that are due first, first.
 
     Args:
         store: The database.
         worker_in: What somebody is in a dataset, by its id.
-        sight: Which datasets they see.
+        visibility: Which datasets they see.
     """
     with store.read() as session:
-        ids = [one for one in datasets_with_batches(session) if sight.sees(one)]
+        ids = [one for one in datasets_with_batches(session) if visibility.sees(one)]
         found = []
         for batch in read_batches(session, ids):
             worker = worker_in(batch.dataset_id)
             parts = worker.parts(batch)
             if batch.is_open and parts:
                 own = takes_part(batch, parts)
-                left = own_left(session, batch, worker.name) if own else _left(batch, parts)
-                back = _handed_back(session, batch, worker.name)
+                left = own_left(session, batch, worker.name) if own else _count_left(batch, parts)
+                back = _returned_groups(session, batch, worker.name)
                 seen = own_part(session, batch, worker.name) if own else batch
                 found.append(MyBatch(as_seen(session, seen), sorted(parts), left, back))
         return found
 
 
-def _handed_back(session: Session, batch: Batch, name: str) -> list[HandedBack]:
+def _returned_groups(session: Session, batch: Batch, name: str) -> list[ReturnedGroup]:
     """What of a batch somebody has back, in its order."""
     person = person_of(name)
-    rows = (*groups_returned(session, [batch.id], person), *open_takes(session, [batch.id], person))
+    rows = (
+        *groups_returned(session, [batch.id], person),
+        *open_annotations(session, [batch.id], person),
+    )
     waiting = [row.group_id for row in rows]
-    back = read_handed_back(session, waiting) if waiting else {}
+    back = read_returned(session, waiting) if waiting else {}
     return [back[group] for group in waiting if group in back]
 
 
@@ -204,7 +207,7 @@ def team_work(store: Store, dataset: str | int, *, at: datetime | None = None) -
         return [_team_batch(session, batch, moment, hours) for batch in batches]
 
 
-def _left(batch: Batch, parts: Iterable[Part]) -> int:
+def _count_left(batch: Batch, parts: Iterable[Part]) -> int:
     """Groups that somebody with these parts may still get."""
     left = batch.waiting if Part.ANNOTATOR in parts or not batch.annotators else 0
     return left + (batch.handed_in if Part.REVIEWER in parts else 0)
@@ -212,13 +215,13 @@ def _left(batch: Batch, parts: Iterable[Part]) -> int:
 
 def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:
     stall = stall_of(batch, last_of(session, batch), at, hours)
-    since = stall.since if stall is not None and stall.why is Why.IDLE else None
+    since = stall.since if stall is not None and stall.why is StallReason.IDLE else None
     entries = entries_of_work(session, batch.id, batch.created)
-    takes = takes_of_batch(session, batch.id, batch.dataset_id)
-    return TeamBatch(batch, since, _paces(entries, groups_of(session, batch.id), takes))
+    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
+    return TeamBatch(batch, since, _paces(entries, groups_of(session, batch.id), annotations))
 
 
-def _paces(entries: Sequence[Any], groups: Sequence[Any], takes: Sequence[Any]) -> list[Pace]:
+def _paces(entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[Any]) -> list[Pace]:
     """What each person did, from the log and from what was handed in; of groups, and of own copies.
 
     What stands in the original under the name of somebody who has a copy was taken over from it: it
@@ -227,7 +230,7 @@ def _paces(entries: Sequence[Any], groups: Sequence[Any], takes: Sequence[Any]) 
     times: dict[str, list[str]] = defaultdict(list)
     judged: dict[str, set[int]] = defaultdict(set)
     handed_in: dict[str, set[int]] = defaultdict(set)
-    taken_over = {(take.person, take.group_id) for take in takes}
+    taken_over = {(annotation.person, annotation.group_id) for annotation in annotations}
     for row in entries:
         name = person_of(row.actor)
         if (name, row.group_id) in taken_over:
@@ -236,7 +239,9 @@ def _paces(entries: Sequence[Any], groups: Sequence[Any], takes: Sequence[Any]) 
         if row.kind == "verdict":
             judged[name].add(row.group_id)
     given = [(row.handed_in_by, row.group_id, row.handed_in) for row in groups]
-    given += [(take.person, take.copy_id, take.handed_in) for take in takes]
+    given += [
+        (annotation.person, annotation.copy_id, annotation.handed_in) for annotation in annotations
+    ]
     for name, group, at in given:
         if at is not None:
             handed_in[name].add(group)

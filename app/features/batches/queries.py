@@ -26,7 +26,7 @@ from app.db.log import LogModel
 from app.db.session import Session
 from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
 from app.features.datasets.tables import DatasetModel
-from app.features.independent_annotations.tables import TakeModel
+from app.features.independent_annotations.tables import IndependentAnnotationModel
 from app.features.people.tables import PersonModel
 from app.features.people.visibility_queries import seen_in
 from app.features.queue.tables import QueueModel
@@ -49,10 +49,10 @@ _LEASES_ON = _LEASES.where(
     LeaseModel.group_id == bindparam("group"), LeaseModel.until > bindparam("at")
 )
 _LEASES_IN = _LEASES.where(LeaseModel.batch_id.in_(_IDS), LeaseModel.until > bindparam("at"))
-_TAKE = upsert(LeaseModel)
-_KEEP = _TAKE.on_conflict_do_update(
+_ANNOTATION = upsert(LeaseModel)
+_KEEP = _ANNOTATION.on_conflict_do_update(
     index_elements=["batch_id", "group_id", "person"],
-    set_={"seen": _TAKE.excluded.seen, "until": _TAKE.excluded.until},
+    set_={"seen": _ANNOTATION.excluded.seen, "until": _ANNOTATION.excluded.until},
 )
 _ENDED = delete(LeaseModel).where(LeaseModel.until <= bindparam("at"))
 _PEOPLE = (
@@ -188,7 +188,7 @@ def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, Any]:
     return {row.batch_id: row for row in session.execute(_COUNT, {"ids": list(batch_ids)})}
 
 
-def hand_in(
+def mark_submitted(
     session: Session,
     batch_id: int,
     group_id: int,
@@ -320,7 +320,9 @@ def last_work(session: Session, batch_id: int) -> str | None:
 
 def _worked_on(batch_id: int) -> tuple[ColumnElement[bool], ...]:
     mine = select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id == batch_id)
-    copies = select(TakeModel.copy_id).where(TakeModel.batch_id == batch_id)
+    copies = select(IndependentAnnotationModel.copy_id).where(
+        IndependentAnnotationModel.batch_id == batch_id
+    )
     return LogModel.group_id.in_(mine.union_all(copies)), LogModel.kind.in_(_DONE_KINDS)
 
 

@@ -8,10 +8,10 @@ from typing import Annotated
 from fastapi import APIRouter, BackgroundTasks, Depends, Request, Response
 
 from app.db.store import Store
-from app.features.agreement.service import after_hand_in
-from app.features.batches import own, progress
+from app.features.agreement.service import after_submission
+from app.features.batches import own_annotations, progress
 from app.features.batches import service as batches
-from app.features.batches.leases import Lease, Leases, Worker
+from app.features.batches.leases import BatchMember, Lease, Leases
 from app.features.batches.schemas import (
     BatchEdit,
     BatchGroupList,
@@ -25,7 +25,7 @@ from app.features.batches.schemas import (
     WorkBatchList,
 )
 from app.features.batches.service import Batch, NewBatch
-from app.features.independent_annotations.schemas import HandBack
+from app.features.independent_annotations.schemas import ReturnReason
 from app.features.people.logins import Login
 from app.features.people.roles import lets
 from app.http.access import login_of
@@ -43,34 +43,34 @@ router = APIRouter(tags=["work"], route_class=Route)
 
 
 @dataclass(frozen=True)
-class Workers:
+class BatchMembers:
     """Who asks, and what they may in a dataset; on a server without accounts there is no ``login``."""
 
     login: Login | None
 
-    def here(self, dataset_id: int) -> Worker:
+    def here(self, dataset_id: int) -> BatchMember:
         """Them, in a dataset."""
         if self.login is None:
-            return Worker(LOCAL_USER, alone=True)
+            return BatchMember(LOCAL_USER, alone=True)
         role = self.login.roles.role_in(dataset_id)
         annotates, reviews = (lets(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
-        return Worker(self.login.name, annotates, reviews)
+        return BatchMember(self.login.name, annotates, reviews)
 
-    def of_batch(self, store: Store, batch: int) -> Worker:
+    def of_batch(self, store: Store, batch: int) -> BatchMember:
         """Them, in the dataset of a batch."""
         return self.here(batches.dataset_of_batch(store, batch))
 
 
-async def _workers(request: Request) -> Workers:
-    return Workers(login_of(request.scope))
+async def _workers(request: Request) -> BatchMembers:
+    return BatchMembers(login_of(request.scope))
 
 
-Asks = Annotated[Workers, Depends(_workers)]
+Members = Annotated[BatchMembers, Depends(_workers)]
 
 
-def _told(services: Services, lease: Lease) -> Lease:
+def _announced(services: Services, lease: Lease) -> Lease:
     """A lease of which everybody has been told who looks."""
-    services.events.tell_lease(lease)
+    services.events.publish_lease(lease)
     return lease
 
 
@@ -78,9 +78,9 @@ def _told(services: Services, lease: Lease) -> Lease:
 @may(Action.READ, where=Where.SOMEWHERE)
 @limit(LOOKS)
 @paged()
-def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
+def my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
-    return MyWork.model_validate({"items": progress.my_work(store, asks.here, sight)})
+    return MyWork.model_validate({"items": progress.my_work(store, members.here, visibility)})
 
 
 @router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
@@ -88,7 +88,7 @@ def my_work(store: AppStore, sight: Sees, asks: Asks) -> MyWork:
 @paged()
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     """The batches of a dataset."""
-    return WorkBatchList.model_validate({"items": own.seen_batches(store, dataset)})
+    return WorkBatchList.model_validate({"items": own_annotations.seen_batches(store, dataset)})
 
 
 def _made(batch: Batch) -> Response:
@@ -138,7 +138,7 @@ def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
 @may(Action.READ, batch=OwnedKind.WORK)
 def get_batch(batch: Id, store: AppStore) -> Batch:
     """One batch."""
-    return own.seen_batch(store, batch)
+    return own_annotations.seen_batch(store, batch)
 
 
 @router.patch(
@@ -176,99 +176,103 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
 
 @router.post(
     "/batches/{batch}/next",
-    operation_id="takeNextGroup",
+    operation_id="openNextGroup",
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @limit(EDITS)
-def take_next(batch: Id, come: NextGroup, services: AppServices, asks: Asks) -> Lease:
+def open_next_group(batch: Id, origin: NextGroup, services: AppServices, members: Members) -> Lease:
     """Take the next group that waits for whoever asks, and that nobody else has open.
 
     The lease lasts three minutes, and three more each time that it is taken again.
     """
-    worker = asks.of_batch(services.store, batch)
-    return _told(services, Leases(services.store).next(batch, worker, after=come.after))
+    worker = members.of_batch(services.store, batch)
+    return _announced(services, Leases(services.store).next(batch, worker, after=origin.after))
 
 
 @router.put(
     "/batches/{batch}/groups/{group}/lease",
-    operation_id="takeGroup",
+    operation_id="openGroup",
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @limit(EDITS)
-def take_group(batch: Id, group: Id, how: LeaseRequest, services: AppServices, asks: Asks) -> Lease:
+def open_group(
+    batch: Id, group: Id, how: LeaseRequest, services: AppServices, members: Members
+) -> Lease:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
-    worker = asks.of_batch(services.store, batch)
+    worker = members.of_batch(services.store, batch)
     taken = Leases(services.store).take(batch, group, worker, take_over=how.take_over)
-    return _told(services, taken)
+    return _announced(services, taken)
 
 
 @router.delete(
     "/batches/{batch}/groups/{group}/lease",
-    operation_id="giveGroupBack",
+    operation_id="releaseGroup",
     status_code=204,
     responses=responses(404),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @limit(EDITS)
-def give_back(batch: Id, group: Id, services: AppServices, asks: Asks) -> None:
+def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
-    worker = asks.of_batch(services.store, batch)
-    _told(services, Leases(services.store).give_back(batch, group, worker))
+    worker = members.of_batch(services.store, batch)
+    _announced(services, Leases(services.store).give_back(batch, group, worker))
 
 
 @router.put(
-    "/batches/{batch}/groups/{group}/hand-in",
-    operation_id="handInGroup",
+    "/batches/{batch}/groups/{group}/submission",
+    operation_id="submitGroup",
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @responds(as_document(LeaseDocument.model_validate))
-def hand_in(
+def submit_group(
     batch: Id,
     group: Id,
     services: AppServices,
     actor: Actor,
-    asks: Asks,
+    members: Members,
     background: BackgroundTasks,
 ) -> Lease:
     """Say that a group is annotated, so that a reviewer gets it."""
-    worker = asks.of_batch(services.store, batch)
-    background.add_task(after_hand_in, services.store, group, services.paint)
-    return _told(services, Leases(services.store).hand_in(batch, group, worker, actor=actor))
+    worker = members.of_batch(services.store, batch)
+    background.add_task(after_submission, services.store, group, services.paint)
+    return _announced(services, Leases(services.store).submit(batch, group, worker, actor=actor))
 
 
 @router.delete(
-    "/batches/{batch}/groups/{group}/hand-in",
-    operation_id="takeHandInBack",
+    "/batches/{batch}/groups/{group}/submission",
+    operation_id="withdrawSubmission",
     response_model=LeaseDocument,
     responses=responses(404, 409),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @responds(as_document(LeaseDocument.model_validate))
-def take_back(batch: Id, group: Id, services: AppServices, actor: Actor, asks: Asks) -> Lease:
+def withdraw_submission(
+    batch: Id, group: Id, services: AppServices, actor: Actor, members: Members
+) -> Lease:
     """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
-    worker = asks.of_batch(services.store, batch)
-    lease = Leases(services.store).hand_in(batch, group, worker, actor=actor, done=False)
-    return _told(services, lease)
+    worker = members.of_batch(services.store, batch)
+    lease = Leases(services.store).submit(batch, group, worker, actor=actor, done=False)
+    return _announced(services, lease)
 
 
 @router.post(
-    "/batches/{batch}/groups/{group}/hand-back",
-    operation_id="handBackGroup",
+    "/batches/{batch}/groups/{group}/return",
+    operation_id="returnGroup",
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.REVIEW, batch=OwnedKind.WORK)
 @responds(as_document(LeaseDocument.model_validate))
-def hand_back(
-    batch: Id, group: Id, why: HandBack, services: AppServices, actor: Actor, asks: Asks
+def return_group(
+    batch: Id, group: Id, why: ReturnReason, services: AppServices, actor: Actor, members: Members
 ) -> Lease:
     """Give a group back to the annotator who handed it in, and tell them why."""
-    worker = asks.of_batch(services.store, batch)
-    lease = Leases(services.store).hand_back(batch, group, worker, why.reason, actor=actor)
-    return _told(services, lease)
+    worker = members.of_batch(services.store, batch)
+    lease = Leases(services.store).return_group(batch, group, worker, why.reason, actor=actor)
+    return _announced(services, lease)

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.features.batches.progress import Pace
 from app.features.batches.service import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, BatchGroup, Part
 from app.features.datasets.service import MAX_TITLE
-from app.features.independent_annotations.service import HandedBack
+from app.features.independent_annotations.service import ReturnedGroup
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
@@ -142,7 +142,7 @@ class LeaseDocument(Document):
     until: datetime | None = Field(description="When the lease ends unless it is taken again.")
     here: list[PresenceDocument] = Field(description="People who have the group open.")
     handed_in_by: str | None = Field(description="Person who submitted it; null: not submitted.")
-    handed_back: HandedBack | None = Field(
+    handed_back: ReturnedGroup | None = Field(
         description="Why its annotator has it back; null: they have not."
     )
     place: int | None = Field(
@@ -161,7 +161,7 @@ class MyBatchDocument(Document):
     batch: WorkBatchDocument
     parts: list[Part]
     left: int = Field(description="Groups that one may still get.")
-    handed_back: list[HandedBack] = Field(
+    handed_back: list[ReturnedGroup] = Field(
         description="Submitted groups that were returned to the person, in the order of the batch."
     )
 

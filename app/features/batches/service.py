@@ -31,8 +31,8 @@ from app.features.batches.queries import (
 )
 from app.features.datasets.service import checked_title, dataset_id
 from app.features.independent_annotations.gold_queries import gold_heads
-from app.features.notifications.queries import RingKind
-from app.features.notifications.service import tell
+from app.features.notifications.queries import NotificationKind
+from app.features.notifications.service import notify
 from app.features.people.members import list_members
 from app.features.people.roles import Action, lets
 from app.features.queue.listing_queries import Listing
@@ -88,7 +88,7 @@ class NewBatch:
 
 
 @dataclass(frozen=True)
-class Here:
+class Presence:
     """Somebody who has a group open, and since when."""
 
     group: int
@@ -128,7 +128,7 @@ class Batch:
     handed_in: int = 0
     settled: int = 0
     last: str | None = None
-    here: list[Here] = field(default_factory=list)
+    here: list[Presence] = field(default_factory=list)
 
     @property
     def is_open(self) -> bool:
@@ -175,7 +175,7 @@ def get_batch(store: Store, batch_id: int) -> Batch:
 
 def dataset_of_batch(store: Store, batch_id: int) -> int:
     """Id of the dataset of a batch; raises NotFoundError when there is no such batch."""
-    with store.glance() as session:
+    with store.read_one() as session:
         row = batch_of(session, batch_id)
     if row is None:
         raise NotFoundError(f"there is no batch {batch_id}")
@@ -221,7 +221,7 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         given = groups_given(session, number) if new.skip_given else set()
         ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
         if not ids:
-            raise _nothing(found)
+            raise _no_groups_error(found)
         if new.gold_every is not None:
             _require_gold(session, number)
         values = {
@@ -242,8 +242,8 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         for part, chosen in people.items():
             set_people(session, made, part, chosen)
         batch = read_batch(session, made)
-        _note(session, batch, "made", actor)
-        _tell(session, batch, (*batch.annotators, *batch.reviewers), actor)
+        _log(session, batch, "made", actor)
+        _notify_people(session, batch, (*batch.annotators, *batch.reviewers), actor)
         announce_batch(session, made, GIVEN_OUT, actor=actor, at=batch.created)
         session.respond(batch)
         return batch
@@ -298,10 +298,10 @@ def change_batch(
         for part, chosen in people.items():
             set_people(session, batch_id, part, chosen)
         batch = read_batch(session, batch_id)
-        _note(session, batch, "closed" if state == CLOSED else "changed", actor)
+        _log(session, batch, "closed" if state == CLOSED else "changed", actor)
         known = (*before.annotators, *before.reviewers)
         new = [name for name in (*batch.annotators, *batch.reviewers) if name not in known]
-        _tell(session, batch, new, actor)
+        _notify_people(session, batch, new, actor)
         if known != (*batch.annotators, *batch.reviewers):
             announce_batch(session, batch_id, HANDED_ON, actor=actor, at=now())
         session.respond(batch)
@@ -313,7 +313,7 @@ def remove_batch(store: Store, batch_id: int, *, actor: str) -> Batch:
     with store.write() as session:
         batch = read_batch(session, batch_id)
         delete_batch(session, batch_id)
-        _note(session, batch, "deleted", actor)
+        _log(session, batch, "deleted", actor)
         session.respond(batch)
         return batch
 
@@ -340,9 +340,9 @@ def _batches(session: Session, rows: Sequence[Any], with_here: bool = True) -> l
     names: dict[tuple[int, str], list[str]] = defaultdict(list)
     for row in people_of(session, ids):
         names[row.batch_id, row.part].append(row.name)
-    here: dict[int, list[Here]] = defaultdict(list)
+    here: dict[int, list[Presence]] = defaultdict(list)
     for row in leases_of(session, ids, now()) if with_here else ():
-        here[row.batch_id].append(Here(row.group_id, row.person, row.taken, row.seen))
+        here[row.batch_id].append(Presence(row.group_id, row.person, row.taken, row.seen))
     found = []
     for row in rows:
         count = counts.get(row.id)
@@ -404,7 +404,7 @@ def _require_gold(session: Session, dataset: int) -> None:
         )
 
 
-def _nothing(found: Sequence[int]) -> InputError:
+def _no_groups_error(found: Sequence[int]) -> InputError:
     if not found:
         return InputError("no group matches that query", pointer="/q")
     return InputError(
@@ -414,21 +414,21 @@ def _nothing(found: Sequence[int]) -> InputError:
     )
 
 
-def _tell(session: Session, batch: Batch, people: Iterable[str], actor: str) -> None:
+def _notify_people(session: Session, batch: Batch, people: Iterable[str], actor: str) -> None:
     """Tell people that work was given to them."""
     by = person_of(actor)
     due = "" if batch.due is None else f", due {batch.due}"
     # Who is told how many groups it has counts how many gold ones are mixed in.
     groups = "groups" if batch.gold_every is not None else plural(batch.groups, "group")
-    said = f"{by} assigned you work: {batch.name}, {groups} of {batch.dataset}{due}"
+    sentence = f"{by} assigned you work: {batch.name}, {groups} of {batch.dataset}{due}"
     for name in dict.fromkeys(people):
-        tell(
-            session, name, RingKind.ASSIGNED, said,
+        notify(
+            session, name, NotificationKind.ASSIGNED, sentence,
             actor=actor, address="/work", dataset_id=batch.dataset_id,
         )  # fmt: skip
 
 
-def _note(session: Session, batch: Batch, did: str, actor: str) -> None:
+def _log(session: Session, batch: Batch, did: str, actor: str) -> None:
     """Write what became of a batch into the log."""
     body = {
         "batch": batch.id,

@@ -29,16 +29,16 @@ def examine_threads(store: Store) -> Check:
 def _examine(session: Session, restore: str) -> Check:
     try:
         with as_written():
-            said = said_threads(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
+            logged = logged_threads(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
     except StorageError as error:
         return Check("threads", False, error.message, error.hint or restore)
     present = all_threads(session)
-    keys = sorted(said.keys() | present.keys())
-    apart = [str(key) for key in keys if said.get(key) != present.get(key)]
+    keys = sorted(logged.keys() | present.keys())
+    apart = [str(key) for key in keys if logged.get(key) != present.get(key)]
     return compared("threads", f"{len(present):,}, as the log says", apart, WRONG, restore)
 
 
-def said_threads(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
+def logged_threads(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
     """The threads that follow from the log, by id.
 
     Args:
@@ -57,7 +57,7 @@ def said_threads(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
 def _apply(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
     body, number = entry.body, entry.body["thread"]
     if number not in threads:
-        threads[number] = _begun(entry)
+        threads[number] = _new_thread(entry)
     thread, comment = threads[number], body.get("comment", 0)
     match body["did"]:
         case "said":
@@ -72,6 +72,6 @@ def _apply(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
         del threads[number]
 
 
-def _begun(entry: LogEntry) -> ThreadRecord:
+def _new_thread(entry: LogEntry) -> ThreadRecord:
     x, y = entry.body.get("at", (None, None))
     return ThreadRecord(entry.dataset_id, entry.group_id, entry.body.get("view"), x, y)

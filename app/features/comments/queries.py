@@ -116,8 +116,8 @@ def all_threads(session: Session) -> dict[int, ThreadRecord]:
     for row in session.execute(select(*comment.__table__.columns).order_by(comment.id)):
         # One whose thread is gone is a lost reference, and the thread is missed.
         if row.thread_id in found:
-            said = (row.actor, row.at, row.edited, row.text)
-            found[row.thread_id].comments[row.id] = said
+            columns = (row.actor, row.at, row.edited, row.text)
+            found[row.thread_id].comments[row.id] = columns
     return found
 
 
@@ -146,8 +146,8 @@ def _comments(session: Session, threads: Sequence[int]) -> dict[int, list[Stored
     )
     found: dict[int, list[StoredComment]] = defaultdict(list)
     for row in session.execute(statement):
-        said = (row.id, row.actor, row.at, row.edited, row.text)
-        found[row.thread_id].append(StoredComment(*said, tuple(mentions[row.id])))
+        columns = (row.id, row.actor, row.at, row.edited, row.text)
+        found[row.thread_id].append(StoredComment(*columns, tuple(mentions[row.id])))
     return found
 
 

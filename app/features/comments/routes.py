@@ -44,7 +44,7 @@ def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
     return ThreadList(items=[ThreadDocument.of(thread, actor) for thread in found])
 
 
-def _told(thread: comments.StoredThread, actor: str, status: int = 200) -> Response:
+def _thread_response(thread: comments.StoredThread, actor: str, status: int = 200) -> Response:
     return document(ThreadDocument.of(thread, actor), status)
 
 
@@ -56,7 +56,7 @@ def _told(thread: comments.StoredThread, actor: str, status: int = 200) -> Respo
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(partial(_told, status=201), "actor")
+@responds(partial(_thread_response, status=201), "actor")
 def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> comments.StoredThread:
     """Say something about the group, a view of it, or a place there.
 
@@ -73,7 +73,7 @@ def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> co
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(_told, "actor")
+@responds(_thread_response, "actor")
 def change_thread(
     group: Id, thread: Id, change: ThreadEdit, store: AppStore, actor: Actor
 ) -> comments.StoredThread:
@@ -89,7 +89,7 @@ def change_thread(
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(partial(_told, status=201), "actor")
+@responds(partial(_thread_response, status=201), "actor")
 def reply(
     group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor
 ) -> comments.StoredThread:
@@ -104,7 +104,7 @@ def reply(
     responses=responses(403, 404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(_told, "actor")
+@responds(_thread_response, "actor")
 def change_comment(
     group: Id, thread: Id, comment: Id, new: NewComment, store: AppStore, actor: Actor
 ) -> comments.StoredThread:

@@ -26,8 +26,8 @@ from app.features.comments.queries import (
     set_mentions,
     set_resolved,
 )
-from app.features.notifications.queries import RingKind
-from app.features.notifications.service import tell
+from app.features.notifications.queries import NotificationKind
+from app.features.notifications.service import notify
 from app.features.people.logins import read_roles
 from app.features.people.queries import members, person_by_name
 from app.features.people.roles import Role
@@ -71,7 +71,7 @@ def people_of(store: Store, group_id: int) -> list[str]:
     """
     with store.read() as session:
         group = _need_group(session, group_id)
-        return [row.name for row in members(session, group.dataset_id) if _sees(row)]
+        return [row.name for row in members(session, group.dataset_id) if _can_read(row)]
 
 
 def begin_thread(
@@ -98,7 +98,7 @@ def begin_thread(
             raise InputError(f'the group has no view "{view}"', pointer="/view")
         thread_id = insert_thread(session, group, view, at, now())
         where = {"view": view, "at": None if at is None else [*at]}
-        _say(session, group, thread_id, text, actor, (), **where)
+        _insert_comment(session, group, thread_id, text, actor, (), **where)
         return _answered(session, group_id, thread_id)
 
 
@@ -118,7 +118,7 @@ def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str)
                 f"a thread has at most {MOST} comments", hint="Begin another one on this group."
             )
         before = {person_of(one.actor) for one in thread.comments if one.text is not None}
-        _say(session, group, thread_id, text, actor, sorted(before))
+        _insert_comment(session, group, thread_id, text, actor, sorted(before))
         return _answered(session, group_id, thread_id)
 
 
@@ -159,12 +159,12 @@ def change(
         if text != comment.text:
             time = now()
             change_comment(session, comment_id, text, time)
-            people = _seeing(session, group, names_in(text))
+            people = _ids_of_readers(session, group, names_in(text))
             set_mentions(session, comment_id, people.values())
-            said = {"comment": comment_id, "text": text}
-            _log(session, group, actor, time, did="edited", thread=thread_id, **said)
+            entry = {"comment": comment_id, "text": text}
+            _log(session, group, actor, time, did="edited", thread=thread_id, **entry)
             new = [name for name in people if name not in comment.mentions]
-            _ring(session, group, thread_id, actor, new, ())
+            _notify(session, group, thread_id, actor, new, ())
         return _answered(session, group_id, thread_id)
 
 
@@ -187,7 +187,7 @@ def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, acto
         session.respond(None)
 
 
-def _say(
+def _insert_comment(
     session: Session,
     group: ThreadGroup,
     thread_id: int,
@@ -198,14 +198,14 @@ def _say(
 ) -> None:
     time = now()
     comment_id = insert_comment(session, thread_id, actor, text, time)
-    people = _seeing(session, group, names_in(text))
+    people = _ids_of_readers(session, group, names_in(text))
     set_mentions(session, comment_id, people.values())
-    said = {"comment": comment_id, "text": text, **where}
-    _log(session, group, actor, time, did="said", thread=thread_id, **said)
-    _ring(session, group, thread_id, actor, people, before)
+    entry = {"comment": comment_id, "text": text, **where}
+    _log(session, group, actor, time, did="said", thread=thread_id, **entry)
+    _notify(session, group, thread_id, actor, people, before)
 
 
-def _ring(
+def _notify(
     session: Session,
     group: ThreadGroup,
     thread_id: int,
@@ -215,10 +215,10 @@ def _ring(
 ) -> None:
     """Tell those whom a comment mentions, and of the others those who spoke in its thread."""
     named = sorted(set(mentioned))
-    rings = [(name, RingKind.MENTION, "mentioned you") for name in named]
-    rings += [(name, RingKind.REPLY, "replied") for name in spoke if name not in named]
+    rings = [(name, NotificationKind.MENTION, "mentioned you") for name in named]
+    rings += [(name, NotificationKind.REPLY, "replied") for name in spoke if name not in named]
     for name, kind, did in rings:
-        tell(
+        notify(
             session,
             name,
             kind,
@@ -230,7 +230,7 @@ def _ring(
         )
 
 
-def _seeing(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[str, int]:
+def _ids_of_readers(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[str, int]:
     """Ids of those among some names who see a group's dataset; the others are not told apart."""
     found: dict[str, int] = {}
     for name in names:
@@ -242,13 +242,13 @@ def _seeing(session: Session, group: ThreadGroup, names: Iterable[str]) -> dict[
     return found
 
 
-def _sees(row: Any) -> bool:
+def _can_read(row: Any) -> bool:
     here = row.everywhere if row.role is None or row.everywhere == Role.ADMIN else row.role
     return bool(here != Role.NONE)
 
 
-def _log(session: Session, group: ThreadGroup, actor: str, time: str, **said: Any) -> None:
-    body = {name: value for name, value in said.items() if value is not None}
+def _log(session: Session, group: ThreadGroup, actor: str, time: str, **fields: Any) -> None:
+    body = {name: value for name, value in fields.items() if value is not None}
     append(session, [Entry(COMMENT, actor, time, body, group.dataset_id, group.group_id)])
 
 

@@ -58,7 +58,7 @@ class CommentMentionModel(Base):
     person_id: Mapped[int] = mapped_column(ForeignKey("person.id"), primary_key=True)
 
 
-class BellModel(Base):
+class NotificationModel(Base):
     """One thing that a person is told; ``address`` leads to it, ``read`` is when they have seen it."""
 
     __tablename__ = "bell"

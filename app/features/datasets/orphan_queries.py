@@ -23,15 +23,15 @@ from app.object_store.address import is_address
 _KEY = CalibrationModel.key
 _items = items_of(SolutionModel.calibrations)
 _NAMED = select(_items.c.value).select_from(SolutionModel).join(_items, true())
-_SPARE = select(_KEY).where(_KEY.not_in(_NAMED))
+_UNUSED = select(_KEY).where(_KEY.not_in(_NAMED))
 
 
-def spare_calibrations(session: Session) -> list[str]:
+def unused_calibrations(session: Session) -> list[str]:
     """Keys of calibrations that no solution rests on; none while groups wait to be solved.
 
     A solver may have read them already for the solution that it is about to save.
     """
-    return [] if _has_unsolved(session) else list(session.scalars(_SPARE))
+    return [] if _has_unsolved(session) else list(session.scalars(_UNUSED))
 
 
 def delete_calibrations(session: Session, keys: Sequence[str]) -> int:
@@ -42,8 +42,8 @@ def delete_calibrations(session: Session, keys: Sequence[str]) -> int:
     if _has_unsolved(session):
         return 0
     named = _NAMED.where(_items.c.value.in_(texts_in(keys)))
-    asked = (_KEY.in_(texts_in(keys)), _KEY.not_in(named))
-    gone = delete(CalibrationModel).where(*asked).returning(_KEY)
+    unused = (_KEY.in_(texts_in(keys)), _KEY.not_in(named))
+    gone = delete(CalibrationModel).where(*unused).returning(_KEY)
     return len(session.scalars(gone).all())
 
 

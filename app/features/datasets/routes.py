@@ -34,11 +34,11 @@ router = APIRouter(prefix="/datasets", tags=["datasets"], route_class=Route)
 @router.get("", operation_id="listDatasets", responses=responses())
 @may(Action.READ, where=Where.SOMEWHERE)
 @paged()
-def list_datasets(request: Request, store: AppStore, sight: Sees) -> DatasetList:
+def list_datasets(request: Request, store: AppStore, visibility: Sees) -> DatasetList:
     """Every dataset that one sees, with its progress."""
     login = login_of(request.scope)
     own = () if login is None else login.roles.single.keys()
-    return DatasetList(items=review.list_datasets(store, sight, own))
+    return DatasetList(items=review.list_datasets(store, visibility, own))
 
 
 @router.get(

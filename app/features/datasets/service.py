@@ -14,7 +14,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets import queries as removal
-from app.features.datasets.orphan_queries import delete_calibrations, spare_calibrations
+from app.features.datasets.orphan_queries import delete_calibrations, unused_calibrations
 from app.features.datasets.queries import (
     dataset_names,
     dataset_rows,
@@ -32,7 +32,7 @@ from app.features.independent_annotations.queries import (
     copy_dataset_ids,
     insert_copy_dataset,
 )
-from app.features.people.visibility_queries import COPIES, EVERYTHING, Sight, is_blind
+from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility, is_blind
 from app.features.queue.listing_queries import count_states
 from app.features.queue.queries import refresh_queue
 from app.finite import quoted
@@ -182,7 +182,7 @@ def insert_dataset(
 
 
 def list_datasets(
-    store: Store, sight: Sight = EVERYTHING, own: Collection[int] = ()
+    store: Store, visibility: Visibility = EVERYTHING, own: Collection[int] = ()
 ) -> list[Dataset]:
     """The datasets that somebody sees, by name; those of copies are in no list.
 
@@ -192,7 +192,7 @@ def list_datasets(
     with store.read() as session:
         hidden = frozenset(own) - copy_dataset_ids(session) if own else frozenset[int]()
         rows = [row for row in dataset_rows(session) if row.id <= COPIES or row.id in hidden]
-        return _datasets(session, [row for row in rows if sight.sees(row.id)])
+        return _datasets(session, [row for row in rows if visibility.sees(row.id)])
 
 
 def get_dataset(store: Store, dataset: str | int) -> Dataset:
@@ -311,14 +311,14 @@ CALIBRATIONS_AT_ONCE = 2000
 """Calibrations a transaction: nobody who saves waits long for it."""
 
 
-def delete_spare_calibrations(store: Store, wanted: Callable[[], bool] = lambda: True) -> int:
+def delete_unused_calibrations(store: Store, wanted: Callable[[], bool] = lambda: True) -> int:
     """Delete them in short transactions; returns how many there were.
 
     While a group waits to be solved they stay: its solver may have read them already. The rest is
     left once it is no longer ``wanted``.
     """
     with store.read() as session:
-        keys = spare_calibrations(session)
+        keys = unused_calibrations(session)
     gone = 0
     for start in range(0, len(keys), CALIBRATIONS_AT_ONCE):
         if not wanted():
@@ -396,7 +396,7 @@ def delete_dataset(
         if afresh is not None:
             assert insert_dataset(session, contents.name, afresh, actor) == heir
         session.respond(contents)
-    delete_spare_calibrations(store)
+    delete_unused_calibrations(store)
     return contents
 
 

@@ -125,7 +125,7 @@ class ViewModel(Base):
     source_digest: Mapped[str]
 
 
-class SpareFrameModel(Base):
+class UnassignedFrameModel(Base):
     """A frame that is no group (persons only) and is kept for export."""
 
     __tablename__ = "spare_frame"

@@ -27,7 +27,7 @@ from app.terminal.options import (
     read_settings,
 )
 from app.terminal.server import connected, given_server
-from app.terminal.terminal import complain, print_export, print_import, say, show_progress
+from app.terminal.terminal import print_error, print_export, print_import, say, show_progress
 
 if TYPE_CHECKING:
     from app.config import Settings
@@ -148,7 +148,7 @@ def import_(
             )  # fmt: skip
         print_import(values, json_)
         if nothing is not None:
-            complain(*nothing)
+            print_error(*nothing)
             raise typer.Exit(1)
         return
     from app.features.imports.sources import Source, import_source
@@ -176,8 +176,8 @@ def import_(
             actor=acting(), dry_run=dry_run, policy=chosen,
         )  # fmt: skip
     print_import(imported.values(), json_)
-    if not imported.something:
-        complain(*imported.nothing_read())
+    if not imported.imported_anything:
+        print_error(*imported.nothing_read_error())
         raise typer.Exit(1)
     if format_ == "frames" and propose and not dry_run:
         _propose(dataset, settings, silent=json_)
@@ -229,7 +229,7 @@ def export(
     json_: Json = False,
 ) -> None:
     """Write accepted groups, all of them, or a frozen version, with a manifest."""
-    asked: dict[str, Any] = {
+    options: dict[str, Any] = {
         "boxes": boxes,
         "images": images,
         "views": views,
@@ -241,7 +241,7 @@ def export(
 
         if images == "link":
             raise typer.BadParameter("a server cannot link to frames here; choose copy or none")
-        request = {"dataset": dataset, "format": format_, "all": everything, **asked}
+        request = {"dataset": dataset, "format": format_, "all": everything, **options}
         with connected(server) as client, show_progress("Exporting") as progress:
             sent_to = out if is_address(out) else Path(out)
             values = remote_files.export_values(client, sent_to, request, progress)
@@ -251,10 +251,10 @@ def export(
     from app.features.exports.service import require_possible
 
     with opened_store() as store, show_progress("Exporting") as progress:
-        require_possible(store, dataset, format_, everything=everything, **asked)
+        require_possible(store, dataset, format_, everything=everything, **options)
         target = target_path(store.settings, out) if is_address(out) else Path(out)
         report = run_export(
-            store, dataset, format_, target, everything=everything, **asked, progress=progress
+            store, dataset, format_, target, everything=everything, **options, progress=progress
         )
     # How many groups were to be written is a matter of progress; what was is in the counts.
     values = {name: value for name, value in vars(report).items() if name != "groups"}

@@ -15,7 +15,7 @@ from app.features.datasets.service import get_dataset_head
 from app.features.exports.folder import ExportFolder
 from app.features.exports.service import ExportReport, export, require_possible
 from app.features.jobs.queries import EXPORT, Job
-from app.features.jobs.run import JobProgress, counting, run_job_in_worker
+from app.features.jobs.run import JobProgress, counting_progress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.formats.file_tree import Root
 from app.formats.safe_path import check_name
@@ -67,21 +67,21 @@ def request_export(
         views=request.get("views", "valid"),
         version=None if version is None else str(version),
     )
-    asked = {**request, "dataset": found.name}
+    named = {**request, "dataset": found.name}
     return jobs.submit(
         KIND,
         f"Export {found.name} as {request['format']}",
         partial(export_work, store, folder, frames),
         dataset_id=found.id,
         actor=actor,
-        request=asked,
+        request=named,
     )
 
 
 def resume_exports(jobs: Jobs, store: Store, folder: ExportFolder, frames: Frames) -> None:
     """Let exports that an earlier server was at be written from their beginning."""
 
-    jobs.resumes(KIND, partial(export_work, store, folder, frames))
+    jobs.register_resume(KIND, partial(export_work, store, folder, frames))
 
 
 def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: JobProgress) -> Json:
@@ -102,7 +102,7 @@ def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: Jo
             request,
             dataset_id=progress.dataset_id,
             progress=progress,
-            report=counting(progress, "groups written"),
+            report=counting_progress(progress, "groups written"),
             answer=lambda frame: frames.read(*frame),
         )
     # It is done, also where somebody cancels it now.

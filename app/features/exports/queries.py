@@ -19,7 +19,7 @@ _OVERRIDDEN = func.coalesce(QueueModel.override == QueueModel.gate, false())
 _QUALIFIES = or_(QueueModel.passes.is_(True), _OVERRIDDEN)
 
 
-def newest_word(session: Session, dataset_id: int) -> str | None:
+def newest_entry_time(session: Session, dataset_id: int) -> str | None:
     """Time of the newest thing that was said about a dataset; freezing it, and comments, say nothing of it."""
     statement = select(func.max(LogModel.at)).where(
         LogModel.dataset_id == dataset_id, LogModel.kind.not_in(_NO_WORD)

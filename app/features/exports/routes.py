@@ -10,7 +10,7 @@ from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from starlette.responses import FileResponse
 
 from app.errors import ConflictError, NotFoundError
-from app.features.audit.audit_events import record_deed
+from app.features.audit.audit_events import record_audit_event
 from app.features.datasets.service import dataset_id
 from app.features.exports.jobs import KIND, request_export
 from app.features.exports.schemas import (
@@ -107,7 +107,7 @@ def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> 
 @may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
 def list_exports(
     services: AppServices,
-    sight: SeesWhole,
+    visibility: SeesWhole,
     dataset: DatasetFilter = None,
     limit: Limit = 50,
     cursor: Cursor = None,
@@ -119,7 +119,7 @@ def list_exports(
         kinds=[KIND],
         before=parse_cursor(cursor),
         limit=limit + 1,
-        sight=sight,
+        visibility=visibility,
     )
     more = str(jobs[limit - 1].id) if len(jobs) > limit else None
     days, find = services.settings.export_days, services.exports.find
@@ -153,7 +153,7 @@ def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None
     if document.state in ("failed", "cancelled"):
         services.jobs.forget(int(export))
     services.exports.forget(export)
-    record_deed(services.store, actor, "export deleted", None, export=export)
+    record_audit_event(services.store, actor, "export deleted", None, export=export)
 
 
 async def written(export: ExportId, services: AppServices) -> str:

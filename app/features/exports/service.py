@@ -19,8 +19,8 @@ from app.features.exports.images import ExportImages, ReadPicture
 from app.features.exports.source import ExportSource, Item, LiveSource, VersionSource
 from app.features.groups.view_queries import frame_files
 from app.features.imports.edits_export import FORMAT as CARRY
-from app.features.imports.edits_export import carry_out
-from app.features.imports.spare import spare_persons
+from app.features.imports.edits_export import export_edits
+from app.features.imports.unassigned import unassigned_persons
 from app.features.versions.service import find_version
 from app.formats.export_formats import (
     CONTENT,
@@ -44,7 +44,7 @@ from app.formats.view_files import PutText, ViewFiles
 from app.media.frames import make_picture
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.ball_boxes import BOX_KINDS
 from app.soccer.choices import PicturesWritten, TrainingViews
 
@@ -75,7 +75,7 @@ class ExportReport:
     missing_images: tuple[str, ...] = ()
 
 
-class _NoRoomError(InputError):
+class _UnrepresentableError(InputError):
     """A format has no place for what the groups hold."""
 
 
@@ -142,7 +142,7 @@ def export(
     images: str = "none",
     views: str = "valid",
     version: str | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     read: ReadPicture | None = None,
     beside: Path | None = None,
 ) -> ExportReport:
@@ -177,17 +177,17 @@ def export(
     options.check(out)
     _require_plain(format, everything, version)
     if format == CARRY:
-        counts = carry_out(store, dataset, out, progress, beside)
+        counts = export_edits(store, dataset, out, progress, beside)
         return ExportReport(out, CARRY, counts["groups"], counts)
     with store.read() as session:
         source = _source(session, store, dataset, everything, version)
         with output_anywhere(out, store.settings.exports, beside, progress) as root:
-            frames = ExportImages(root, images, read or _here(store), frame_layout(format))
+            frames = ExportImages(root, images, read or _local_reader(store), frame_layout(format))
             names = export_names(format, source.outlines())
             run = _Run(source, options, frames, names, progress)
-            # A version is the same every time; spare frames are the dataset's as it is.
+            # A version is the same every time; unassigned frames are the dataset's as it is.
             if format == "issia" and isinstance(source, LiveSource):
-                run.spare = spare_persons(session, dataset)
+                run.unassigned = unassigned_persons(session, dataset)
             with _view_files(root, out) as put:
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
@@ -229,11 +229,11 @@ def require_possible(
         InputError: Nothing to export, none of the images that are wanted is there, the format does
             not use an option, or the groups do not fit it; then the hint names those that they fit.
     """
-    asked = _Options(format, everything, boxes, images, views)
-    asked.require_used()
+    options = _Options(format, everything, boxes, images, views)
+    options.require_used()
     try:
-        _try(store, dataset, asked, version)
-    except _NoRoomError as error:
+        _require_format(store, dataset, options, version)
+    except _UnrepresentableError as error:
         answers = possible_formats(store, dataset, version)
         fitting = [answer.format for answer in answers if answer.reason is None]
         hint = f"These formats have room for it: {', '.join(fitting)}." if fitting else error.hint
@@ -254,7 +254,7 @@ def possible_formats(
     for format in FORMATS:  # noqa: A001
         options = _Options(format, version is None, "optimized", "none", "all")
         try:
-            _try(store, dataset, options, version)
+            _require_format(store, dataset, options, version)
         except InputError as error:
             answers.append(FormatAnswer(format, error.message, error.hint))
         else:
@@ -262,7 +262,9 @@ def possible_formats(
     return answers
 
 
-def _try(store: Store, dataset: str | int, options: _Options, version: str | None) -> None:
+def _require_format(
+    store: Store, dataset: str | int, options: _Options, version: str | None
+) -> None:
     """``require_possible`` of one format."""
     format, everything = options.format, options.everything  # noqa: A001
     _require_plain(format, everything, version)
@@ -270,14 +272,14 @@ def _try(store: Store, dataset: str | int, options: _Options, version: str | Non
         whole = _source(session, store, dataset, everything or format == CARRY, version)
         if format == CARRY:
             return
-        source = _First(whole)
-        frames = ExportImages(Path(folder), "none", _here(store), frame_layout(format))
+        source = _SampleSource(whole)
+        frames = ExportImages(Path(folder), "none", _local_reader(store), frame_layout(format))
         with ViewFiles(Path(folder)) as small:
             try:
                 names = export_names(format, source.outlines())
                 counts = _Run(source, options, frames, names, None).write(Path(folder), small.put)
             except InputError as error:
-                raise _NoRoomError(error.message, hint=error.hint) from error
+                raise _UnrepresentableError(error.message, hint=error.hint) from error
         if options.images != "none" and not frames.media:
             files = [] if source.is_all else frame_files(session, whole.dataset_id)
             _require_frames(whole.dataset, files)
@@ -311,7 +313,7 @@ def _require_plain(format: str, everything: bool, version: str | None) -> None: 
         )
 
 
-class _First:
+class _SampleSource:
     """The first groups of a source."""
 
     def __init__(self, source: LiveSource | VersionSource):
@@ -334,7 +336,7 @@ class _First:
         return islice(self._source.outlines(), self.count)
 
 
-def _here(store: Store) -> ReadPicture:
+def _local_reader(store: Store) -> ReadPicture:
     return lambda media, width, flipped: make_picture(media, width, flipped, store.settings)
 
 
@@ -359,14 +361,14 @@ class _Run:
         options: _Options,
         images: ExportImages,
         names: ExportNames,
-        progress: TellProgress | None,
+        progress: ReportProgress | None,
     ):
         self._source, self._options = source, options
         self._images, self._names, self._progress = images, names, progress
         self._licences: set[str] = set()
         self._verdicts: Counter[str] = Counter()
         self._overrides: list[dict[str, str | None]] = []
-        self.spare: Iterable[FramePersons] = ()
+        self.unassigned: Iterable[FramePersons] = ()
 
     def write(self, root: Path, put: PutText | None) -> dict[str, int]:
         """Write the format's files; returns its counts."""
@@ -385,7 +387,7 @@ class _Run:
             options.boxes,
             options.every_view,
             provenance,
-            self.spare,
+            self.unassigned,
         )
         return write_format(root, self._records(), wanted, put)
 

@@ -11,7 +11,7 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.errors import InputError
 from app.features.datasets.service import DatasetHead
-from app.features.exports.queries import exported_groups, left_out_groups, newest_word
+from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
 from app.features.groups.state import GroupState, VerdictState, read_states
 from app.features.groups.view_queries import NamedView, named_views
 from app.features.versions.membership import policy_settings, version_settings, version_stamp
@@ -81,7 +81,7 @@ class LiveSource:
     @property
     def date(self) -> str:
         """Time of the newest thing that was said about the dataset; freezing it says nothing."""
-        return str(newest_word(self._session, self._found.id))
+        return str(newest_entry_time(self._session, self._found.id))
 
     def settings(self) -> dict[str, Any]:
         """Policy, solver, and which groups."""
@@ -109,7 +109,7 @@ class LiveSource:
     def require_some(self) -> None:
         """Raise InputError where there is nothing to export."""
         if not self.count:
-            raise _nothing(self._found, self.left_out, self._everything)
+            raise _nothing_to_export(self._found, self.left_out, self._everything)
 
 
 class VersionSource:
@@ -215,7 +215,9 @@ def verdict_reason(
     return None
 
 
-def _nothing(dataset: DatasetHead, left_out: Mapping[str, int], everything: bool) -> InputError:
+def _nothing_to_export(
+    dataset: DatasetHead, left_out: Mapping[str, int], everything: bool
+) -> InputError:
     if everything:
         return InputError(
             f'dataset "{dataset.name}" holds no groups, so there is nothing to export'

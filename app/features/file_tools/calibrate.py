@@ -26,7 +26,7 @@ from app.formats.cameras_writer import camera_name, camera_text
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
@@ -76,7 +76,7 @@ def calibrate_files(
     picture: Path | None = None,
     guess_picture: bool = False,
     executor: Executor,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> dict[str, Any]:
     """Write a camera file for each line file, and what was noticed on the way.
 
@@ -107,9 +107,9 @@ def calibrate_files(
     if not files:
         raise report.refusal(f"{source} holds no line files")
     geometry: PictureGeometry | None = None
-    told: dict[str, Any] | None = None
+    picture_summary: dict[str, Any] | None = None
     if picture is not None or guess_picture:
-        geometry, told = picture_for(files, size, picture)
+        geometry, picture_summary = picture_for(files, size, picture)
         files = as_taken(files, geometry)
     named = None if matches is None else read_matches(matches)
     sharing = guess or named is not None
@@ -145,8 +145,8 @@ def calibrate_files(
     summary = _summary(frames, report, time.perf_counter() - began)
     if sharing:
         summary["matches"] = groups
-    if told is not None:
-        summary["picture"] = told
+    if picture_summary is not None:
+        summary["picture"] = picture_summary
     _write(out, frames, summary, with_leave_one_out)
     return summary
 

@@ -11,7 +11,7 @@ import typer
 from app.plural import plural
 from app.soccer.frames import ImageSize
 from app.terminal.options import Json, Size, Workers, parse_size, read_settings
-from app.terminal.terminal import complain, print_json, print_values, say, show_progress
+from app.terminal.terminal import print_error, print_json, print_values, say, show_progress
 
 commands = typer.Typer()
 
@@ -89,21 +89,21 @@ def calibrate(
             progress=progress,
         )
     print_values(result, json_)
-    _tell_problems(result["problems"])
+    _print_problems(result["problems"])
     if not result["calibrated"]:
         first = result["failed"][0]
-        complain(
+        print_error(
             f"none of {plural(result['frames'], 'frame')} could be calibrated: {first['frame']}: {first['reason']}"
         )
         raise typer.Exit(1)
 
 
-def _tell_problems(problems: list[str]) -> None:
+def _print_problems(problems: list[str]) -> None:
     """What could not be read, on stderr; ``--json`` has all of it."""
     for problem in problems[:PROBLEMS]:
-        complain(problem)
+        print_error(problem)
     if len(problems) > PROBLEMS:
-        complain(f"... and {len(problems) - PROBLEMS} more problems; --json names all")
+        print_error(f"... and {len(problems) - PROBLEMS} more problems; --json names all")
 
 
 def _file(text: str | None, option: str) -> Path | None:
@@ -137,7 +137,7 @@ def score(
     with show_progress("Scoring") as progress:
         result = score_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
-    _tell_problems(result["problems"])
+    _print_problems(result["problems"])
 
 
 @commands.command()
@@ -212,7 +212,7 @@ def link(
                 f"from {piece['first_s']:.2f} to {piece['last_s']:.2f} s: offset "
                 f"{piece['offset_s']:.3f} s, speed {piece['speed']:.4f}"
             )
-        _tell_problems(result["problems"])
+        _print_problems(result["problems"])
 
 
 @commands.command()
@@ -247,4 +247,4 @@ def cameras(
         print_json(result)
         return
     print_values({name: value for name, value in result.items() if name != "problems"}, False)
-    _tell_problems(result["problems"])
+    _print_problems(result["problems"])

@@ -39,8 +39,8 @@ from app.paint.evidence import to_paint_evidence
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.propose import why_too_small
 from app.paint.ridges import line_like
-from app.paint.snap import Snapped, snap
-from app.progress import TellProgress
+from app.paint.snap import SnappedCamera, snap
+from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.pitch import Pitch
@@ -138,7 +138,7 @@ def snap_files(
     out: Path,
     *,
     settings: Settings,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Cameras from clicks and paint: ``camera_<stem>.json``, ``lines/<stem>.json``, ``snap.json``.
 
@@ -176,7 +176,7 @@ def agree_files(
     images: Sequence[Path],
     *,
     settings: Settings,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """How well cameras and the paint of their pictures agree, a row for each picture.
 
@@ -259,7 +259,7 @@ def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, A
 
 def _snap_picture(
     picture: PictureFile, frame: str, value: Any, report: Report
-) -> tuple[dict[str, Any], str | None, Snapped | None]:
+) -> tuple[dict[str, Any], str | None, SnappedCamera | None]:
     """The row of a picture, the text of its camera's file, and how it lies on the paint."""
     if picture.image is None:
         return _row(frame, NOTHING, reason=picture.problem), None, None
@@ -306,7 +306,7 @@ def _snap_picture(
     return row, camera_text(snapped.camera, row_by_row(known), size), snapped
 
 
-def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> Snapped:
+def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> SnappedCamera:
     assert picture.image is not None and clicked.camera is not None
     known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
     return snap(picture.image, field, clicked.camera, start_covariance=known)
@@ -340,7 +340,7 @@ def _row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
     return {"frame": frame, "outcome": outcome, **empty, "points": 0, **known}
 
 
-def _keep(out: Path, stem: str, text: str | None, snapped: Snapped | None) -> None:
+def _keep(out: Path, stem: str, text: str | None, snapped: SnappedCamera | None) -> None:
     """Write the camera of a frame and the points that were snapped; what an earlier run left
     there goes where there is nothing to write."""
     old = resolve_inside(out, camera_name(stem))

@@ -24,7 +24,7 @@ from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.paint.frame_pitch import films, pitch_frame, pitch_of
 from app.paint.propose import FrameProposal, propose
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 from app.soccer.pitch import Pitch
@@ -42,7 +42,7 @@ def propose_files(
     *,
     size: ImageSize | None = None,
     known: Sequence[Path] = (),
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Write a camera file for each picture whose camera is certain, and what became of each.
 

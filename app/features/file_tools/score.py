@@ -14,7 +14,7 @@ from app.formats.plain_file import read_plain
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.camera import Camera
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.annotation import lines_without
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -27,7 +27,7 @@ def score_files(
     *,
     size: ImageSize,
     without: Path | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> dict[str, Any]:
     """Measure camera files against line files.
 

@@ -12,7 +12,7 @@ from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, InputError, TooLargeError
 from app.finite import json_text
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.video.shots import RecordingShots, Shot, shots_of_recording
 from app.worker_process import WorkerEnded, WorkerLimits, WorkerProcess
 
@@ -22,7 +22,7 @@ LIMITS = WorkerLimits(memory=2 * 2**30, processor=inf, silence=600.0)
 
 
 def shots_file(
-    recording: Path, out: Path, settings: Settings, progress: TellProgress | None = None
+    recording: Path, out: Path, settings: Settings, progress: ReportProgress | None = None
 ) -> dict[str, Any]:
     """Write the shots of a recording to ``shots.json``.
 

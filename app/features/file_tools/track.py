@@ -19,7 +19,7 @@ from app.formats.line_documents import read_line_documents
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.resection import LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Z
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.tracking.clip import Clip
@@ -38,7 +38,7 @@ def track_files(
     out: Path,
     lines: Sequence[str] = (),
     *,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> dict[str, Any]:
     """Write a camera file for each frame of a clip that has a camera, and what became of each.
 

@@ -31,7 +31,7 @@ def group_findings(session: Session, group_id: int) -> list[Noticed]:
     return [(row.view, row.sentence) for row in session.execute(statement.order_by(model.id))]
 
 
-def groups_told(session: Session, ids: Collection[int], sentence: str) -> set[int]:
+def groups_with_finding(session: Session, ids: Collection[int], sentence: str) -> set[int]:
     """The groups among them that have a finding about the whole group."""
     model = ImportFindingModel
     statement = select(model.group_id).where(
@@ -102,7 +102,7 @@ def replace_shape_findings(
     present = {
         (row.key, row.view, row.sentence): row for row in session.execute(has) if row.key in looked
     }
-    gone = [row for said, row in present.items() if said not in wanted]
+    gone = [row for key, row in present.items() if key not in wanted]
     fresh = sorted(wanted - present.keys())
     ids = {row.key: row.id for row in session.execute(mine)} if fresh else {}
     if gone:
@@ -119,7 +119,7 @@ SHOWN = (
     *(_TABLE.c[name] for name in ("marking", "suggested", "number", "at", "dismissed", "note")),
     shown_actor(_TABLE.c.actor, _TABLE.c.at).label("actor"),
 )
-"""What ``standing`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
+"""What ``current_dismissals`` asks of a row besides ``group``, ``id``, ``kind``, ``view`` and ``sentence``."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ NOTHING_DISMISSED = GroupDismissals()
 """Of a group in which nobody ever dismissed anything."""
 
 
-def standing(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
+def current_dismissals(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     """What people dismissed, by group id; groups in which nobody ever did are left out.
 
     ``rows`` are those of the table, the oldest first (``features.queue.queries.read_noticed`` reads them).
@@ -154,24 +154,28 @@ def standing(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     found: dict[int, GroupDismissals] = {}
     for row in rows:
         names = (row.kind, row.view, row.marking, row.suggested)
-        said = Dismissal(*names, row.number, row.sentence, row.actor, row.at, row.note)
+        dismissal = Dismissal(*names, row.number, row.sentence, row.actor, row.at, row.note)
         before = found.get(row.group, NOTHING_DISMISSED).standing
-        others = tuple(item for item in before if not item.covers(said))
-        found[row.group] = GroupDismissals(row.id, (*others, said) if row.dismissed else others)
+        others = tuple(item for item in before if not item.covers(dismissal))
+        found[row.group] = GroupDismissals(
+            row.id, (*others, dismissal) if row.dismissed else others
+        )
     return found
 
 
-CARRIED = tuple(column.name for column in _TABLE.columns if column.name not in ("id", "group_id"))
+MERGED_COLUMNS = tuple(
+    column.name for column in _TABLE.columns if column.name not in ("id", "group_id")
+)
 """What is carried of a row to another installation."""
 
 
-def carried_dismissals(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:
+def dismissals_to_merge(session: Session, ids: Iterable[int]) -> dict[int, list[dict[str, Any]]]:
     """What is carried of the dismissals of groups, by group, oldest first."""
-    columns = [_TABLE.c[name] for name in CARRIED]
+    columns = [_TABLE.c[name] for name in MERGED_COLUMNS]
     statement = select(_TABLE.c.group_id, *columns).where(_TABLE.c.group_id.in_(list(ids)))
     found: dict[int, list[dict[str, Any]]] = {}
     for group_id, *values in session.execute(statement.order_by(_TABLE.c.id)):
-        found.setdefault(group_id, []).append(dict(zip(CARRIED, values, strict=True)))
+        found.setdefault(group_id, []).append(dict(zip(MERGED_COLUMNS, values, strict=True)))
     return found
 
 
@@ -179,7 +183,7 @@ def insert_dismissal(
     session: Session,
     dataset_id: int,
     group_id: int,
-    said: Dismissal,
+    dismissal: Dismissal,
     *,
     dismissed: bool,
     brought: tuple[str, str] | None = None,
@@ -189,13 +193,19 @@ def insert_dismissal(
     ``brought`` is who brought it from another installation, and when; the log has it under them.
     """
     identity = next_id(session, DismissalModel)
-    body = {name: value for name, value in vars(said).items() if name not in ("actor", "at")}
+    body = {name: value for name, value in vars(dismissal).items() if name not in ("actor", "at")}
     body |= {"dismissed": dismissed}
-    row = {"id": identity, "group_id": group_id, "actor": said.actor, "at": said.at, **body}
+    row = {
+        "id": identity,
+        "group_id": group_id,
+        "actor": dismissal.actor,
+        "at": dismissal.at,
+        **body,
+    }
     session.execute(insert(_TABLE), [row])
-    actor, at = brought or (said.actor, said.at)
+    actor, at = brought or (dismissal.actor, dismissal.at)
     if brought is not None:
-        body |= {"actor": said.actor, "at": said.at}
+        body |= {"actor": dismissal.actor, "at": dismissal.at}
     append(session, [Entry(DISMISSAL, actor, at, body, dataset_id, group_id)])
     return identity
 
@@ -206,6 +216,6 @@ def dismissed_kinds(
     """Kinds of findings that are open, and of those that are dismissed; a kind may be both."""
     found = dismissals.of(findings)
     pairs = list(zip(findings, found, strict=True))
-    opened = dict.fromkeys(finding.kind for finding, said in pairs if said is None)
-    closed = dict.fromkeys(finding.kind for finding, said in pairs if said is not None)
+    opened = dict.fromkeys(finding.kind for finding, dismissal in pairs if dismissal is None)
+    closed = dict.fromkeys(finding.kind for finding, dismissal in pairs if dismissal is not None)
     return list(opened), list(closed)

@@ -41,9 +41,9 @@ def list_findings(
     after = parse_cursor(cursor) or 0
     groups = read_findings(store, found, after=after, limit=limit, kind=kind, dismissed=dismissed)
     rows = [
-        FindingRow.of(group, finding, said)
+        FindingRow.of(group, finding, dismissal)
         for group in groups
-        for finding, said in zip(group.findings, group.dismissed, strict=True)
+        for finding, dismissal in zip(group.findings, group.dismissed, strict=True)
     ]
     following = str(groups[-1].number) if len(groups) == limit else None
     return FindingList(

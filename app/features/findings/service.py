@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import dataset_id
 from app.features.findings.queries import insert_dismissal
-from app.features.groups.state import GroupState, read_states, require_said, require_unchanged
+from app.features.groups.state import GroupState, read_states, require_content, require_unchanged
 from app.features.groups.submit import read_solved, require_open
 from app.features.queue.listing_queries import (
     Condition,
@@ -51,10 +51,10 @@ class GroupFindings:
                 "group": self.group.key,
                 **asdict(finding),
                 "dismissed": None
-                if said is None
-                else {"by": said.actor, "at": said.at, "note": said.note},
+                if dismissal is None
+                else {"by": dismissal.actor, "at": dismissal.at, "note": dismissal.note},
             }
-            for finding, said in zip(self.findings, self.dismissed, strict=True)
+            for finding, dismissal in zip(self.findings, self.dismissed, strict=True)
         ]
 
 
@@ -108,12 +108,15 @@ def _where(kind: str | None, dismissed: bool | None) -> list[Condition]:
 def _group_findings(state: GroupState, kind: str | None, dismissed: bool | None) -> GroupFindings:
     found = state.solution.findings if state.solution is not None else ()
     chosen = [
-        (item, said)
-        for item, said in zip(found, state.dismissed, strict=True)
+        (item, dismissal)
+        for item, dismissal in zip(found, state.dismissed, strict=True)
         if (kind is None or item.kind == kind)
-        and (dismissed is None or dismissed == (said is not None))
+        and (dismissed is None or dismissed == (dismissal is not None))
     ]
-    findings, checked = tuple(item for item, _ in chosen), tuple(said for _, said in chosen)
+    findings, checked = (
+        tuple(item for item, _ in chosen),
+        tuple(dismissal for _, dismissal in chosen),
+    )
     return GroupFindings(state.id, state.number, state.group, findings, checked)
 
 
@@ -162,14 +165,18 @@ def set_dismissal(
         before = record.state(solution)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
-            require_said(session, group_id, record.said, if_match, what)
+            require_content(session, group_id, record.content, if_match, what)
             require_open(session, stored.dataset_id, group_id)
             # After the ETag: a person who saw another state is told so first.
-            finding = _found(() if before.solution is None else before.solution.findings, named)
+            finding = _meant_finding(
+                () if before.solution is None else before.solution.findings, named
+            )
             # Under another policy other things may be found.
             if policy_hash == stored.policy.hash:
-                said = _said(finding, actor, note)
-                insert_dismissal(session, stored.dataset_id, group_id, said, dismissed=dismissed)
+                dismissal = _dismissal_of(finding, actor, note)
+                insert_dismissal(
+                    session, stored.dataset_id, group_id, dismissal, dismissed=dismissed
+                )
                 refresh_queue(session, [group_id])
                 dismissals = read_noticed(session, [group_id])[1][group_id]
                 after = replace(record, dismissals=dismissals).state(solution)
@@ -177,7 +184,7 @@ def set_dismissal(
                 return after
 
 
-def _found(findings: Sequence[Finding], named: FindingName) -> Finding:
+def _meant_finding(findings: Sequence[Finding], named: FindingName) -> Finding:
     """The finding that is meant; of several, the one with the nearest number."""
     names = (named.kind, named.view, named.marking, named.suggested)
     fitting = [one for one in findings if (one.kind, one.view, one.marking, one.suggested) == names]
@@ -193,7 +200,7 @@ def _found(findings: Sequence[Finding], named: FindingName) -> Finding:
     return min(fitting, key=lambda one: abs((one.number or 0.0) - number))
 
 
-def _said(finding: Finding, actor: str, note: str | None) -> Dismissal:
+def _dismissal_of(finding: Finding, actor: str, note: str | None) -> Dismissal:
     return Dismissal(
         finding.kind,
         finding.view,

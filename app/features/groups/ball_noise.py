@@ -13,7 +13,7 @@ from dataclasses import replace
 from app.db.log import Entry, append, read_entries_of, single_edits
 from app.db.session import Session, now
 from app.features.datasets.queries import group_ids
-from app.features.groups.edit import Edit, SetBall, SetBalls, SetNoise, Several, need_view
+from app.features.groups.edit import CompositeEdit, Edit, SetBall, SetBalls, SetNoise, need_view
 from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup
 from app.features.groups.undo_stacks import GROUP_KINDS
@@ -67,9 +67,9 @@ def give_factors(session: Session, dataset_id: int, factors: Factors, actor: str
 
 def with_noise(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
     """The edit with the noise of who makes it, where it places a ball."""
-    if isinstance(edit, Several):
+    if isinstance(edit, CompositeEdit):
         own = (with_noise(factors, group, one, actor) for one in edit.edits)
-        return Several(tuple(own))
+        return CompositeEdit(tuple(own))
     if not isinstance(edit, SetBall | SetBalls):
         return edit
     balls = edit.balls if isinstance(edit, SetBalls) else (edit.ball,)

@@ -311,7 +311,7 @@ def _plan_group(
         )
         for index, one in outcomes.items():
             if one.error is None:
-                why = _at(spoilt, f"/items/{index}")
+                why = _error_at(spoilt, f"/items/{index}")
                 outcomes[index] = ItemOutcome(index, "refused", stored.id, one.view, etag, why)
     return outcomes
 
@@ -320,12 +320,14 @@ def _refused(group: _GroupPlan, error: ReviewError) -> dict[int, ItemOutcome]:
     """The items of a group that was refused when its turn came."""
     etag = error.current_etag if isinstance(error, StaleRevisionError) else None
     return {
-        index: ItemOutcome(index, "refused", group.id, view, etag, _at(error, f"/items/{index}"))
+        index: ItemOutcome(
+            index, "refused", group.id, view, etag, _error_at(error, f"/items/{index}")
+        )
         for index, view in group.views.items()
     }
 
 
-def _at(error: ReviewError, pointer: str) -> ReviewError:
+def _error_at(error: ReviewError, pointer: str) -> ReviewError:
     """The same error at another place of the request."""
     found = copy(error)
     found.pointer = pointer

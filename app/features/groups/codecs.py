@@ -175,7 +175,7 @@ def station_to_json(station: Station) -> Json:
         "key": station.key,
         "size": [station.size.width, station.size.height],
         "shared": station.shared,
-        "lines": lines_to_json(station.said_lines),
+        "lines": lines_to_json(station.annotated_lines),
         "given": None if station.given is None else camera_to_json(station.given),
         "calibration": station.calibration,
         "flipped": station.flipped,

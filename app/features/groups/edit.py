@@ -344,7 +344,7 @@ class SetNoise:
 
 
 @dataclass(frozen=True)
-class Several:
+class CompositeEdit:
     """Edits that are one: done one after the other, and taken back together."""
 
     edits: tuple[Edit, ...]
@@ -355,13 +355,13 @@ class Several:
             group = edit.apply(group)
         return group
 
-    def inverse(self, group: Group) -> Several:
+    def inverse(self, group: Group) -> CompositeEdit:
         """What takes the last one back first."""
         back: list[Edit] = []
         for edit in self.edits:
             back.insert(0, edit.inverse(group))
             group = edit.apply(group)
-        return Several(tuple(back))
+        return CompositeEdit(tuple(back))
 
 
 STATION_EDITS = (SetLines, SetCalibrationSource, SetPicture)

@@ -21,6 +21,7 @@ from app.features.groups.codecs import (
     positions_to_json,
 )
 from app.features.groups.edit import (
+    CompositeEdit,
     Edit,
     IncludeView,
     LineChanges,
@@ -36,7 +37,6 @@ from app.features.groups.edit import (
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
-    Several,
     StationEdit,
 )
 from app.soccer.annotation import Lines
@@ -53,14 +53,14 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
     """An edit with its name under ``edit``."""
     match edit:
         case SetLines(view, lines, proposed, not_visible):
-            said = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
-            return {"edit": "set_lines", "view": view, **said}
+            fields = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
+            return {"edit": "set_lines", "view": view, **fields}
         case SetBalls(view, balls, noise):
-            said = {"balls": [*map(ball_to_json, balls)], **_noise(noise)}
-            return {"edit": "set_balls", "view": view, **said}
+            fields = {"balls": [*map(ball_to_json, balls)], **_noise(noise)}
+            return {"edit": "set_balls", "view": view, **fields}
         case SetBall(view, ball, noise):
-            said = {"balls": [] if ball is None else [ball_to_json(ball)], **_noise(noise)}
-            return {"edit": "set_balls", "view": view, **said}
+            fields = {"balls": [] if ball is None else [ball_to_json(ball)], **_noise(noise)}
+            return {"edit": "set_balls", "view": view, **fields}
         case IncludeView(view, included, reason, note):
             why = {} if reason is None else {"reason": reason, "note": note}
             return {"edit": "include_view", "view": view, "included": included, **why}
@@ -74,13 +74,13 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "set_positions", "positions": positions_to_json(positions)}
         case SetNoise(noise):
             return {"edit": "set_noise", "noise": {view: float(of) for view, of in noise.items()}}
-        case Several(edits):
+        case CompositeEdit(edits):
             return {"edit": "several", "edits": [*map(edit_to_json, edits)]}
         case SetPaint(paint):
             return {"edit": "set_paint", "paint": paint_to_json(paint)}
         case SetStationLines(lines, proposed, not_visible):
-            said = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
-            return {"edit": "set_station_lines", **said}
+            fields = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
+            return {"edit": "set_station_lines", **fields}
         case SetStationCalibration(calibration):
             return {"edit": "set_station_calibration", "calibration": calibration}
         case SetStationCamera(given, covariance, calibration):
@@ -115,7 +115,7 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
         case "set_noise":
             return SetNoise(value["noise"])
         case "several":
-            return Several(tuple(map(edit_from_json, value["edits"])))
+            return CompositeEdit(tuple(map(edit_from_json, value["edits"])))
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
 
 
@@ -144,15 +144,15 @@ def _noise(noise: float) -> Json:
 def _source(proposed: tuple[str, ...], not_visible: tuple[str, ...]) -> Json:
     """Where lines come from, or why there are none, only where there is something to say: all other
     entries are as ever."""
-    said = dict.fromkeys(proposed, "proposed") | dict.fromkeys(not_visible, "not_visible")
-    return {"source": said} if said else {}
+    sources = dict.fromkeys(proposed, "proposed") | dict.fromkeys(not_visible, "not_visible")
+    return {"source": sources} if sources else {}
 
 
 def _sources(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The markings that were proposed, and those that are not visible."""
-    said = value.get("source", {})
+    sources = value.get("source", {})
     proposed, not_visible = (
-        tuple(name for name, source in said.items() if source == wanted)
+        tuple(name for name, source in sources.items() if source == wanted)
         for wanted in ("proposed", "not_visible")
     )
     return proposed, not_visible

@@ -25,7 +25,7 @@ def give_edits(
     *,
     actor: str,
     body: Mapping[str, Json] | None = None,
-    told: int | None = None,
+    always_logged: int | None = None,
 ) -> int:
     """Edit groups; one that the edit leaves as it is gets neither revision nor entry.
 
@@ -37,7 +37,7 @@ def give_edits(
         edits_of: The edits of some groups, by id; one that has none is left alone.
         actor: Who says so.
         body: What each entry says beside the edit and its inverse.
-        told: A group that gets its entry even where nothing changes: the entry says more than the edit.
+        always_logged: A group that gets its entry even where nothing changes: the entry says more than the edit.
 
     Returns:
         How many groups have an entry.
@@ -49,7 +49,7 @@ def give_edits(
         for number, edit in edits_of(some).items():
             stored = some[number]
             group = edit.apply(stored.group)
-            if group == stored.group and number != told:
+            if group == stored.group and number != always_logged:
                 continue
             save_revision(session, stored, next_revision(stored, group, at))
             step = step_to_json(edit, edit.inverse(stored.group))

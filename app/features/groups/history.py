@@ -14,7 +14,7 @@ from app.errors import NotFoundError
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
 from app.features.groups.state import need_group
-from app.features.groups.state_snapshot import Ledger, StationRecord
+from app.features.groups.state_snapshot import StateSnapshot, StationRecord
 from app.features.people.alias_queries import shown_entries
 from app.features.people.visibility_queries import reads_blind
 from app.soccer.group import Group, View
@@ -64,10 +64,10 @@ def history(store: Store, group_id: int) -> list[LogEntry]:
     """
     with store.read() as session:
         stored = need_group(session, group_id)
-        told = shown_entries(session, _told(session, stored))
+        entries = shown_entries(session, _group_entries(session, stored))
         if not reads_blind():
-            return told
-        return [replace(entry, id=place) for place, entry in enumerate(told, start=1)]
+            return entries
+        return [replace(entry, id=place) for place, entry in enumerate(entries, start=1)]
 
 
 def read_step(store: Store, group_id: int, entry_id: int) -> Step:
@@ -79,22 +79,22 @@ def read_step(store: Store, group_id: int, entry_id: int) -> Step:
     with store.read() as session:
         stored = need_group(session, group_id)
         if reads_blind():
-            place, told = entry_id - 1, _told(session, stored)
-            entry_id = told[place].id if place < len(told) else 0
-        ledger = _static_cameras(stored)
+            place, entries = entry_id - 1, _group_entries(session, stored)
+            entry_id = entries[place].id if place < len(entries) else 0
+        snapshot = _static_cameras(stored)
         before: Group | None = None
         for entry in _entries(session, stored):
-            known = group_id in ledger.groups
+            known = group_id in snapshot.groups
             if entry.id == entry_id:
-                before = ledger.group(group_id) if known else None
-            apply_entry(ledger, entry)
-            if entry.id == entry_id and group_id in ledger.groups:
+                before = snapshot.group(group_id) if known else None
+            apply_entry(snapshot, entry)
+            if entry.id == entry_id and group_id in snapshot.groups:
                 (shown,) = shown_entries(session, [entry])
-                return _step(shown, before, ledger.group(group_id), stored.view_ids)
+                return _step(shown, before, snapshot.group(group_id), stored.view_ids)
     raise NotFoundError(f"group {group_id} has no entry {entry_id}")
 
 
-def _told(session: Session, stored: StoredGroup) -> list[LogEntry]:
+def _group_entries(session: Session, stored: StoredGroup) -> list[LogEntry]:
     """The entries of a group's history."""
     entries = list(_entries(session, stored))
     first = next(entry.id for entry in entries if entry.group_id is not None)
@@ -114,15 +114,15 @@ def _entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
     return heapq.merge(group_entries(session, stored.id), *shared, key=lambda entry: entry.id)
 
 
-def _static_cameras(stored: StoredGroup) -> Ledger:
-    """A ledger of the static cameras alone, as they are now; their own entries tell what they were."""
-    ledger = Ledger()
+def _static_cameras(stored: StoredGroup) -> StateSnapshot:
+    """A state snapshot of the static cameras alone, as they are now; their own entries tell what they were."""
+    snapshot = StateSnapshot()
     for item in stored.stations.values():
         if item.station.shared:
-            ledger.stations[item.id] = StationRecord(
+            snapshot.stations[item.id] = StationRecord(
                 stored.dataset_id, item.station, item.revision, item.source_digest
             )
-    return ledger
+    return snapshot
 
 
 def _step(entry: LogEntry, before: Group | None, after: Group, view_ids: Mapping[str, int]) -> Step:

@@ -23,7 +23,7 @@ from app.http.documents import Document
 from app.soccer.group import View, view_letter
 
 
-class PastView(Document):
+class ViewThen(Document):
     """A view as it was said to be at a time."""
 
     included: bool
@@ -50,8 +50,8 @@ class ChangedViewDocument(Document):
     width: int
     height: int
     image: str | None = Field(description="Address of the frame, where there is one now.")
-    before: PastView | None
-    after: PastView | None
+    before: ViewThen | None
+    after: ViewThen | None
 
     @classmethod
     def of(cls, changed: ChangedView) -> Self:
@@ -65,8 +65,8 @@ class ChangedViewDocument(Document):
             width=there.size.width,
             height=there.size.height,
             image=image_address(changed.id) if shown and changed.id is not None else None,
-            before=None if changed.before is None else PastView.of(changed.before),
-            after=None if changed.after is None else PastView.of(changed.after),
+            before=None if changed.before is None else ViewThen.of(changed.before),
+            after=None if changed.after is None else ViewThen.of(changed.after),
         )
 
 

@@ -30,7 +30,7 @@ def station_values(station: Station) -> dict[str, Any]:
         "height": station.size.height,
         "flipped": station.flipped,
         "calibration": station.calibration,
-        "lines": canonical(codecs.lines_to_json(station.said_lines)),
+        "lines": canonical(codecs.lines_to_json(station.annotated_lines)),
         "given": None if given is None else canonical(given),
         "picture": None
         if station.picture is None

@@ -19,7 +19,7 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
 from app.solving.warm import warm_up
-from app.worker_pool import WarmWorker, least_busy
+from app.worker_pool import ReadyWorker, least_busy
 from app.worker_process import WorkerEnded, WorkerLimits
 
 Solved = TypeVar("Solved")
@@ -38,7 +38,9 @@ class LargeEdits:
 
     def __init__(self, settings: Settings):
         apart = settings.solves_apart
-        self.workers = [WarmWorker("large", LIMITS, _ended, make_ready)] if apart else []
+        self.workers = (
+            [ReadyWorker("large", LIMITS, _process_ended, prepare_process)] if apart else []
+        )
 
     def run(
         self,
@@ -71,7 +73,7 @@ class LargeEdits:
             worker.close()
 
 
-def make_ready() -> None:
+def prepare_process() -> None:
     """In the process: give way to others, and load the solver's kernels."""
     os.nice(NICENESS)
     warm_up()
@@ -79,5 +81,5 @@ def make_ready() -> None:
     gc.freeze()
 
 
-def _ended(error: WorkerEnded) -> OverloadedError:
+def _process_ended(error: WorkerEnded) -> OverloadedError:
     return OverloadedError(f"solving this {error}", hint="Nothing was saved. Try it again.")

@@ -211,14 +211,14 @@ class ProposalTask:
         old = self.old
         if old is None or old.version != EXTRACTOR_VERSION or old.beside != self.beside:
             return ""
-        told = old.outcome == "proposed" or old.sought_with == self.sought_with
-        return old.frame if told else ""
+        is_usable = old.outcome == "proposed" or old.sought_with == self.sought_with
+        return old.frame if is_usable else ""
 
     def without_picture(self, sentence: str) -> Proposal:
         """What is kept where no picture can be read."""
-        return self.said(ViewProposal("nothing", sentence, {}), "")
+        return self.kept(ViewProposal("nothing", sentence, {}), "")
 
-    def said(self, found: ViewProposal, frame: str) -> Proposal:
+    def kept(self, found: ViewProposal, frame: str) -> Proposal:
         """What is kept of an answer for the picture with this digest."""
         return Proposal(
             view_id=self.view_id,
@@ -242,7 +242,7 @@ def read_proposal(task: ProposalTask, settings: Settings) -> Proposal | None:
     if image is None:
         return None
     found = proposal_of(image, task.size, task.known, task.pitch, task.policy)
-    return task.said(beside_drawn(found, task.drawn, task.pitch, task.size, task.policy), digest)
+    return task.kept(beside_drawn(found, task.drawn, task.pitch, task.size, task.policy), digest)
 
 
 class PictureTask:

@@ -24,7 +24,7 @@ from app.log import log_to_stderr
 from app.soccer.group import Group
 from app.solving.solve import solve
 from app.solving.warm import warm_up
-from app.worker_pool import WarmWorker, least_busy
+from app.worker_pool import ReadyWorker, least_busy
 from app.worker_process import WorkerEnded, WorkerLimits
 
 
@@ -80,7 +80,8 @@ class Previews:
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
         places = PREVIEWS.apart if settings.solves_apart else None
         self.workers = [
-            WarmWorker("previews", LIMITS, _ended, make_ready, settings) for _ in range(places or 0)
+            ReadyWorker("previews", LIMITS, _process_ended, make_ready, settings)
+            for _ in range(places or 0)
         ]
 
     async def answer(self, request: Request, group_id: int, changes: PreviewRequest) -> bytes:
@@ -149,5 +150,5 @@ def _solve(
     return document.model_dump_json().encode()
 
 
-def _ended(error: WorkerEnded) -> OverloadedError:
+def _process_ended(error: WorkerEnded) -> OverloadedError:
     return OverloadedError(f"this preview {error}", hint="Nothing was changed. Try it again.")

@@ -13,8 +13,8 @@ from app.db.session import Session
 from app.features.datasets.tables import (
     GroupModel,
     ImportFindingModel,
-    SpareFrameModel,
     StationModel,
+    UnassignedFrameModel,
     ViewModel,
 )
 from app.features.findings.queries import SEEN
@@ -44,15 +44,15 @@ def all_groups(session: Session) -> Iterator[StoredGroup]:
 
 def all_verdicts(session: Session) -> Iterator[dict[str, Any]]:
     """Every verdict as values by column but its id, oldest first."""
-    return _all_said(session, VerdictModel)
+    return _all_rows(session, VerdictModel)
 
 
 def all_dismissals(session: Session) -> Iterator[dict[str, Any]]:
     """Every dismissal of a finding in the same way."""
-    return _all_said(session, DismissalModel)
+    return _all_rows(session, DismissalModel)
 
 
-def _all_said(
+def _all_rows(
     session: Session, model: type[VerdictModel] | type[DismissalModel]
 ) -> Iterator[dict[str, Any]]:
     columns = [item for item in model.__table__.columns if item.name != "id"]
@@ -60,9 +60,9 @@ def _all_said(
         yield dict(row._mapping)
 
 
-def all_spare(session: Session) -> Iterator[Any]:
-    """The row of every spare frame."""
-    return iter(session.execute(select(*SpareFrameModel.__table__.columns)))
+def all_unassigned(session: Session) -> Iterator[Any]:
+    """The row of every unassigned frame."""
+    return iter(session.execute(select(*UnassignedFrameModel.__table__.columns)))
 
 
 def all_noticed(session: Session) -> Iterator[Any]:
@@ -72,7 +72,7 @@ def all_noticed(session: Session) -> Iterator[Any]:
 
 
 def rewrite(
-    session: Session, *, stations: Rows, groups: Rows, views: Rows, noticed: Rows, spare: Rows
+    session: Session, *, stations: Rows, groups: Rows, views: Rows, noticed: Rows, unassigned: Rows
 ) -> None:
     """Put rows in the place of all stations, groups, views and what hangs on them.
 
@@ -81,8 +81,8 @@ def rewrite(
     """
     # Solutions and verdicts refer to groups, which are gone for a moment.
     session.execute(DeferReferences())
-    with _kept_of_views(session):
-        for model in (QueueModel, ImportFindingModel, SpareFrameModel, ViewModel):
+    with _keeping_view_rows(session):
+        for model in (QueueModel, ImportFindingModel, UnassignedFrameModel, ViewModel):
             session.execute(delete(model))
         session.execute(delete(GroupModel))
         session.execute(delete(StationModel))
@@ -91,19 +91,19 @@ def rewrite(
             (GroupModel, groups),
             (ViewModel, views),
             (ImportFindingModel, noticed),
-            (SpareFrameModel, spare),
+            (UnassignedFrameModel, unassigned),
         ):
             if rows:
                 session.execute(insert(table), rows)
 
 
 @contextmanager
-def _kept_of_views(session: Session) -> Iterator[None]:
+def _keeping_view_rows(session: Session) -> Iterator[None]:
     """What goes with its view and is in no log comes back after this, where its view did."""
-    for table in _going_with_views():
+    for table in _tables_of_views():
         session.execute(text(f"CREATE TEMP TABLE kept_{table} AS SELECT * FROM {table}"))
     yield
-    for table in _going_with_views():
+    for table in _tables_of_views():
         session.execute(
             text(
                 f"INSERT INTO {table} SELECT * FROM kept_{table}"
@@ -113,7 +113,7 @@ def _kept_of_views(session: Session) -> Iterator[None]:
         session.execute(text(f"DROP TABLE kept_{table}"))
 
 
-def _going_with_views() -> list[str]:
+def _tables_of_views() -> list[str]:
     """Names of the tables whose rows are deleted with the view that they are about."""
     return [
         table.name

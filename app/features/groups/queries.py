@@ -19,8 +19,8 @@ from app.features.datasets.queries import policy_of
 from app.features.datasets.tables import (
     DatasetModel,
     GroupModel,
-    SpareFrameModel,
     StationModel,
+    UnassignedFrameModel,
     ViewModel,
 )
 from app.features.groups import codecs
@@ -262,7 +262,7 @@ BATCH = 1000
 
 
 @dataclass(frozen=True)
-class StoredSpareFrame:
+class StoredUnassignedFrame:
     """A camera, one of its frames, and its extras as they are stored."""
 
     camera: str
@@ -270,9 +270,9 @@ class StoredSpareFrame:
     extras: bytes
 
 
-def spare_rows(session: Session, dataset_id: int) -> Iterator[StoredSpareFrame]:
-    """The spare frames of a dataset as they came, in batches."""
-    model, after = SpareFrameModel, 0
+def unassigned_rows(session: Session, dataset_id: int) -> Iterator[StoredUnassignedFrame]:
+    """The unassigned frames of a dataset as they came, in batches."""
+    model, after = UnassignedFrameModel, 0
     while True:
         rows = session.execute(
             select(model.id, model.camera, model.frame, model.extras)
@@ -281,42 +281,44 @@ def spare_rows(session: Session, dataset_id: int) -> Iterator[StoredSpareFrame]:
             .limit(BATCH)
         ).all()
         for row in rows:
-            yield StoredSpareFrame(row.camera, row.frame, row.extras)
+            yield StoredUnassignedFrame(row.camera, row.frame, row.extras)
         if len(rows) < BATCH:
             return
         after = rows[-1].id
 
 
-def sorted_spare_rows(session: Session, dataset_id: int) -> Iterator[StoredSpareFrame]:
-    """The spare frames of a dataset by camera and frame."""
-    model = SpareFrameModel
+def sorted_unassigned_rows(session: Session, dataset_id: int) -> Iterator[StoredUnassignedFrame]:
+    """The unassigned frames of a dataset by camera and frame."""
+    model = UnassignedFrameModel
     statement = (
         select(model.camera, model.frame, model.extras)
         .where(model.dataset_id == dataset_id)
         .order_by(model.camera, model.frame)
     )
     for row in session.execute(statement.execution_options(yield_per=BATCH)):
-        yield StoredSpareFrame(row.camera, row.frame, row.extras)
+        yield StoredUnassignedFrame(row.camera, row.frame, row.extras)
 
 
-def known_spare(
+def known_unassigned(
     session: Session, dataset_id: int, frames: Collection[str]
 ) -> dict[tuple[str, str], bytes]:
-    """Extras of the spare frames of these names, by camera and frame."""
-    model = SpareFrameModel
+    """Extras of the unassigned frames of these names, by camera and frame."""
+    model = UnassignedFrameModel
     statement = select(model.camera, model.frame, model.extras).where(
         model.dataset_id == dataset_id, model.frame.in_(frames)
     )
     return {(row.camera, row.frame): row.extras for row in session.execute(statement)}
 
 
-def put_spare(session: Session, dataset_id: int, bodies: Mapping[tuple[str, str], bytes]) -> None:
-    """Insert spare frames, or replace what is known of them."""
+def put_unassigned(
+    session: Session, dataset_id: int, bodies: Mapping[tuple[str, str], bytes]
+) -> None:
+    """Insert unassigned frames, or replace what is known of them."""
     rows = [
         {"dataset_id": dataset_id, "camera": camera, "frame": frame, "extras": body}
         for (camera, frame), body in bodies.items()
     ]
-    statement = insert(SpareFrameModel)
+    statement = insert(UnassignedFrameModel)
     session.execute(
         statement.on_conflict_do_update(
             index_elements=["dataset_id", "camera", "frame"],

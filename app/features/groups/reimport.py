@@ -30,7 +30,7 @@ class KeptEdit:
 
 
 @dataclass(frozen=True)
-class Followed:
+class MergedGroup:
     """A group after its dataset changed.
 
     ``base`` is the group as it would be had nobody edited it.
@@ -42,15 +42,15 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class FollowedStation:
-    """A station after its dataset changed; ``base`` as in ``Followed``."""
+class MergedStation:
+    """A station after its dataset changed; ``base`` as in ``MergedGroup``."""
 
     station: Station
     base: Station
     kept: KeptEdit | None
 
 
-def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
+def follow_group(stored: StoredGroup, incoming: Group) -> MergedGroup:
     """The stored group brought up to the incoming one, but for what a person edited.
 
     Shared stations are the incoming group's own; they are followed once, elsewhere.
@@ -69,7 +69,7 @@ def follow_group(stored: StoredGroup, incoming: Group) -> Followed:
             bases.append(view)
             sentence = f"{view.key} is gone from the dataset; a person had edited it, so it stays"
             kept.append(KeptEdit(view.key, sentence))
-    return Followed(
+    return MergedGroup(
         replace(incoming, views=tuple(views)), replace(incoming, views=tuple(bases)), tuple(kept)
     )
 
@@ -80,7 +80,7 @@ def follow_station(
     source: Station | None = None,
     *,
     lines_left: bool = False,
-) -> FollowedStation:
+) -> MergedStation:
     """The stored station brought up to the incoming one, unless a person edited it.
 
     A calibration that was imported on its own stays when the dataset brings none. So do the
@@ -106,14 +106,14 @@ def follow_station(
     if incoming.given is None and brought.given is not None:
         incoming = incoming.with_given(brought.given, brought.given_covariance)
     if not stored.edited:
-        return FollowedStation(incoming, incoming, None)
+        return MergedStation(incoming, incoming, None)
     kept = None
     if station_digest(incoming) not in (stored.digest, stored.source_digest):
         sentence = f"the dataset has new lines or a new camera for {incoming.key}; edits stay"
         kept = KeptEdit(None, sentence)
     # What no edit can touch follows all the same.
-    station = incoming.with_said(stored.station)
-    return FollowedStation(station, incoming, kept)
+    station = incoming.with_annotations_of(stored.station)
+    return MergedStation(station, incoming, kept)
 
 
 def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[KeptEdit]]:
@@ -196,30 +196,30 @@ class SharedStations:
         """A station as its dataset last brought it; under an edit only the log remembers."""
         if not stored.edited:
             return stored.station
-        found = said = None
+        found = station = None
         for entry in station_entries(self._session, stored.id):
             if entry.kind == "station":
-                said = station_from_json(entry.body["base"] or entry.body["station"])
-            elif entry.kind == "camera" and said is not None:
-                said = said.with_given(*logged_camera(entry.body))
-            if said is not None and station_digest(said) == stored.source_digest:
-                found = said
+                station = station_from_json(entry.body["base"] or entry.body["station"])
+            elif entry.kind == "camera" and station is not None:
+                station = station.with_given(*logged_camera(entry.body))
+            if station is not None and station_digest(station) == stored.source_digest:
+                found = station
         return found
 
     def _insert(self, station: Station) -> None:
         rows = NewRows(self._session, self._dataset_id)
         self.ids[station.key] = rows.add_station(station)
         rows.insert()
-        self._log(self.ids[station.key], FollowedStation(station, station, None), None)
+        self._log(self.ids[station.key], MergedStation(station, station, None), None)
 
-    def _save(self, stored: StoredStation, followed: FollowedStation) -> None:
+    def _save(self, stored: StoredStation, followed: MergedStation) -> None:
         save_station(self._session, stored, followed.station, source=followed.base)
-        self._log(stored.id, followed, self._note(stored.id, followed))
+        self._log(stored.id, followed, self._save_finding(stored.id, followed))
         groups = groups_of_station(self._session, stored.id)
         refresh_inputs_hashes(self._session, groups)
         refresh_queue(self._session, groups)
 
-    def _note(self, station_id: int, followed: FollowedStation) -> str | None:
+    def _save_finding(self, station_id: int, followed: MergedStation) -> str | None:
         """Save what imports noticed about the station: this one, or earlier ones while it holds."""
         if followed.kept is not None:
             sentence: str | None = followed.kept.sentence
@@ -231,7 +231,7 @@ class SharedStations:
         replace_station_finding(self._session, station_id, KIND, sentence)
         return sentence
 
-    def _log(self, station_id: int, followed: FollowedStation, kept: str | None) -> None:
+    def _log(self, station_id: int, followed: MergedStation, kept: str | None) -> None:
         same = followed.base == followed.station
         body = {
             "source": self._source,

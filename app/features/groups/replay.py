@@ -27,7 +27,7 @@ from app.features.groups.projection_queries import rewrite
 from app.features.groups.reimport import KIND
 from app.features.groups.state_snapshot import (
     GroupRecord,
-    Ledger,
+    StateSnapshot,
     StationRecord,
     ViewRecord,
     without_station,
@@ -40,28 +40,28 @@ from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 
 
-def replay(session: Session) -> Ledger:
-    """The ledger that follows from the log, whose chain is verified first.
+def replay(session: Session) -> StateSnapshot:
+    """The state snapshot that follows from the log, whose chain is verified first.
 
     Raises:
         StorageError: The log is not what was written.
     """
     verify_chain(session)
-    ledger, numbers = Ledger(), Counter[int]()
+    snapshot, numbers = StateSnapshot(), Counter[int]()
     for entry in read_log(session):
         assert entry.kind != "import" or entry.dataset_id is not None
-        if entry.kind == "import" and entry.group_id not in ledger.groups:
+        if entry.kind == "import" and entry.group_id not in snapshot.groups:
             numbers[entry.dataset_id or 0] += 1
-        apply_entry(ledger, entry, numbers[entry.dataset_id or 0])
-    return ledger
+        apply_entry(snapshot, entry, numbers[entry.dataset_id or 0])
+    return snapshot
 
 
-def apply_entry(ledger: Ledger, entry: LogEntry, number: int = 0) -> None:
-    """Bring one entry of the log into the ledger; ``number`` is that of a group that is new."""
-    if entry.kind == "import" and entry.group_id not in ledger.groups:
-        _new_group(ledger, entry, number)
+def apply_entry(snapshot: StateSnapshot, entry: LogEntry, number: int = 0) -> None:
+    """Bring one entry of the log into the state snapshot; ``number`` is that of a group that is new."""
+    if entry.kind == "import" and entry.group_id not in snapshot.groups:
+        _new_group(snapshot, entry, number)
     else:
-        _STEPS[entry.kind](ledger, entry)
+        _STEPS[entry.kind](snapshot, entry)
 
 
 def rebuild(store: Store) -> int:
@@ -71,76 +71,80 @@ def rebuild(store: Store) -> int:
     far as their views do. Returns the number of groups.
     """
     with store.write() as session:
-        ledger = replay(session)
-        rewrite(session, **_rows(ledger))
-        refresh_queue(session, list(ledger.groups))
-    return len(ledger.groups)
+        snapshot = replay(session)
+        rewrite(session, **_rows(snapshot))
+        refresh_queue(session, list(snapshot.groups))
+    return len(snapshot.groups)
 
 
-def _dataset(ledger: Ledger, entry: LogEntry) -> None:
+def _dataset(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.dataset_id is not None
     policy = policy_from_json(entry.body["policy"])
-    ledger.datasets[entry.dataset_id] = (entry.body["name"], policy)
+    snapshot.datasets[entry.dataset_id] = (entry.body["name"], policy)
 
 
-def _policy(ledger: Ledger, entry: LogEntry) -> None:
+def _policy(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.dataset_id is not None
-    name, _ = ledger.datasets[entry.dataset_id]
-    ledger.datasets[entry.dataset_id] = (name, policy_from_json(entry.body["policy"]))
+    name, _ = snapshot.datasets[entry.dataset_id]
+    snapshot.datasets[entry.dataset_id] = (name, policy_from_json(entry.body["policy"]))
 
 
-def _station(ledger: Ledger, entry: LogEntry) -> None:
+def _station(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None and entry.dataset_id is not None
     station, base = entry.body["station"], entry.body["base"]
     _save_station(
-        ledger,
+        snapshot,
         entry.dataset_id,
         entry.station_id,
         station_from_json(station),
         station_from_json(station if base is None else base),
     )
-    _notice(ledger, None, entry.station_id, [[None, entry.body["kept"]]])
+    _replay_noticed(snapshot, None, entry.station_id, [[None, entry.body["kept"]]])
 
 
 def _save_station(
-    ledger: Ledger, dataset_id: int, station_id: int, station: Station, base: Station | None
+    snapshot: StateSnapshot,
+    dataset_id: int,
+    station_id: int,
+    station: Station,
+    base: Station | None,
 ) -> None:
-    old = ledger.stations.get(station_id)
+    old = snapshot.stations.get(station_id)
     digest = station_digest(base) if base is not None else (old.source_digest if old else "")
     revision = old.revision + 1 if old else 1
-    ledger.stations[station_id] = StationRecord(dataset_id, station, revision, digest)
+    snapshot.stations[station_id] = StationRecord(dataset_id, station, revision, digest)
 
 
-def _new_group(ledger: Ledger, entry: LogEntry, number: int) -> None:
+def _new_group(snapshot: StateSnapshot, entry: LogEntry, number: int) -> None:
     assert entry.group_id is not None and entry.dataset_id is not None
-    ledger.groups[entry.group_id] = GroupRecord(
+    snapshot.groups[entry.group_id] = GroupRecord(
         entry.dataset_id, number, 0, "", "", Group("", ()), []
     )
-    _import(ledger, entry)
+    _import(snapshot, entry)
 
 
-def _import(ledger: Ledger, entry: LogEntry) -> None:
+def _import(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
-    record, body = ledger.groups[entry.group_id], entry.body
+    record, body = snapshot.groups[entry.group_id], entry.body
     base = {view["key"]: view for view in (body["base"] or body["group"])["views"]}
     gone = {item.station_id for item in record.views}
     record.views = []
     for value in body["group"]["views"]:
         view_id, station_id = body["ids"][value["key"]]
         gone.discard(station_id)
-        item = _import_view(ledger, record, value, base[value["key"]], station_id)
+        item = _import_view(snapshot, record, value, base[value["key"]], station_id)
         record.views.append(replace(item, id=view_id))
     for station_id in gone:
-        if not ledger.stations[station_id].station.shared:
-            del ledger.stations[station_id]
+        if not snapshot.stations[station_id].station.shared:
+            del snapshot.stations[station_id]
     record.head, record.paint = _head(body["group"]), dict(body["group"].get("paint", {}))
     record.source_hash = body["source_hash"]
     record.revision, record.changed = record.revision + 1, entry.at
-    _notice(ledger, entry.group_id, None, body.get("kept", []))
+    _replay_noticed(snapshot, entry.group_id, None, body.get("kept", []))
 
 
 def _import_view(
-    ledger: Ledger,
+    snapshot: StateSnapshot,
     record: GroupRecord,
     value: Mapping[str, Any],
     base: Mapping[str, Any],
@@ -149,8 +153,8 @@ def _import_view(
     shared = isinstance(value["station"], str)
     if not shared:
         own, source = station_from_json(value["station"]), station_from_json(base["station"])
-        _save_station(ledger, record.dataset_id, station_id, own, source)
-    station = ledger.stations[station_id].station
+        _save_station(snapshot, record.dataset_id, station_id, own, source)
+    station = snapshot.stations[station_id].station
     source_digest = view_digest(view_from_json(base, station))
     return ViewRecord(0, station_id, without_station(view_from_json(value, station)), source_digest)
 
@@ -167,100 +171,103 @@ def _head(value: Mapping[str, Any]) -> Group:
     )
 
 
-def _edit(ledger: Ledger, entry: LogEntry) -> None:
+def _edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
-    record, group = ledger.groups[entry.group_id], ledger.group(entry.group_id)
+    record, group = snapshot.groups[entry.group_id], snapshot.group(entry.group_id)
     changed = edit_from_json(entry.body["edit"]).apply(group)
     for item, before, after in zip(record.views, group.views, changed.views, strict=True):
         item.view = without_station(after)
         if after.station != before.station:
-            _save_station(ledger, record.dataset_id, item.station_id, after.station, None)
+            _save_station(snapshot, record.dataset_id, item.station_id, after.station, None)
     record.head = replace(record.head, pitch=changed.pitch, positions=changed.positions)
     record.revision, record.changed = record.revision + 1, entry.at
 
 
-def _noise(ledger: Ledger, entry: LogEntry) -> None:
+def _noise(snapshot: StateSnapshot, entry: LogEntry) -> None:
     # What is accepted for a dataset changes none of its groups by itself.
     if entry.group_id is not None:
-        _edit(ledger, entry)
+        _edit(snapshot, entry)
 
 
-def _paint(ledger: Ledger, entry: LogEntry) -> None:
+def _paint(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
-    record = ledger.groups[entry.group_id]
+    record = snapshot.groups[entry.group_id]
     record.paint = dict(entry.body["edit"]["paint"])
     record.revision, record.changed = record.revision + 1, entry.at
 
 
-def _station_edit(ledger: Ledger, entry: LogEntry) -> None:
+def _station_edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None
-    record = ledger.stations[entry.station_id]
+    record = snapshot.stations[entry.station_id]
     station = station_edit_from_json(entry.body["edit"]).apply(record.station)
-    _save_station(ledger, record.dataset_id, entry.station_id, station, None)
+    _save_station(snapshot, record.dataset_id, entry.station_id, station, None)
 
 
-def _camera(ledger: Ledger, entry: LogEntry) -> None:
+def _camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None
-    record = ledger.stations[entry.station_id]
+    record = snapshot.stations[entry.station_id]
     edited = station_digest(record.station) != record.source_digest
     station = record.station.with_given(*logged_camera(entry.body))
     base = None if edited else station
-    _save_station(ledger, record.dataset_id, entry.station_id, station, base)
+    _save_station(snapshot, record.dataset_id, entry.station_id, station, base)
     if entry.group_id is not None:
-        group = ledger.groups[entry.group_id]
+        group = snapshot.groups[entry.group_id]
         group.revision, group.changed = group.revision + 1, entry.at
 
 
-def _verdict(ledger: Ledger, entry: LogEntry) -> None:
+def _verdict(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
-    ledger.verdicts.setdefault(entry.group_id, []).append(dict(entry.body))
+    snapshot.verdicts.setdefault(entry.group_id, []).append(dict(entry.body))
 
 
-def _dismissal(ledger: Ledger, entry: LogEntry) -> None:
+def _dismissal(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
     # One that was brought from elsewhere says itself whose it is.
-    said = {"actor": entry.actor, "at": entry.at, **entry.body}
-    ledger.dismissals.setdefault(entry.group_id, []).append(said)
+    dismissal = {"actor": entry.actor, "at": entry.at, **entry.body}
+    snapshot.dismissals.setdefault(entry.group_id, []).append(dismissal)
 
 
-def _dataset_deleted(ledger: Ledger, entry: LogEntry) -> None:
+def _dataset_deleted(snapshot: StateSnapshot, entry: LogEntry) -> None:
     """Everything of the dataset goes; its entries before this one still tell what it was."""
     gone = entry.dataset_id
     assert gone is not None
-    del ledger.datasets[gone]
-    groups = {key for key, record in ledger.groups.items() if record.dataset_id == gone}
-    stations = {key for key, record in ledger.stations.items() if record.dataset_id == gone}
+    del snapshot.datasets[gone]
+    groups = {key for key, record in snapshot.groups.items() if record.dataset_id == gone}
+    stations = {key for key, record in snapshot.stations.items() if record.dataset_id == gone}
     for key in groups:
-        del ledger.groups[key]
-        ledger.verdicts.pop(key, None)
-        ledger.dismissals.pop(key, None)
+        del snapshot.groups[key]
+        snapshot.verdicts.pop(key, None)
+        snapshot.dismissals.pop(key, None)
     for key in stations:
-        del ledger.stations[key]
-    for place in [place for place in ledger.spare if place[0] == gone]:
-        del ledger.spare[place]
-    ledger.noticed = {
-        item for item in ledger.noticed if item[0] not in groups and item[1] not in stations
+        del snapshot.stations[key]
+    for place in [place for place in snapshot.unassigned if place[0] == gone]:
+        del snapshot.unassigned[place]
+    snapshot.noticed = {
+        item for item in snapshot.noticed if item[0] not in groups and item[1] not in stations
     }
 
 
-def _spare(ledger: Ledger, entry: LogEntry) -> None:
+def _replay_unassigned(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.dataset_id is not None
     for camera, frame, extras in entry.body["frames"]:
-        ledger.spare[entry.dataset_id, camera, frame] = extras_from_json(extras)
+        snapshot.unassigned[entry.dataset_id, camera, frame] = extras_from_json(extras)
 
 
-def _notice(
-    ledger: Ledger, group_id: int | None, station_id: int | None, kept: list[list[str | None]]
+def _replay_noticed(
+    snapshot: StateSnapshot,
+    group_id: int | None,
+    station_id: int | None,
+    kept: list[list[str | None]],
 ) -> None:
     """Each import replaces what the ones before it noticed in the same place."""
     place = (group_id, station_id)
-    ledger.noticed = {item for item in ledger.noticed if item[:2] != place}
+    snapshot.noticed = {item for item in snapshot.noticed if item[:2] != place}
     for view, sentence in kept:
         if sentence is not None:
-            ledger.noticed.add((*place, view, sentence))
+            snapshot.noticed.add((*place, view, sentence))
 
 
-def _rows(ledger: Ledger) -> dict[str, list[dict[str, Any]]]:
+def _rows(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
     """Rows of the tables, as ``rewrite`` takes them."""
     stations = [
         {
@@ -270,7 +277,7 @@ def _rows(ledger: Ledger) -> dict[str, list[dict[str, Any]]]:
             "revision": item.revision,
             "source_digest": item.source_digest,
         }
-        for key, item in ledger.stations.items()
+        for key, item in snapshot.stations.items()
     ]
     views = [
         {
@@ -280,31 +287,31 @@ def _rows(ledger: Ledger) -> dict[str, list[dict[str, Any]]]:
             "station_id": item.station_id,
             "source_digest": item.source_digest,
         }
-        for key, record in ledger.groups.items()
+        for key, record in snapshot.groups.items()
         for place, item in enumerate(record.views)
     ]
     noticed = [
-        {"group_id": group, "station_id": station, "view": view, "kind": KIND, "sentence": said}
-        for group, station, view, said in sorted(ledger.noticed, key=repr)
+        {"group_id": group, "station_id": station, "view": view, "kind": KIND, "sentence": sentence}
+        for group, station, view, sentence in sorted(snapshot.noticed, key=repr)
     ]
-    spare = [
+    unassigned = [
         {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": _packed(extras)}
-        for key, extras in ledger.spare.items()
+        for key, extras in snapshot.unassigned.items()
     ]
-    groups = [_group_row(ledger, key) for key in ledger.groups]
+    groups = [_group_row(snapshot, key) for key in snapshot.groups]
     return {
         "stations": stations,
         "groups": groups,
         "views": views,
         "noticed": noticed,
-        "spare": spare,
+        "unassigned": unassigned,
     }
 
 
-def _group_row(ledger: Ledger, group_id: int) -> dict[str, Any]:
-    record = ledger.groups[group_id]
+def _group_row(snapshot: StateSnapshot, group_id: int) -> dict[str, Any]:
+    record = snapshot.groups[group_id]
     return {
-        **head_values(ledger.group(group_id), record.paint),
+        **head_values(snapshot.group(group_id), record.paint),
         "id": group_id,
         "dataset_id": record.dataset_id,
         "number": record.number,
@@ -318,7 +325,7 @@ def _packed(extras: Any) -> bytes:
     return pack(extras.values())
 
 
-_STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
+_STEPS: dict[str, Callable[[StateSnapshot, LogEntry], None]] = {
     "dataset": _dataset,
     "dataset_deleted": _dataset_deleted,
     "policy": _policy,
@@ -337,7 +344,7 @@ _STEPS: dict[str, Callable[[Ledger, LogEntry], None]] = {
     "camera": _camera,
     "verdict": _verdict,
     DISMISSAL: _dismissal,
-    "spare": _spare,
+    "spare": _replay_unassigned,
     # What a batch did stands in the verdicts themselves.
     "verdict_batch": lambda _ledger, _entry: None,
     "verdict_batch_undo": lambda _ledger, _entry: None,

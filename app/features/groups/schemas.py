@@ -129,14 +129,14 @@ def points_of(lines: dict[str, list[Point] | None]) -> dict[str, tuple[ImagePoin
 
 def _as_union(schema: dict[str, Any]) -> None:
     """Describe the ball edit as the three things that it may be, each complete in itself."""
-    said = schema.pop("properties")
+    fields = schema.pop("properties")
     del schema["type"], schema["additionalProperties"]
-    box, point = (said[name].pop("anyOf")[0] for name in ("box", "point"))
+    box, point = (fields[name].pop("anyOf")[0] for name in ("box", "point"))
     nowhere = {"type": "null"}
 
     def one(title: str, place: str, **own: Any) -> dict[str, Any]:
         own = {"box": nowhere, "point": nowhere, "out_of_view": {"const": False}, **own}
-        properties = {name: said[name] | own.get(name, {}) for name in said}
+        properties = {name: fields[name] | own.get(name, {}) for name in fields}
         properties[place].pop("default", None)
         return {
             "title": title,

@@ -279,7 +279,7 @@ class FixDocument(Document, shows=Fix):
     """An edit that a finding proposes."""
 
 
-def _said(edit: Any) -> Any:
+def _edit_values(edit: Any) -> Any:
     return edit if isinstance(edit, dict) else edit_to_json(edit)
 
 
@@ -287,7 +287,7 @@ class OfferDocument(Document):
     """An edit that carries a fix out."""
 
     label: str = Field(description="What a button for it says.")
-    edit: Annotated[dict[str, Any], BeforeValidator(_said)] = Field(
+    edit: Annotated[dict[str, Any], BeforeValidator(_edit_values)] = Field(
         description="As the history writes edits: `set_lines`, `set_balls`, "
         "`set_picture` or `include_view`."
     )
@@ -344,10 +344,10 @@ class FindingDocument(Document, shows=Finding):
     @staticmethod
     def of(finding: Finding, group: Group, dismissed: Dismissal | None) -> FindingDocument:
         """The document of a finding of a group."""
-        said = FindingDocument.model_validate(finding, context=group)
+        document = FindingDocument.model_validate(finding, context=group)
         if dismissed is not None:
-            said.dismissed = DismissedDocument.model_validate(dismissed)
-        return said
+            document.dismissed = DismissedDocument.model_validate(dismissed)
+        return document
 
     @model_validator(mode="before")
     @classmethod
@@ -390,7 +390,7 @@ class SolutionDocument(Document):
         ``dismissed`` says of each finding who has checked it.
         """
         document = SolutionDocument.model_validate(solution, context=group)
-        for finding, said in zip(document.findings, dismissed, strict=False):
-            if said is not None:
-                finding.dismissed = DismissedDocument.model_validate(said)
+        for finding, dismissal in zip(document.findings, dismissed, strict=False):
+            if dismissal is not None:
+                finding.dismissed = DismissedDocument.model_validate(dismissal)
         return document

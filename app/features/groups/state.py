@@ -13,7 +13,7 @@ from app.features.findings.queries import NOTHING_DISMISSED, GroupDismissals
 from app.features.groups.digest import digest
 from app.features.groups.etag_queries import find_head, read_heads
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.undo_stacks import Stacks, read_stacks
+from app.features.groups.undo_stacks import UndoStacks, read_stacks
 from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
 from app.features.queue.queries import import_findings, is_fixed, read_noticed
@@ -25,17 +25,17 @@ from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Solution
 
 
-def said_part(inputs_hash: str, revision: int, verdict_id: int, dismissal_id: int = 0) -> str:
+def content_tag(inputs_hash: str, revision: int, verdict_id: int, dismissal_id: int = 0) -> str:
     """What people said about a group: the part of its ETag that a change builds on.
 
     The ids are those of the newest verdict and of the newest dismissal; 0: there is none.
     """
-    said = [inputs_hash, revision, verdict_id]
-    return digest([*said, dismissal_id] if dismissal_id else said)[:16]
+    content = [inputs_hash, revision, verdict_id]
+    return digest([*content, dismissal_id] if dismissal_id else content)[:16]
 
 
 def group_etag(
-    said: str,
+    content: str,
     policy_hash: str,
     policy_name: str,
     findings: Iterable[str] | None,
@@ -49,7 +49,7 @@ def group_etag(
     stations that were changed and changed back.
 
     Args:
-        said: ``said_part``.
+        content: ``content_tag``.
         policy_hash: Of the dataset's policy.
         policy_name: Of the dataset's policy.
         findings: Kinds of the solution's findings; None without a solution.
@@ -58,7 +58,7 @@ def group_etag(
     kinds = sorted(set(findings or ()))
     parts = [policy_hash, policy_name, SOLVER_VERSION, findings is None, kinds, station_revisions]
     computed = digest(parts)[:8]
-    return f'"{said}-{computed}"'
+    return f'"{content}-{computed}"'
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,11 @@ class Head:
     """What a change of a group rests on.
 
     Attributes:
-        said: ``said_part``.
+        content: ``content_tag``.
         policy_hash: Of the policy that judges it.
     """
 
-    said: str
+    content: str
     policy_hash: str
 
 
@@ -79,11 +79,11 @@ def read_head(session: Session, group_id: int) -> Head | None:
     row = find_head(session, group_id)
     if row is None:
         return None
-    said = said_part(row.inputs_hash, row.revision, row.last, row.last_dismissal)
-    return Head(said, row.policy_hash)
+    content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
+    return Head(content, row.policy_hash)
 
 
-def said_of(etag: str) -> str:
+def content_tag_of(etag: str) -> str:
     """The first part of an ETag, quoted or not."""
     return etag.strip().strip('"').partition("-")[0]
 
@@ -104,13 +104,15 @@ def require_unchanged(session: Session, group_id: int, if_match: str, what: str)
     head = read_head(session, group_id)
     if head is None:
         raise NotFoundError.group(group_id)
-    require_said(session, group_id, head.said, if_match, what)
+    require_content(session, group_id, head.content, if_match, what)
     return head.policy_hash
 
 
-def require_said(session: Session, group_id: int, said: str, if_match: str, what: str) -> None:
+def require_content(
+    session: Session, group_id: int, content: str, if_match: str, what: str
+) -> None:
     """``require_unchanged`` where what was said about the group is known."""
-    if said != said_of(if_match):
+    if content != content_tag_of(if_match):
         require_etag(read_etags(session, [group_id])[group_id], if_match, what)
 
 
@@ -120,7 +122,7 @@ def require_etag(current: str, if_match: str, what: str) -> None:
     Raises:
         StaleRevisionError: With both ETags.
     """
-    if said_of(current) != said_of(if_match):
+    if content_tag_of(current) != content_tag_of(if_match):
         raise StaleRevisionError(
             f"{what} has changed in the meantime", base_etag=if_match, current_etag=current
         )
@@ -131,14 +133,14 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     noticed = import_findings(session, group_ids)
     etags = {}
     for row in read_heads(session, group_ids):
-        said = said_part(row.inputs_hash, row.revision, row.last, row.last_dismissal)
+        content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
         findings = None
         if row.summary is not None:
             kinds = [item.kind for item in noticed[row.id]]
             findings = [*json.loads(row.summary)["findings"], *kinds]
         name = policy_of(row.policy).name
         revisions = int(row.station_revisions)
-        etags[row.id] = group_etag(said, row.policy_hash, name, findings, revisions)
+        etags[row.id] = group_etag(content, row.policy_hash, name, findings, revisions)
     return etags
 
 
@@ -219,7 +221,7 @@ class Record:
     stored: StoredGroup
     noticed: tuple[Finding, ...]
     verdicts: tuple[StoredVerdict, ...]
-    stacks: Stacks
+    stacks: UndoStacks
     dismissals: GroupDismissals = NOTHING_DISMISSED
 
     @property
@@ -228,12 +230,12 @@ class Record:
         return SolutionKey(self.stored.id, self.stored.inputs_hash, self.stored.policy.hash)
 
     @property
-    def said(self) -> str:
+    def content(self) -> str:
         """What people said: the part of the ETag that a change builds on."""
         newest = self.newest_verdict
         verdict_id = 0 if newest is None else newest.id
         stored = self.stored
-        return said_part(stored.inputs_hash, stored.revision, verdict_id, self.dismissals.last)
+        return content_tag(stored.inputs_hash, stored.revision, verdict_id, self.dismissals.last)
 
     @property
     def newest_verdict(self) -> StoredVerdict | None:
@@ -260,7 +262,7 @@ class Record:
             number=stored.number,
             key=stored.group.key,
             revision=stored.revision,
-            etag=group_etag(self.said, stored.policy.hash, stored.policy.name, kinds, revisions),
+            etag=group_etag(self.content, stored.policy.hash, stored.policy.name, kinds, revisions),
             group=stored.group,
             view_ids=stored.view_ids,
             station_ids={item.station.key: item.id for item in stations},

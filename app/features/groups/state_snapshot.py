@@ -1,6 +1,6 @@
 """Ledger: everything that was said, as values, whether it comes from the log or the tables.
 
-``replay.replay`` makes one from the log, ``read_ledger`` one from the tables; they are equal.
+``replay.replay`` makes one from the log, ``read_state_snapshot`` one from the tables; they are equal.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from app.features.groups.projection_queries import (
     all_dismissals,
     all_groups,
     all_noticed,
-    all_spare,
     all_stations,
+    all_unassigned,
     all_verdicts,
 )
 from app.features.groups.queries import StoredGroup
@@ -69,13 +69,13 @@ class GroupRecord:
 
 
 @dataclass
-class Ledger:
+class StateSnapshot:
     """The present state of what was said, by the ids of the database.
 
     Attributes:
         verdicts: By group, oldest first, as logged.
         dismissals: Of findings, in the same way.
-        spare: By dataset, camera and frame.
+        unassigned: By dataset, camera and frame.
         noticed: What imports noticed: (group or None, station or None, view, sentence).
     """
 
@@ -84,7 +84,7 @@ class Ledger:
     groups: dict[int, GroupRecord] = field(default_factory=dict)
     verdicts: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
     dismissals: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
-    spare: dict[tuple[int, str, str], Extras] = field(default_factory=dict)
+    unassigned: dict[tuple[int, str, str], Extras] = field(default_factory=dict)
     noticed: set[tuple[int | None, int | None, str | None, str]] = field(default_factory=set)
 
     def group(self, group_id: int) -> Group:
@@ -106,27 +106,27 @@ def without_station(view: View) -> View:
     return replace(view, station=_ELSEWHERE)
 
 
-def read_ledger(session: Session) -> Ledger:
-    """The ledger as the tables have it."""
-    ledger = Ledger()
+def read_state_snapshot(session: Session) -> StateSnapshot:
+    """The state snapshot as the tables have it."""
+    snapshot = StateSnapshot()
     for row in dataset_rows(session):
-        ledger.datasets[row.id] = (row.name, policy_of(row.policy))
+        snapshot.datasets[row.id] = (row.name, policy_of(row.policy))
     for station in all_stations(session):
-        ledger.stations[station.id] = StationRecord(
+        snapshot.stations[station.id] = StationRecord(
             station.dataset_id, station.station, station.revision, station.source_digest
         )
     for group in all_groups(session):
-        ledger.groups[group.id] = _group_record(group)
+        snapshot.groups[group.id] = _group_record(group)
     for values in all_verdicts(session):
-        ledger.verdicts.setdefault(values.pop("group_id"), []).append(values)
+        snapshot.verdicts.setdefault(values.pop("group_id"), []).append(values)
     for values in all_dismissals(session):
-        ledger.dismissals.setdefault(values.pop("group_id"), []).append(values)
-    for spare in all_spare(session):
-        place = (spare.dataset_id, spare.camera, spare.frame)
-        ledger.spare[place] = extras_from_json(unpack(spare.extras))
+        snapshot.dismissals.setdefault(values.pop("group_id"), []).append(values)
+    for unassigned in all_unassigned(session):
+        place = (unassigned.dataset_id, unassigned.camera, unassigned.frame)
+        snapshot.unassigned[place] = extras_from_json(unpack(unassigned.extras))
     for row in all_noticed(session):
-        ledger.noticed.add((row.group_id, row.station_id, row.view, row.sentence))
-    return ledger
+        snapshot.noticed.add((row.group_id, row.station_id, row.view, row.sentence))
+    return snapshot
 
 
 def _group_record(stored: StoredGroup) -> GroupRecord:

@@ -13,7 +13,14 @@ from app.db.store import Store
 from app.errors import NotFoundError, SharedStationError
 from app.features.groups import view_queries as views
 from app.features.groups.ball_noise import keeping_noise, with_noise
-from app.features.groups.edit import STATION_EDITS, Edit, SetPaint, SetPicture, Several, need_view
+from app.features.groups.edit import (
+    STATION_EDITS,
+    CompositeEdit,
+    Edit,
+    SetPaint,
+    SetPicture,
+    need_view,
+)
 from app.features.groups.edit_codec import require_few_points_in_all, step_to_json
 from app.features.groups.queries import StoredGroup, group_of_view
 from app.features.groups.revision_queries import next_revision, save_revision
@@ -24,12 +31,12 @@ from app.features.groups.state import (
     read_etags,
     read_record,
     read_state,
-    require_said,
+    require_content,
     require_unchanged,
 )
 from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations import submission_queries as submissions
-from app.features.independent_annotations.queries import take_of_copy
+from app.features.independent_annotations.queries import annotation_of_copy
 from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
 from app.features.people.visibility_queries import COPIES
 from app.features.queue.queries import refresh_queue, update_row
@@ -80,7 +87,7 @@ def find_view(store: Store, view_id: int) -> FoundView:
 def require_open(session: Session, dataset_id: int, group_id: int) -> None:
     """Raise ConflictError where a group is an independent annotation that was submitted."""
     if dataset_id > COPIES:
-        submissions.require_open(take_of_copy(session, group_id))
+        submissions.require_open(annotation_of_copy(session, group_id))
 
 
 @dataclass(frozen=True)
@@ -104,7 +111,7 @@ class _Outcome:
     encoded: EncodedSolution
 
 
-class How(TypedDict):
+class EditOptions(TypedDict):
     """How a step is taken.
 
     Attributes:
@@ -155,7 +162,7 @@ def submit(
     store: Store,
     group_id: int,
     edit: Edit,
-    **how: Unpack[How],
+    **how: Unpack[EditOptions],
 ) -> GroupState:
     """Save an edit and answer with the group as it is then, solved.
 
@@ -163,7 +170,7 @@ def submit(
         store: The database.
         group_id: The group.
         edit: What to change.
-        how: See ``How``.
+        how: See ``EditOptions``.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
@@ -178,7 +185,7 @@ def submit_all(
     store: Store,
     group_id: int,
     edits: Sequence[Edit],
-    **how: Unpack[How],
+    **how: Unpack[EditOptions],
 ) -> GroupState:
     """``submit`` for several edits of a group, which are one edit: undo takes them back together."""
     return take_step(store, lambda _session: group_id, _plan_edits(lambda _stored: edits), **how)
@@ -188,7 +195,7 @@ def submit_view(
     store: Store,
     view_id: int,
     edit_of: Callable[[str], Edit],
-    **how: Unpack[How],
+    **how: Unpack[EditOptions],
 ) -> GroupState:
     """``submit`` for a view's id: ``edit_of`` makes the edit from the view's key."""
 
@@ -309,7 +316,7 @@ def take_step(
         store: The database.
         find: Finds the group.
         plan: Makes the step for the state that it builds on.
-        if_match, actor, then, paint, solve: See ``How``.
+        if_match, actor, then, paint, solve: See ``EditOptions``.
 
     Raises:
         StaleRevisionError: Somebody else was faster.
@@ -320,7 +327,7 @@ def take_step(
         with store.read() as session:
             before = read_record(session, find(session))
             what = f"group {before.stored.group.key}"
-            require_said(session, before.stored.id, before.said, if_match, what)
+            require_content(session, before.stored.id, before.content, if_match, what)
             change = plan(session, before, actor)
             if change.group == before.stored.group:
                 found = read_solutions(session, [before.solution_key])
@@ -389,7 +396,7 @@ def checked_edit(stored: StoredGroup, edits: Sequence[Edit], actor: str) -> Edit
     for edit in made:
         refuse_shared(stored, edit)
     require_few_points_in_all(stored.group, made)
-    return made[0] if len(made) == 1 else Several(tuple(made))
+    return made[0] if len(made) == 1 else CompositeEdit(tuple(made))
 
 
 def _plan_edits(edits_of: Callable[[StoredGroup], Sequence[Edit]]) -> Plan:

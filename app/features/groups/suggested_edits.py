@@ -72,7 +72,7 @@ def offers(group: Group, fix: Fix | None, point: ImagePoint | None = None) -> tu
     action = _ACTIONS[fix.action]
     found = ((one, action.edit(view, one, point)) for one in _choices(view, fix))
     return tuple(
-        Offer(_words(action.label, one), edit, _words(action.caption, one))
+        Offer(_button_text(action.label, one), edit, _button_text(action.caption, one))
         for one, edit in found
         if edit
     )
@@ -120,7 +120,7 @@ def rank(fix: Fix) -> int:
 def sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
     """The condition under which the group passes, to be read after "would pass if"."""
     letter = view_letter([view.key for view in group.views].index(fix.view or ""))
-    return _words(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
+    return _button_text(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 
 
 def ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
@@ -142,7 +142,7 @@ def _fitted(group: Group, finding: Finding) -> tuple[Offer, ...]:
     return (Offer("Fit the box", SetBall(view.key, replace(ball, box=box))),)
 
 
-def _words(text: str, fix: Fix, **more: str | float) -> str:
+def _button_text(text: str, fix: Fix, **more: str | float) -> str:
     number = None if fix.index is None else fix.index + 1
     return text.format(marking=fix.marking, to=fix.to, number=number, **more)
 
@@ -155,7 +155,7 @@ def _choices(view: View, fix: Fix) -> list[Fix]:
     return [replace(fix, index=index) for index in seen] if len(seen) > 1 else []
 
 
-def _nothing(_view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _no_edit(_view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
     return None
 
 
@@ -237,7 +237,7 @@ class _Action:
     sentence: str = ""
     label: str = ""
     caption: str = ""
-    edit: Callable[[View, Fix, ImagePoint | None], Edit | None] = _nothing
+    edit: Callable[[View, Fix, ImagePoint | None], Edit | None] = _no_edit
 
 
 _ACTIONS = {
@@ -303,7 +303,7 @@ _ACTIONS = {
     ),
     "exclude_view": _Action(5, "{letter} was left out", "Leave it out", edit=_include),
 }
-_GUIDES = frozenset(name for name, action in _ACTIONS.items() if action.edit is _nothing)
+_GUIDES = frozenset(name for name, action in _ACTIONS.items() if action.edit is _no_edit)
 """Actions that no edit carries out."""
 
 

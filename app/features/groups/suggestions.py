@@ -61,7 +61,7 @@ RAY_DEPTHS_M = np.geomspace(1.0, 400.0, 2000)
 
 
 @dataclass(frozen=True)
-class Remedy:
+class Suggestion:
     """What would make a group pass, or bring the gate that fails nearer to passing.
 
     Attributes:
@@ -89,8 +89,8 @@ class Remedy:
 
 
 @dataclass(frozen=True)
-class _Idea:
-    """A remedy before it is tried."""
+class _Candidate:
+    """A suggestion before it is tried."""
 
     sentence: str
     fix: Fix
@@ -99,7 +99,7 @@ class _Idea:
     """What a person would draw; None: the fix itself is the edit."""
 
 
-def find_remedies(group: Group, policy: Policy, solution: Solution) -> list[Remedy]:
+def find_suggestions(group: Group, policy: Policy, solution: Solution) -> list[Suggestion]:
     """What would make a group pass, the gentlest first; nothing for a group that passes.
 
     Args:
@@ -112,37 +112,37 @@ def find_remedies(group: Group, policy: Policy, solution: Solution) -> list[Reme
         return []
     known = {view.calibration_key: view.calibration for view in solution.views}
     found = []
-    for idea in _distinct(group, solution, failing)[:MOST_TRIALS]:
-        remedy = _try(group, policy, solution, failing, idea, known)
-        if remedy is not None:
-            found.append((not remedy.passes, rank(idea.fix), remedy))
-    return [remedy for *_, remedy in sorted(found, key=lambda item: item[:2])]
+    for candidate in _distinct(group, solution, failing)[:MOST_TRIALS]:
+        suggestion = _tried(group, policy, solution, failing, candidate, known)
+        if suggestion is not None:
+            found.append((not suggestion.passes, rank(candidate.fix), suggestion))
+    return [suggestion for *_, suggestion in sorted(found, key=lambda item: item[:2])]
 
 
-def _try(
+def _tried(
     group: Group,
     policy: Policy,
     solution: Solution,
     failing: Gate,
-    idea: _Idea,
+    candidate: _Candidate,
     known: dict[str, Calibration],
-) -> Remedy | None:
-    """The remedy, or None where the edit changes nothing for the better."""
-    edit = idea.trial or edit_of_fix(group, idea.fix, idea.point)
+) -> Suggestion | None:
+    """The suggestion, or None where the edit changes nothing for the better."""
+    edit = candidate.trial or edit_of_fix(group, candidate.fix, candidate.point)
     if edit is None:
         return None
     then = solve(edit.apply(group), policy, known)
     gate = next(gate for gate in then.gates if gate.name == failing.name)
-    if not then.passes and not _is_nearer(failing, gate, solution, then, idea.fix.view):
+    if not then.passes and not _is_nearer(failing, gate, solution, then, candidate.fix.view):
         return None
-    return Remedy(
+    return Suggestion(
         gate=failing.name,
-        view=idea.fix.view,
-        sentence=idea.sentence,
-        fix=idea.fix,
-        point=idea.point,
-        offers=offers(group, idea.fix, idea.point),
-        guide=guide(idea.fix, idea.point),
+        view=candidate.fix.view,
+        sentence=candidate.sentence,
+        fix=candidate.fix,
+        point=candidate.point,
+        offers=offers(group, candidate.fix, candidate.point),
+        guide=guide(candidate.fix, candidate.point),
         value=gate.value,
         passes=then.passes,
     )
@@ -160,30 +160,30 @@ def _is_nearer(before: Gate, after: Gate, now: Solution, then: Solution, view: s
     return new.calibration.jac[0] > old.calibration.jac[0]
 
 
-def _distinct(group: Group, solution: Solution, failing: Gate) -> list[_Idea]:
+def _distinct(group: Group, solution: Solution, failing: Gate) -> list[_Candidate]:
     """All ideas once, the gentlest first."""
-    ideas: dict[Fix, _Idea] = {}
-    for idea in (*_of_findings(group, solution), *_of_gate(group, solution, failing)):
-        ideas.setdefault(idea.fix, idea)
-    return sorted(ideas.values(), key=lambda idea: rank(idea.fix))
+    ideas: dict[Fix, _Candidate] = {}
+    for candidate in (*_of_findings(group, solution), *_of_gate(group, solution, failing)):
+        ideas.setdefault(candidate.fix, candidate)
+    return sorted(ideas.values(), key=lambda candidate: rank(candidate.fix))
 
 
-def _of_findings(group: Group, solution: Solution) -> Iterator[_Idea]:
+def _of_findings(group: Group, solution: Solution) -> Iterator[_Candidate]:
     for finding in solution.findings:
         fix = finding.fix
         view = None if fix is None or fix.view is None else group.view(fix.view)
         if fix is not None and view is not None:
-            yield _Idea(sentence(group, fix), fix)
+            yield _Candidate(sentence(group, fix), fix)
 
 
-def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]:
+def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Candidate]:
     for view in group.views:
         solved = solution.view(view.key)
         if solved is None:
             continue
         if not view.included:
             fix = Fix("include_view", view.key)
-            yield _Idea(sentence(group, fix), fix)
+            yield _Candidate(sentence(group, fix), fix)
         elif solved.failed == "jac":
             yield from _of_undrawn(group, view, solved)
             yield from _of_lines(group, view, solved)
@@ -192,7 +192,7 @@ def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Idea]
         yield from _of_balls(group, solution)
 
 
-def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
+def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Candidate]:
     """Draw what the camera sees and nobody has drawn: all of it, the longest first; stubs that
     nobody can see are said not to be visible, for two clicks anywhere would do as well."""
     # What stands there under a wrong name is relabelled, not drawn again.
@@ -211,18 +211,18 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Ide
     for fit in undrawn:
         if fit.length_px < shortest:
             hide = Fix("hide_marking", view.key, fit.marking)
-            yield _Idea(sentence(group, hide, max(fit.length_px, 1.0)), hide)
+            yield _Candidate(sentence(group, hide, max(fit.length_px, 1.0)), hide)
     if not undrawn or undrawn[0].length_px < shortest or camera is None:
         return
     letter = view_letter(group.views.index(view))
     names = [f"{fit.marking} (visible over {pixels(max(fit.length_px, 1))})" for fit in undrawn]
     verb = "were" if len(names) > 1 else "was"
-    said = f"{' and '.join(names)} {verb} drawn in {letter}"
+    advice = f"{' and '.join(names)} {verb} drawn in {letter}"
     fitted = group.pitch.with_goal(solved.calibration.goal)
     seen = project_markings(camera, fitted, view.size)
     drawn = {fit.marking: _clicks_on(seen[fit.marking]) for fit in undrawn}
     fix = Fix("draw_marking", view.key, undrawn[0].marking)
-    yield _Idea(said, fix, trial=SetLines(view.key, drawn))
+    yield _Candidate(advice, fix, trial=SetLines(view.key, drawn))
 
 
 def _is_undrawn(fit: MarkingFit) -> bool:
@@ -233,7 +233,7 @@ def _clicks_on(polyline: FloatArray) -> tuple[ImagePoint, ...]:
     return tuple(map(ImagePoint._make, polyline[:: len(polyline) // _CLICKS + 1].tolist()))
 
 
-def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]:
+def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Candidate]:
     """Move or drop the worst point, or drop the marking, for each marking that does not count."""
     off = [fit for fit in solved.calibration.markings if fit.outcome != "tp" and _largest(fit)]
     for fit in sorted(off, key=_largest, reverse=True)[:MARKINGS_PER_VIEW]:
@@ -248,10 +248,10 @@ def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Idea]
             if action == "move_point" and fit.distances_px[index] > slip:
                 continue
             point = fit.nearest[index] if action == "move_point" else None
-            yield _Idea(sentence(group, fix, fit.distances_px[index]), fix, point)
+            yield _Candidate(sentence(group, fix, fit.distances_px[index]), fix, point)
 
 
-def _of_balls(group: Group, solution: Solution) -> Iterator[_Idea]:
+def _of_balls(group: Group, solution: Solution) -> Iterator[_Candidate]:
     """Look for the ball where the other view's ray passes, in either view of a pair.
 
     Nobody moves it there by a key: a ball that is put onto a ray meets it, right or wrong.
@@ -267,7 +267,7 @@ def _of_balls(group: Group, solution: Solution) -> Iterator[_Idea]:
                 continue
             fix = Fix("look_ball", moved, to=other)
             trial = ball_at(moved, view.ball, point)
-            yield _Idea(sentence(group, fix, apart), fix, point, trial)
+            yield _Candidate(sentence(group, fix, apart), fix, point, trial)
 
 
 def _beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:

@@ -28,7 +28,7 @@ from app.features.groups.codecs import (
 from app.features.groups.digest import digest, station_digest, view_digest
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
-from app.features.groups.state_snapshot import Ledger, StationRecord
+from app.features.groups.state_snapshot import StateSnapshot, StationRecord
 from app.features.groups.view_queries import StoredStation
 from app.features.imports.queries import shared_stations
 from app.soccer.group import Group, Station, View
@@ -42,7 +42,7 @@ _FIRST_LOOK, _FURTHER = 8, 8
 
 
 @dataclass(frozen=True)
-class Stacks:
+class UndoStacks:
     """Ids of log entries: the last of ``done`` is what undo takes back, of ``undone`` what redo
     does again. Of a long history ``done`` may hold the newest alone, and then at least two."""
 
@@ -59,17 +59,17 @@ class Stacks:
         """Whether there is an edit to do again."""
         return bool(self.undone)
 
-    def then(self, kind: str, log_id: int = 0) -> Stacks:
+    def then(self, kind: str, log_id: int = 0) -> UndoStacks:
         """The stacks after one more entry: an undo moves the last edit over, a redo moves it
         back, and a fresh edit clears what was undone."""
         if kind == "edit":
-            return Stacks((*self.done, log_id))
+            return UndoStacks((*self.done, log_id))
         if kind == "undo":
-            return Stacks(self.done[:-1], (*self.undone, self.done[-1]))
-        return Stacks((*self.done, self.undone[-1]), self.undone[:-1])
+            return UndoStacks(self.done[:-1], (*self.undone, self.done[-1]))
+        return UndoStacks((*self.done, self.undone[-1]), self.undone[:-1])
 
 
-def next_step(session: Session, stacks: Stacks, kind: str, where: str) -> Json:
+def next_step(session: Session, stacks: UndoStacks, kind: str, where: str) -> Json:
     """Body of the entry that an undo or a redo writes: the edit that it makes, and back.
 
     Args:
@@ -89,7 +89,7 @@ def next_step(session: Session, stacks: Stacks, kind: str, where: str) -> Json:
     return {"edit": body[made], "inverse": body[back], "of": steps[-1]}
 
 
-def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Stacks]:
+def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, UndoStacks]:
     """The stacks of each group."""
     if len(group_ids) == 1:
         return {group_ids[0]: _read_newest(session, group_ids[0])}
@@ -99,19 +99,19 @@ def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Stac
     return {number: _stacks_of(taken) for number, taken in steps.items()}
 
 
-def _read_newest(session: Session, group_id: int) -> Stacks:
+def _read_newest(session: Session, group_id: int) -> UndoStacks:
     """The stacks of one group from as little of its history as tells them."""
     most = _FIRST_LOOK
     while True:
         rows = newest_steps(session, group_id, GROUP_KINDS, most)
         steps = [(GROUP_KINDS[row.kind], row.id) for row in reversed(rows)]
-        stacks = _stacks_of(steps) if len(rows) < most else _upper_part(steps)
+        stacks = _stacks_of(steps) if len(rows) < most else _stacks_of_newest(steps)
         if stacks is not None:
             return stacks
         most *= _FURTHER
 
 
-def _upper_part(steps: Sequence[tuple[str, int]]) -> Stacks | None:
+def _stacks_of_newest(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
     """The stacks after the newest steps, or None where older ones must be known to tell them.
 
     An edit leaves nothing undone, whatever was before; so all that follows from it is known, as
@@ -125,14 +125,14 @@ def _upper_part(steps: Sequence[tuple[str, int]]) -> Stacks | None:
     return stacks if len(stacks.done) > 1 else None
 
 
-def read_station_stacks(session: Session, station_id: int) -> Stacks:
+def read_station_stacks(session: Session, station_id: int) -> UndoStacks:
     """The stacks of a shared station."""
     rows = station_steps(session, station_id, STATION_KINDS)
     return _stacks_of((STATION_KINDS[row.kind], row.id) for row in rows)
 
 
-def _stacks_of(steps: Iterable[tuple[str, int]]) -> Stacks:
-    """The stacks after all steps (kind, id of the entry): ``Stacks.then`` of each, in one go."""
+def _stacks_of(steps: Iterable[tuple[str, int]]) -> UndoStacks:
+    """The stacks after all steps (kind, id of the entry): ``UndoStacks.then`` of each, in one go."""
     done: list[int] = []
     undone: list[int] = []
     for kind, log_id in steps:
@@ -143,11 +143,11 @@ def _stacks_of(steps: Iterable[tuple[str, int]]) -> Stacks:
         else:
             done.append(log_id)
             undone.clear()
-    return Stacks(tuple(done), tuple(undone))
+    return UndoStacks(tuple(done), tuple(undone))
 
 
 @dataclass(frozen=True)
-class Lineage:
+class RevisionChain:
     """Where a group comes from.
 
     Attributes:
@@ -167,8 +167,8 @@ class Lineage:
 
 
 @dataclass(frozen=True)
-class StationLineage:
-    """Where a static camera comes from; as ``Lineage``."""
+class StationRevisionChain:
+    """Where a static camera comes from; as ``RevisionChain``."""
 
     base: Station
     states: tuple[str, ...]
@@ -188,7 +188,7 @@ def base_digest(group: Group) -> str:
 
 
 def pitch_size(pitch: Pitch) -> str:
-    """The size of a pitch as lineages have it."""
+    """The size of a pitch as revision chains have it."""
     return f"{float(pitch.length)!r}x{float(pitch.width)!r}"
 
 
@@ -196,7 +196,7 @@ def pitch_size(pitch: Pitch) -> str:
 class _Walk:
     """One group's log on the way from its first entry to its last."""
 
-    ledger: Ledger
+    snapshot: StateSnapshot
     base: Group | None = None
     bases: dict[str, None] = field(default_factory=dict)
     views: dict[str, list[str]] = field(default_factory=dict)
@@ -207,20 +207,20 @@ class _Walk:
         assert entry.group_id is not None
         if entry.kind == "camera":
             self._camera(entry)
-        apply_entry(self.ledger, entry)
+        apply_entry(self.snapshot, entry)
         if entry.kind == "import":
             self.base = logged_group(entry.body["base"] or entry.body["group"], by_key)
         if self.base is not None:
             self.bases[base_digest(self.base)] = None
-        self._note(self.ledger.group(entry.group_id))
+        self._note(self.snapshot.group(entry.group_id))
 
     def _camera(self, entry: LogEntry) -> None:
         """A camera that came on its own is what the dataset brought, unless lines were edited."""
         assert entry.group_id is not None and entry.station_id is not None
-        record = self.ledger.stations[entry.station_id]
+        record = self.snapshot.stations[entry.station_id]
         if self.base is None or station_digest(record.station) != record.source_digest:
             return
-        items = self.ledger.groups[entry.group_id].views
+        items = self.snapshot.groups[entry.group_id].views
         for item in (item for item in items if item.station_id == entry.station_id):
             view = self.base.view(item.view.key)
             if view is not None:
@@ -240,14 +240,14 @@ def _add(states: list[str], state: str) -> None:
         states.append(state)
 
 
-class Lineages:
+class RevisionChains:
     """Lineages of the groups of one dataset, read in a session."""
 
     def __init__(self, session: Session, dataset_id: int):
         self._session, self._dataset_id = session, dataset_id
         self._shared = {item.id: item for item in shared_stations(session, dataset_id)}
 
-    def of(self, groups: Iterable[StoredGroup]) -> dict[int, Lineage]:
+    def of(self, groups: Iterable[StoredGroup]) -> dict[int, RevisionChain]:
         """Lineages by group id; what nobody touched since its import costs no look at it."""
         found = list(groups)
         touched = groups_with_past(self._session, [item.id for item in found])
@@ -256,18 +256,18 @@ class Lineages:
             for item in found
         }
 
-    def _walked(self, stored: StoredGroup) -> Lineage:
-        ledger = Ledger()
+    def _walked(self, stored: StoredGroup) -> RevisionChain:
+        snapshot = StateSnapshot()
         for number, item in self._shared.items():
-            ledger.stations[number] = StationRecord(
+            snapshot.stations[number] = StationRecord(
                 self._dataset_id, item.station, item.revision, item.source_digest
             )
         by_key = {item.station.key: item.station for item in self._shared.values()}
-        walk = _Walk(ledger)
+        walk = _Walk(snapshot)
         for entry in group_entries(self._session, stored.id, verdicts=False):
             walk.take(entry, by_key)
         assert walk.base is not None
-        return Lineage(
+        return RevisionChain(
             base=walk.base,
             bases=tuple(walk.bases),
             views={key: tuple(states) for key, states in walk.views.items()},
@@ -276,9 +276,9 @@ class Lineages:
         )
 
 
-def _untouched(stored: StoredGroup) -> Lineage:
+def _untouched(stored: StoredGroup) -> RevisionChain:
     group = stored.group
-    return Lineage(
+    return RevisionChain(
         base=group,
         bases=(base_digest(group),),
         views={view.key: (view_digest(view),) for view in group.views},
@@ -291,20 +291,20 @@ def _untouched(stored: StoredGroup) -> Lineage:
     )
 
 
-def station_lineage(session: Session, stored: StoredStation) -> StationLineage:
-    """The lineage of a static camera."""
-    ledger, base, states = Ledger(), stored.station, list[str]()
+def station_revision_chain(session: Session, stored: StoredStation) -> StationRevisionChain:
+    """The revision chain of a static camera."""
+    snapshot, base, states = StateSnapshot(), stored.station, list[str]()
     for entry in station_entries(session, stored.id):
-        known = ledger.stations.get(stored.id)
+        known = snapshot.stations.get(stored.id)
         unedited = known is None or station_digest(known.station) == known.source_digest
-        apply_entry(ledger, entry)
-        station = ledger.stations[stored.id].station
+        apply_entry(snapshot, entry)
+        station = snapshot.stations[stored.id].station
         if entry.kind == "station":
             base = station_from_json(entry.body["base"] or entry.body["station"])
         elif entry.kind == "camera" and unedited:
             base = station
         _add(states, station_digest(station))
-    return StationLineage(base, tuple(states) or (stored.digest,))
+    return StationRevisionChain(base, tuple(states) or (stored.digest,))
 
 
 def logged_group(value: Mapping[str, Any], shared: Mapping[str, Station]) -> Group:
@@ -320,5 +320,5 @@ def logged_group(value: Mapping[str, Any], shared: Mapping[str, Station]) -> Gro
 
 
 def _logged_view(value: Mapping[str, Any], shared: Mapping[str, Station]) -> View:
-    said = value["station"]
-    return view_from_json(value, shared[said] if isinstance(said, str) else None)
+    station = value["station"]
+    return view_from_json(value, shared[station] if isinstance(station, str) else None)

@@ -31,7 +31,13 @@ from app.soccer.media import Media
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate_clicks, clicks_key, sought_key, view_key, wanted_paint
+from app.solving.calibrate import (
+    calibrate_clicks,
+    clicks_key,
+    paint_search_key,
+    view_key,
+    wanted_paint,
+)
 from app.solving.observations import principal_point
 from app.worker_pool import PoolTask
 from app.worker_process import WorkerEnded
@@ -204,14 +210,14 @@ class PaintFollower:
         release_admission()
         end = monotonic() + SECONDS
         try:
-            asked = [
+            started = [
                 (task, self._frames.ask_to(task.view.media, read_view_paint, task))
                 for task in tasks
             ]
         except ReviewError:
             # As many wait as may.
             return
-        for task, waiting in asked:
+        for task, waiting in started:
             try:
                 reading = waiting.future.result(max(end - monotonic(), 0.0))
             except (TimeoutError, CancelledError, WorkerEnded, ReviewError):
@@ -245,7 +251,7 @@ def _stale(
         reading = wanted_paint(group, view, policy)
         if reading is None and (view.media is None or not view.takes_paint):
             continue
-        key = sought_key(group, view, policy)
+        key = paint_search_key(group, view, policy)
         clicked = known.get(clicks_key(group, view, policy))
         # Clicks that were seen to make no camera say nowhere where to look.
         is_lost = clicked is not None and clicked.camera is None

@@ -90,10 +90,10 @@ def dataset_views(
         ids: Only these views; None: all.
         without_ball: Only those in which nobody annotated a ball.
     """
-    asked = list(conditions)
-    if asked:
-        asked.append(QueueModel.group_id == GroupModel.id)
-    where = [GroupModel.dataset_id == dataset_id, *asked]
+    wanted = list(conditions)
+    if wanted:
+        wanted.append(QueueModel.group_id == GroupModel.id)
+    where = [GroupModel.dataset_id == dataset_id, *wanted]
     if ids is not None:
         where.append(ViewModel.id.in_(ids))
     if without_ball:

@@ -86,10 +86,10 @@ def patch_lines(
     request: Request,
 ) -> GroupState:
     """Draw, move or delete markings; 409 names the station when the camera is static."""
-    said = (lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
+    values = (lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
 
     def edit(key: str) -> Edit:
-        return SetLines(key, *said)
+        return SetLines(key, *values)
 
     apart = partial(services.large.run, solve_encoded)
     solve = apart if is_large(request.scope) else solve_encoded
@@ -113,8 +113,8 @@ def patch_ball(
     if_match: IfMatch,
 ) -> GroupState:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
-    said = None if ball is None else ball.ball()
-    return _submit(services, view, lambda key: SetBall(key, said), if_match, actor)
+    value = None if ball is None else ball.ball()
+    return _submit(services, view, lambda key: SetBall(key, value), if_match, actor)
 
 
 @router.patch(
@@ -260,7 +260,7 @@ async def _picture(
     """
     if view.media is None:
         raise NotFoundError("this view has no frame that could be read", hint=NO_FRAME_HINT)
-    with told_with_view(view.key):
+    with with_view_in_error(view.key):
         found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
         if found is not None:
             return found
@@ -273,7 +273,7 @@ async def _picture(
 
 
 @contextmanager
-def told_with_view(key: str) -> Iterator[None]:
+def with_view_in_error(key: str) -> Iterator[None]:
     """Say what is wrong with a frame with the view that it belongs to."""
     try:
         yield

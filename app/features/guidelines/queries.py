@@ -25,7 +25,7 @@ def all_guidelines(session: Session) -> Sequence[Any]:
     return session.execute(select(model.dataset_id, model.number, model.text)).all()
 
 
-def told_dataset(session: Session, dataset_id: int) -> int:
+def guidelines_dataset(session: Session, dataset_id: int) -> int:
     """Of which dataset the guidelines count in a dataset: of that which it holds copies of."""
     statement = select(CopyDatasetModel.of_id).where(CopyDatasetModel.dataset_id == dataset_id)
     return session.scalar(statement) or dataset_id

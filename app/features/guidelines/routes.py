@@ -19,7 +19,9 @@ from app.http.problem import responses
 from app.http.respond import as_document, document, responds
 from app.http.route import Route
 
-router = APIRouter(prefix="/datasets/{dataset}/guidelines", tags=["takes"], route_class=Route)
+router = APIRouter(
+    prefix="/datasets/{dataset}/guidelines", tags=["independent annotations"], route_class=Route
+)
 
 Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of its bytes.")]
 

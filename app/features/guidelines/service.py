@@ -16,9 +16,9 @@ from app.features.guidelines.queries import (
     find_picture,
     guideline_heads,
     guideline_text,
+    guidelines_dataset,
     insert_guideline,
     insert_picture,
-    told_dataset,
 )
 from app.features.imports.upload_queries import upload_path
 from app.finite import Moment
@@ -79,7 +79,7 @@ def read_guidelines(store: Store, dataset: str | int, number: int | None = None)
         NotFoundError: There is no such dataset or version.
     """
     with store.read() as session:
-        return _read(session, told_dataset(session, need_dataset(session, dataset)), number)
+        return _read(session, guidelines_dataset(session, need_dataset(session, dataset)), number)
 
 
 def write_guidelines(
@@ -102,8 +102,8 @@ def write_guidelines(
     if len(text) > MAX_LETTERS:
         raise InputError(f"guidelines have at most {MAX_LETTERS:,} letters", pointer="/text")
     with store.write() as session:
-        told = told_dataset(session, need_dataset(session, dataset))
-        heads = guideline_heads(session, told)
+        dataset_id = guidelines_dataset(session, need_dataset(session, dataset))
+        heads = guideline_heads(session, dataset_id)
         newest = heads[0].number if heads else 0
         if newest != based_on:
             raise ConflictError(
@@ -111,12 +111,12 @@ def write_guidelines(
                 hint="Read it, and write yours on top of it.",
                 pointer="/based_on",
             )
-        if text != (guideline_text(session, told, newest) or ""):
-            insert_guideline(session, told, newest + 1, text, actor)
+        if text != (guideline_text(session, dataset_id, newest) or ""):
+            insert_guideline(session, dataset_id, newest + 1, text, actor)
             digest = hashlib.sha256(text.encode()).hexdigest()
             body = {"number": newest + 1, "digest": digest}
-            append(session, [Entry(GUIDELINE, actor, now(), body, told)])
-        written = _read(session, told)
+            append(session, [Entry(GUIDELINE, actor, now(), body, dataset_id)])
+        written = _read(session, dataset_id)
         session.respond(written)
         return written
 
@@ -139,10 +139,10 @@ def add_picture(store: Store, dataset: str | int, upload: str, frames: Frames) -
     found = frames.ask(Media(str(path)), None, False).future.result()
     picture = GuidelinePicture(hashlib.sha256(found.data).hexdigest(), found.kind, found.data)
     with store.write() as session:
-        told = told_dataset(session, need_dataset(session, dataset))
-        if count_pictures(session, told) >= MAX_PICTURES:
+        dataset_id = guidelines_dataset(session, need_dataset(session, dataset))
+        if count_pictures(session, dataset_id) >= MAX_PICTURES:
             raise ConflictError(f"guidelines have at most {MAX_PICTURES} pictures")
-        insert_picture(session, told, picture.digest, picture.type, picture.body)
+        insert_picture(session, dataset_id, picture.digest, picture.type, picture.body)
         session.respond(picture)
     return picture
 
@@ -154,19 +154,21 @@ def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePict
         NotFoundError: There is no such dataset or picture.
     """
     with store.read() as session:
-        told = told_dataset(session, need_dataset(session, dataset))
-        row = find_picture(session, told, digest)
+        dataset_id = guidelines_dataset(session, need_dataset(session, dataset))
+        row = find_picture(session, dataset_id, digest)
     if row is None:
         raise NotFoundError("these guidelines have no such picture")
     return GuidelinePicture(digest, row.type, row.body)
 
 
-def _read(session: Session, told: int, number: int | None = None) -> Guidelines:
+def _read(session: Session, dataset_id: int, number: int | None = None) -> Guidelines:
     """A version of the guidelines of the dataset whose they are; None: the newest."""
-    versions = tuple(GuidelineVersion(**row._mapping) for row in guideline_heads(session, told))
+    versions = tuple(
+        GuidelineVersion(**row._mapping) for row in guideline_heads(session, dataset_id)
+    )
     if number is None:
         number = versions[0].number if versions else 0
-    text = "" if number == 0 else guideline_text(session, told, number)
+    text = "" if number == 0 else guideline_text(session, dataset_id, number)
     if text is None:
         raise NotFoundError(f"there is no version {number} of these guidelines")
-    return Guidelines(told, number, text, versions)
+    return Guidelines(dataset_id, number, text, versions)

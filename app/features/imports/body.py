@@ -11,12 +11,12 @@ from dataclasses import replace
 from app.db.json_columns import Json
 from app.db.log import Entry, append
 from app.db.session import Session, now
-from app.features.findings.queries import add_group_findings, group_findings, groups_told
+from app.features.findings.queries import add_group_findings, group_findings, groups_with_finding
 from app.features.groups.codecs import group_head_to_json, view_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KIND
 from app.features.groups.revision_queries import save_group
-from app.features.groups.undo_stacks import Lineages
+from app.features.groups.undo_stacks import RevisionChains
 from app.features.imports.queries import known_groups
 from app.features.queue.queries import refresh_queue
 from app.formats.report import Report
@@ -85,12 +85,12 @@ def note_gone(
     session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
 ) -> int:
     """Save a finding for each group that has none of the kind yet; returns how many."""
-    fresh = sorted(set(ids) - groups_told(session, ids, GONE))
+    fresh = sorted(set(ids) - groups_with_finding(session, ids, GONE))
     stored = read_groups(session, fresh)
-    lineages = Lineages(session, dataset_id).of(stored.values())
+    chains = RevisionChains(session, dataset_id).of(stored.values())
     at, entries = now(), []
     for number, item in stored.items():
-        base = lineages[number].base
+        base = chains[number].base
         save_group(session, item, item.group, at=at, source=base)
         body = _body(item, base, source, group_findings(session, number))
         entries.append(Entry("import", actor, at, body, dataset_id, number))
@@ -148,14 +148,14 @@ class GroupLimits:
             return view
         if station.key not in self._told:
             for marking in dense:
-                self._tell(group, view, marking)
+                self._report_left_out(group, view, marking)
         if station.shared:
             self._told.add(station.key)
         lines = {name: points for name, points in station.lines.items() if name not in dense}
         proposed = tuple(name for name in station.proposed if name in lines)
         return replace(view, station=replace(station, lines=lines, proposed=proposed))
 
-    def _tell(self, group: Group, view: View, marking: str) -> None:
+    def _report_left_out(self, group: Group, view: View, marking: str) -> None:
         station = view.station
         what = f"camera {station.key}" if station.shared else f"view {view.key}"
         count, total = len(station.lines[marking]), points_of(station.lines)

@@ -19,7 +19,7 @@ from app.features.groups.view_queries import (
     read_stations,
     save_station,
 )
-from app.features.imports.ingest import IngestReport, attempt
+from app.features.imports.ingest import IngestReport, ingest_session
 from app.features.queue.queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
 from app.geometry.camera import Camera
@@ -33,7 +33,7 @@ EXAMPLES = 3
 
 
 @dataclass(frozen=True)
-class _Place:
+class _NamedStation:
     """A station that a name means; ``group`` is that of its only view, None when shared."""
 
     station: int
@@ -42,7 +42,7 @@ class _Place:
     size: ImageSize
 
 
-class _Given(NamedTuple):
+class _GivenCamera(NamedTuple):
     """A camera for a station, and its covariance where that is known."""
 
     camera: Camera
@@ -88,7 +88,7 @@ def ingest_cameras(
     report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
         places = _places(session, found.id)
-    known: list[tuple[_Place, _Given]] = []
+    known: list[tuple[_NamedStation, _GivenCamera]] = []
     for name in sorted(cameras):
         fitting = _fitting(places, name)
         matches = {place.match for place in fitting}
@@ -111,20 +111,20 @@ def ingest_cameras(
             )
         made_for = stated or size
         report.problems.extend(_of_other_size(name, cameras[name], fitting, made_for))
-        told = {COVARIANCE: (covariances or {}).get(name)}
+        record = {COVARIANCE: (covariances or {}).get(name)}
         for place in fitting:
-            covariance = covariance_from_json(told, cameras[name], made_for or place.size)
+            covariance = covariance_from_json(record, cameras[name], made_for or place.size)
             camera = _sized(cameras[name], made_for, place.size)
-            known.append((place, _Given(camera, covariance)))
+            known.append((place, _GivenCamera(camera, covariance)))
     for start in range(0, len(known), BATCH):
-        with attempt(store, keep=not dry_run) as session:
+        with ingest_session(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]
             _attach_batch(session, found.id, batch, source, actor, report)
     return report
 
 
-def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
-    places: dict[str, list[_Place]] = {}
+def _places(session: Session, dataset_id: int) -> dict[str, list[_NamedStation]]:
+    places: dict[str, list[_NamedStation]] = {}
     for row in dataset_views(session, dataset_id):
         stem = str(PurePosixPath(row.key).with_suffix(""))
         own = row.group.removeprefix(f"{row.match}/") if row.match else row.group
@@ -135,7 +135,7 @@ def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
             else {stem, f"{row.match}/{stem}", f"{row.group}/{stem}", f"{row.match}/{own}/{stem}"}
         )
         size = ImageSize(row.width, row.height)
-        place = _Place(row.station_id, None if row.shared else row.group_id, row.match, size)
+        place = _NamedStation(row.station_id, None if row.shared else row.group_id, row.match, size)
         for name in names:
             known = places.setdefault(name, [])
             if place not in known:
@@ -143,7 +143,7 @@ def _places(session: Session, dataset_id: int) -> dict[str, list[_Place]]:
     return places
 
 
-def _fitting(places: Mapping[str, list[_Place]], name: str) -> list[_Place]:
+def _fitting(places: Mapping[str, list[_NamedStation]], name: str) -> list[_NamedStation]:
     """What a name means; folders before it do not matter where no match could be one of them."""
     parts = name.split("/")
     for start in range(len(parts)):
@@ -153,7 +153,7 @@ def _fitting(places: Mapping[str, list[_Place]], name: str) -> list[_Place]:
     return []
 
 
-def _examples(places: Mapping[str, list[_Place]]) -> str:
+def _examples(places: Mapping[str, list[_NamedStation]]) -> str:
     names = [f'"{name}"' for name in sorted(places) if "/" not in name]
     more = " and more" if len(names) > EXAMPLES else ""
     return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
@@ -166,7 +166,7 @@ def _sized(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camer
 
 
 def _of_other_size(
-    name: str, camera: Camera, fitting: Sequence[_Place], made_for: ImageSize | None
+    name: str, camera: Camera, fitting: Sequence[_NamedStation], made_for: ImageSize | None
 ) -> Iterator[str]:
     """What to say of a camera whose principal point is the middle of another size than was said."""
     for size in sorted({made_for or place.size for place in fitting}, key=lambda it: it.width):
@@ -183,7 +183,7 @@ def _of_other_size(
 def _attach_batch(
     session: Session,
     dataset_id: int,
-    batch: Sequence[tuple[_Place, _Given]],
+    batch: Sequence[tuple[_NamedStation, _GivenCamera]],
     source: str,
     actor: str,
     report: IngestReport,

@@ -18,22 +18,22 @@ from app.db.log import LogEntry, group_entries, station_entries
 from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head
-from app.features.exports.queries import newest_word
-from app.features.findings.queries import carried_dismissals
+from app.features.exports.queries import newest_entry_time
+from app.features.findings.queries import dismissals_to_merge
 from app.features.groups.codecs import (
     group_head_to_json,
     policy_to_json,
     station_to_json,
     view_to_json,
 )
-from app.features.groups.queries import StoredGroup, read_groups, sorted_spare_rows
-from app.features.groups.undo_stacks import Lineage, Lineages, station_lineage
+from app.features.groups.queries import StoredGroup, read_groups, sorted_unassigned_rows
+from app.features.groups.undo_stacks import RevisionChain, RevisionChains, station_revision_chain
 from app.features.imports.queries import group_verdicts, known_groups, shared_stations
 from app.finite import json_text
 from app.formats.file_tree import Root
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.store_output import output_anywhere
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
 
@@ -46,11 +46,11 @@ EDIT_KINDS = (
 _BATCH = 200
 
 
-def carry_out(
+def export_edits(
     store: Store,
     dataset: str | int,
     out: Root,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     beside: Path | None = None,
 ) -> dict[str, int]:
     """Write everything that was said about a dataset, from one snapshot; returns counts.
@@ -68,7 +68,7 @@ def carry_out(
         counts = {
             "stations": _write_lines(root / STATIONS, _stations(session, found.id)),
             "groups": _write_lines(root / GROUPS, _groups(session, found, progress)),
-            "spare": _write_lines(root / SPARE, _spare(session, found.id)),
+            "spare": _write_lines(root / SPARE, _unassigned_values(session, found.id)),
         }
         head = {
             "format": FORMAT,
@@ -81,7 +81,7 @@ def carry_out(
     return counts
 
 
-def carried_group(group: Group) -> dict[str, Json]:
+def group_to_merge(group: Group) -> dict[str, Json]:
     """A group without media; a shared station is its key."""
     views = []
     for view in group.views:
@@ -105,58 +105,58 @@ def _write_lines(path: Path, items: Iterator[Json]) -> int:
 
 def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
     for stored in shared_stations(session, dataset_id):
-        lineage = station_lineage(session, stored)
-        station, base = station_to_json(stored.station), station_to_json(lineage.base)
+        chain = station_revision_chain(session, stored)
+        station, base = station_to_json(stored.station), station_to_json(chain.base)
         yield {
             "key": stored.station.key,
             "station": station,
             "base": None if base == station else base,
-            "states": list(lineage.states),
+            "states": list(chain.states),
             "log": _log(station_entries(session, stored.id)),
         }
 
 
 def _groups(
-    session: Session, dataset: DatasetHead, progress: TellProgress | None
+    session: Session, dataset: DatasetHead, progress: ReportProgress | None
 ) -> Iterator[Json]:
-    lineages = Lineages(session, dataset.id)
+    chains = RevisionChains(session, dataset.id)
     ids = [group.id for group in known_groups(session, dataset.id)]
     for start in range(0, len(ids), _BATCH):
         stored = read_groups(session, ids[start : start + _BATCH])
-        known, verdicts = lineages.of(stored.values()), group_verdicts(session, stored)
-        checked = carried_dismissals(session, stored)
+        known, verdicts = chains.of(stored.values()), group_verdicts(session, stored)
+        checked = dismissals_to_merge(session, stored)
         for item in stored.values():
-            carried = _group(session, item, known[item.id], verdicts.get(item.id, []))
+            exported = _group(session, item, known[item.id], verdicts.get(item.id, []))
             # Earlier releases know no such key: it is there where it says something.
-            yield carried | ({"dismissals": checked[item.id]} if item.id in checked else {})
+            yield exported | ({"dismissals": checked[item.id]} if item.id in checked else {})
         if progress is not None:
             progress(start + len(stored), len(ids))
 
 
-def _group(session: Session, stored: StoredGroup, lineage: Lineage, verdicts: Json) -> Json:
-    group, base = carried_group(stored.group), carried_group(lineage.base)
-    walked = len(lineage.bases) > 1 or base != group or _has_past(lineage)
+def _group(session: Session, stored: StoredGroup, chain: RevisionChain, verdicts: Json) -> Json:
+    group, base = group_to_merge(stored.group), group_to_merge(chain.base)
+    walked = len(chain.bases) > 1 or base != group or _has_past(chain)
     return {
         "group": group,
         "base": None if base == group else base,
-        "bases": list(lineage.bases),
-        "views": {key: list(states) for key, states in lineage.views.items()},
-        "stations": {key: list(states) for key, states in lineage.stations.items()},
-        "pitches": list(lineage.pitches),
+        "bases": list(chain.bases),
+        "views": {key: list(states) for key, states in chain.views.items()},
+        "stations": {key: list(states) for key, states in chain.stations.items()},
+        "pitches": list(chain.pitches),
         "log": _log(group_entries(session, stored.id)) if walked else [],
         "verdicts": verdicts,
     }
 
 
-def _has_past(lineage: Lineage) -> bool:
-    states = [*lineage.views.values(), *lineage.stations.values()]
+def _has_past(chain: RevisionChain) -> bool:
+    states = [*chain.views.values(), *chain.stations.values()]
     return any(len(item) > 1 for item in states)
 
 
-def _log(said: Iterable[LogEntry]) -> list[Json]:
+def _log(logged: Iterable[LogEntry]) -> list[Json]:
     """Who edited what and when; carried edits of a third installation too."""
     entries: list[Json] = []
-    for entry in said:
+    for entry in logged:
         if entry.kind in EDIT_KINDS:
             body = {"kind": entry.kind, "actor": entry.actor, "at": entry.at}
             entries.append({**body, "edit": entry.body["edit"]})
@@ -165,8 +165,8 @@ def _log(said: Iterable[LogEntry]) -> list[Json]:
     return entries
 
 
-def _spare(session: Session, dataset_id: int) -> Iterator[Json]:
-    for row in sorted_spare_rows(session, dataset_id):
+def _unassigned_values(session: Session, dataset_id: int) -> Iterator[Json]:
+    for row in sorted_unassigned_rows(session, dataset_id):
         yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
 
 
@@ -175,7 +175,7 @@ def _manifest(session: Session, dataset: DatasetHead, counts: Mapping[str, int])
     return Manifest(
         dataset=dataset.name,
         format=FORMAT,
-        date=newest_word(session, dataset.id) or dataset.created,
+        date=newest_entry_time(session, dataset.id) or dataset.created,
         counts=counts,
         settings={
             "policy": policy_to_json(dataset.policy),

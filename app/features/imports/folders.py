@@ -25,7 +25,7 @@ from app.features.imports.upload_queries import (
 )
 from app.features.imports.upload_quota import quota_of as quota_of
 from app.features.imports.upload_quota import used_bytes as used_bytes
-from app.features.people.visibility_queries import Sight
+from app.features.people.visibility_queries import Visibility
 from app.formats.file_tree import Root
 from app.formats.guess_format import guess_format, guess_of_names
 from app.formats.safe_path import MAX_PART, check_name, resolve_inside
@@ -190,12 +190,12 @@ def find_upload(settings: Settings, upload_id: str) -> Upload:
     return get_upload(settings, upload_id)
 
 
-def own_uploads(settings: Settings, sight: Sight) -> list[Upload]:
+def own_uploads(settings: Settings, visibility: Visibility) -> list[Upload]:
     """The uploads that somebody sent, the newest first; of an admin everybody's."""
     return [
         item
         for item in list_uploads(settings)
-        if sight.sees(None) or any(sight.sees(None, name) for name in item.by)
+        if visibility.sees(None) or any(visibility.sees(None, name) for name in item.by)
     ]
 
 
@@ -218,7 +218,7 @@ def delete_sent(store: Store, upload_id: str, mine: Callable[[str], bool]) -> No
     if not has_key():
         delete_upload(store.settings, upload_id, mine)
         return
-    begun = _begun(store) or _begin(store, upload_id)
+    begun = _interrupted_deletion(store) or _begin(store, upload_id)
     with suppress(NotFoundError):
         # One that was sent once more meanwhile is another.
         if get_upload(store.settings, begun["upload"]).created == begun["created"]:
@@ -227,7 +227,7 @@ def delete_sent(store: Store, upload_id: str, mine: Callable[[str], bool]) -> No
         session.respond(None)
 
 
-def _begun(store: Store) -> Json | None:
+def _interrupted_deletion(store: Store) -> Json | None:
     """Which upload the same request was deleting when it was stopped; None: it was not."""
     with store.read() as session:
         return read_progress(session)

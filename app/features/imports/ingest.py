@@ -14,7 +14,11 @@ from app.db.store import Store
 from app.errors import ConflictError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset
-from app.features.findings.queries import group_findings, groups_told, replace_group_findings
+from app.features.findings.queries import (
+    group_findings,
+    groups_with_finding,
+    replace_group_findings,
+)
 from app.features.groups.digest import source_hash
 from app.features.groups.edit import SetPaint, SetPositions
 from app.features.groups.insert_queries import NewRows
@@ -41,7 +45,7 @@ from app.features.queue.queries import refresh_queue
 from app.formats.report import Report
 from app.object_store.address import is_address
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
@@ -88,10 +92,10 @@ def ingest(
     *,
     source: str,
     actor: str,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     dry_run: bool = False,
     policy: Policy | None = PAPER,
-    told: Report | None = None,
+    limit_report: Report | None = None,
     lines_left: bool = False,
 ) -> IngestReport:
     """Bring groups into a dataset, which the first of them makes when there is none of that name.
@@ -110,13 +114,13 @@ def ingest(
         policy: Of a dataset that is made; None: as its first pictures suggest.
         lines_left: Whether lines of static cameras that do not come were left aside, so that those of
             an earlier import go.
-        told: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
+        limit_report: What the files hold; hears what of a group is left out, beyond its ``GroupLimits``.
     """
     report, seen, done = IngestReport(), set[str](), 0
-    limits = GroupLimits(source, Report() if told is None else told)
-    sound, stations = _sound(groups, seen, report, limits), set[str]()
+    limits = GroupLimits(source, Report() if limit_report is None else limit_report)
+    sound, stations = _storable(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
-        with attempt(store, keep=not dry_run) as session:
+        with ingest_session(store, keep=not dry_run) as session:
             identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
             origin = Origin(identity, source, actor, lines_left)
             ingest_batch(session, origin, batch, report, stations)
@@ -136,19 +140,19 @@ def ingest(
     return report
 
 
-class _TakenBack(Exception):  # noqa: N818
+class _DryRunRollback(Exception):  # noqa: N818
     """Ends a transaction that shall leave nothing."""
 
 
 @contextmanager
-def attempt(store: Store, *, keep: bool) -> Iterator[Session]:
+def ingest_session(store: Store, *, keep: bool) -> Iterator[Session]:
     """A write session; where nothing shall be kept, what it did is taken back at its end."""
     try:
         with store.write() as session:
             yield session
             if not keep:
-                raise _TakenBack
-    except _TakenBack:
+                raise _DryRunRollback
+    except _DryRunRollback:
         pass
 
 
@@ -182,7 +186,7 @@ def _note_missing(
     return missing
 
 
-def _sound(
+def _storable(
     groups: Iterable[Group], seen: set[str], report: IngestReport, limits: GroupLimits
 ) -> Iterator[Group]:
     """Groups that can be stored, their media by absolute path."""
@@ -240,7 +244,7 @@ def ingest_batch(
     stations.update(shared.changed)
     keys = [group.key for group in batch]
     known = {item.key: item for item in known_groups(session, origin.dataset_id, keys)}
-    gone = groups_told(session, [item.id for item in known.values()], GONE)
+    gone = groups_with_finding(session, [item.id for item in known.values()], GONE)
     fresh: list[tuple[Group, str]] = []
     for group in batch:
         digest = source_hash(group)
@@ -249,7 +253,7 @@ def ingest_batch(
         elif known[group.key].source_hash == digest and known[group.key].id not in gone:
             report.unchanged += 1
         else:
-            _follow(session, origin, known[group.key].id, group, digest, shared.ids, report)
+            _update_group(session, origin, known[group.key].id, group, digest, shared.ids, report)
     insert_fresh(session, origin, fresh, shared.ids)
     report.new += len(fresh)
 
@@ -282,7 +286,7 @@ def insert_fresh(
     return ids
 
 
-def _follow(
+def _update_group(
     session: Session,
     origin: Origin,
     group_id: int,
@@ -313,7 +317,7 @@ def _follow(
         session, stored, followed.group, at=at, source=followed.base, digest=digest, shared=shared
     )
     after = read_groups(session, [group_id])[group_id]
-    kept = note_kept(session, after, followed.kept)
+    kept = save_findings(session, after, followed.kept)
     body = import_body(followed.group, followed.base, origin.source, digest, places_of(after))
     body["kept"] = [[item.view, item.sentence] for item in kept]
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
@@ -331,7 +335,9 @@ def _edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pit
     return stored.group.pitch if is_own else None
 
 
-def note_kept(session: Session, stored: StoredGroup, kept: Sequence[KeptEdit]) -> list[KeptEdit]:
+def save_findings(
+    session: Session, stored: StoredGroup, kept: Sequence[KeptEdit]
+) -> list[KeptEdit]:
     """Save what imports noticed about a group: this one, and earlier ones as far as it holds.
 
     A finding goes when its view is as the dataset has it now. Returns what is noticed then.
@@ -346,6 +352,6 @@ def note_kept(session: Session, stored: StoredGroup, kept: Sequence[KeptEdit]) -
         and stored.is_edited(view)
     ]
     noticed.extend(kept)
-    told = ((item.view, item.sentence) for item in noticed)
-    replace_group_findings(session, stored.id, KIND, told)
+    sentences = ((item.view, item.sentence) for item in noticed)
+    replace_group_findings(session, stored.id, KIND, sentences)
     return noticed

@@ -25,7 +25,7 @@ from app.features.paint.service import has_pictures
 from app.features.solve.jobs import request_solve
 from app.formats.file_tree import Root
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.policy import POLICIES, Policy
 from app.worker_process import WorkerEnded, WorkerLimits
@@ -125,7 +125,7 @@ def request_import(
 def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
     """Let imports that an earlier server was at go on; what is there already stays as it is."""
 
-    jobs.resumes(KIND, partial(import_work, jobs, store, settings))
+    jobs.register_resume(KIND, partial(import_work, jobs, store, settings))
 
 
 def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgress) -> Json:
@@ -151,7 +151,7 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
     with store.read() as session:
         found = find_dataset(session, request.dataset)
     if found is not None:
-        jobs.belongs(progress.job_id, int(found.id))
+        jobs.set_dataset(progress.job_id, int(found.id))
     if outcome.nothing is not None:
         raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
     if request.dry_run or not outcome.fresh:
@@ -166,7 +166,7 @@ def import_in_worker(
     *,
     actor: str,
     dry_run: bool,
-    progress: TellProgress,
+    progress: ReportProgress,
     stop: Callable[[], None],
     policy: Policy | None = None,
 ) -> Outcome:
@@ -196,7 +196,7 @@ def import_here(
     actor: str,
     dry_run: bool,
     policy: Policy | None,
-    progress: TellProgress,
+    progress: ReportProgress,
 ) -> Outcome:
     """The import itself, in this process."""
     settings = store.settings
@@ -204,7 +204,7 @@ def import_here(
         store, dataset, source, settings, progress, actor=actor, dry_run=dry_run, policy=policy
     )
     result = imported.result
-    nothing = None if imported.something else imported.nothing_read()
+    nothing = None if imported.imported_anything else imported.nothing_read_error()
     return Outcome(imported.values(), bool(result.new + result.changed), nothing)
 
 
@@ -228,9 +228,9 @@ def _following(
     return {"solve_job": solve.id, "paint_job": paint}
 
 
-def _step(progress: JobProgress, sentence: str) -> TellProgress:
-    def step(done: int, _total: int | None = None, said: str = "") -> None:
-        more = f" {said}" if said else ""
+def _step(progress: JobProgress, sentence: str) -> ReportProgress:
+    def step(done: int, _total: int | None = None, phase: str = "") -> None:
+        more = f" {phase}" if phase else ""
         progress(done, None, f"{sentence}{more} {plural(done, 'group')} so far.")
 
     return step

@@ -20,10 +20,15 @@ from app.features.groups.digest import station_digest
 from app.features.groups.queries import read_groups
 from app.features.groups.reimport import KIND, SharedStations
 from app.features.groups.revision_queries import refresh_inputs_hashes
-from app.features.groups.undo_stacks import Lineages, StationLineage, base_digest, station_lineage
+from app.features.groups.undo_stacks import (
+    RevisionChains,
+    StationRevisionChain,
+    base_digest,
+    station_revision_chain,
+)
 from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
 from app.features.imports.edits_export import GROUPS, SPARE, STATIONS
-from app.features.imports.ingest import IngestReport, Origin, attempt, ingest_batch
+from app.features.imports.ingest import IngestReport, Origin, ingest_batch, ingest_session
 from app.features.imports.merge_group import (
     CONFLICT,
     FOLLOW,
@@ -35,32 +40,32 @@ from app.features.imports.merge_group import (
     merge_verdicts,
 )
 from app.features.imports.merge_parse import (
-    CarriedGroup,
-    CarriedHead,
-    CarriedStation,
+    MergeGroup,
+    MergeHeader,
+    MergeStation,
     parse_group,
-    parse_spare,
     parse_station,
+    parse_unassigned,
     read_head,
     read_lines,
 )
 from app.features.imports.queries import known_groups, shared_stations
-from app.features.imports.spare import SpareFrame, ingest_spare
+from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.features.queue.queries import refresh_queue
 from app.formats.file_tree import FileTree, Limits, Root
 from app.formats.report import Report
 from app.formats.trees import opened_tree
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group, Station
 
 
 def merge_stations(
-    session: Session, origin: Origin, carried: Iterable[CarriedStation], report: IngestReport
+    session: Session, origin: Origin, exported: Iterable[MergeStation], report: IngestReport
 ) -> None:
     """Bring static cameras up to what another installation made of them."""
-    for item in carried:
+    for item in exported:
         stored = _stored(session, origin.dataset_id, item.station.key)
-        if stored is None or _is_upstream(session, stored, item):
+        if stored is None or _is_only_in_other(session, stored, item):
             shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
             shared.follow([item.base])
             report.changed += len(shared.changed)
@@ -70,29 +75,29 @@ def merge_stations(
         report.changed += _merge(session, origin, stored, item, report)
 
 
-def _is_upstream(session: Session, stored: StoredStation, item: CarriedStation) -> bool:
+def _is_only_in_other(session: Session, stored: StoredStation, item: MergeStation) -> bool:
     """Whether the other's dataset brought what this one's never did."""
     base = station_digest(item.base)
     if base == stored.source_digest:
         return False
-    return base not in station_lineage(session, stored).states
+    return base not in station_revision_chain(session, stored).states
 
 
 def _merge(
     session: Session,
     origin: Origin,
     stored: StoredStation,
-    item: CarriedStation,
+    item: MergeStation,
     report: IngestReport,
 ) -> bool:
-    lineage = station_lineage(session, stored)
-    here = Side(stored.digest, stored.source_digest, lineage.states)
+    chain = station_revision_chain(session, stored)
+    here = Side(stored.digest, stored.source_digest, chain.states)
     there = Side(station_digest(item.station), station_digest(item.base), item.states)
     decision = decide(here, there)
     if decision in (FOLLOW, UPSTREAM):
-        _follow(session, origin, stored, item, lineage, _sentence(decision, stored))
+        _follow(session, origin, stored, item, chain, _sentence(decision, stored))
     elif decision == CONFLICT:
-        return _note(session, origin, stored, lineage, _sentence(decision, stored), report)
+        return _save_conflict(session, origin, stored, chain, _sentence(decision, stored), report)
     return decision in (FOLLOW, UPSTREAM)
 
 
@@ -115,24 +120,24 @@ def _follow(
     session: Session,
     origin: Origin,
     stored: StoredStation,
-    item: CarriedStation,
-    lineage: StationLineage,
+    item: MergeStation,
+    chain: StationRevisionChain,
     sentence: str | None,
 ) -> None:
-    station = stored.station.with_said(item.station)
+    station = stored.station.with_annotations_of(item.station)
     save_station(session, stored, station)
     replace_station_finding(session, stored.id, KIND, sentence)
-    _log(session, origin, replace(stored, station=station), lineage, sentence, list(item.log))
+    _log(session, origin, replace(stored, station=station), chain, sentence, list(item.log))
     groups = groups_of_station(session, stored.id)
     refresh_inputs_hashes(session, groups)
     refresh_queue(session, groups)
 
 
-def _note(
+def _save_conflict(
     session: Session,
     origin: Origin,
     stored: StoredStation,
-    lineage: StationLineage,
+    chain: StationRevisionChain,
     sentence: str | None,
     report: IngestReport,
 ) -> bool:
@@ -142,7 +147,7 @@ def _note(
     # A revision of its own, as every entry of the log about a station makes one.
     save_station(session, stored, stored.station)
     replace_station_finding(session, stored.id, KIND, sentence)
-    _log(session, origin, stored, lineage, sentence, [])
+    _log(session, origin, stored, chain, sentence, [])
     refresh_queue(session, groups_of_station(session, stored.id))
     report.findings += 1
     return True
@@ -152,17 +157,17 @@ def _log(
     session: Session,
     origin: Origin,
     stored: StoredStation,
-    lineage: StationLineage,
+    chain: StationRevisionChain,
     sentence: str | None,
-    carried: list[object],
+    exported: list[object],
 ) -> None:
-    station, base = station_to_json(stored.station), station_to_json(lineage.base)
+    station, base = station_to_json(stored.station), station_to_json(chain.base)
     body = {
         "source": origin.source,
         "station": station,
         "base": None if base == station else base,
         "kept": sentence,
-        "carried": carried,
+        "carried": exported,
     }
     entry = Entry("station", origin.actor, now(), body, origin.dataset_id, station_id=stored.id)
     append(session, [entry])
@@ -182,7 +187,7 @@ class _Run:
 
     store: Store
     dataset: str
-    head: CarriedHead
+    head: MergeHeader
     source: str
     actor: str
     keep: bool
@@ -201,7 +206,7 @@ class _Run:
         return Origin(number, self.source, self.actor)
 
 
-def carry_in(
+def merge_edits(
     store: Store,
     dataset: str,
     path: Root,
@@ -210,10 +215,10 @@ def carry_in(
     *,
     source: str,
     actor: str,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     dry_run: bool = False,
 ) -> IngestReport:
-    """Merge what ``carry_out`` wrote into a dataset, which is made when there is none.
+    """Merge what ``export_edits`` wrote into a dataset, which is made when there is none.
 
     Killed anywhere and started again, it ends in the same state.
 
@@ -235,15 +240,15 @@ def carry_in(
         try:
             head = read_head(tree)
             run = _Run(store, dataset, head, source, actor, not dry_run, result, set())
-            _carry(run, tree, report, progress)
+            _merge_tree(run, tree, report, progress)
         except DatasetFormatError as error:
             report.skip(error)
     return result
 
 
-def _carry(run: _Run, tree: FileTree, report: Report, progress: TellProgress | None) -> None:
+def _merge_tree(run: _Run, tree: FileTree, report: Report, progress: ReportProgress | None) -> None:
     stations = {item.station.key: item for item in _parsed(tree, STATIONS, report, parse_station)}
-    with attempt(run.store, keep=run.keep) as session:
+    with ingest_session(run.store, keep=run.keep) as session:
         origin = run.origin(session)
         _note_policy(session, run)
         merge_stations(session, origin, stations.values(), run.report)
@@ -251,14 +256,14 @@ def _carry(run: _Run, tree: FileTree, report: Report, progress: TellProgress | N
     groups = _parsed(tree, GROUPS, report, lambda value: parse_group(value, known))
     done = 0
     while batch := list(islice(groups, BATCH)):
-        with attempt(run.store, keep=run.keep) as session:
+        with ingest_session(run.store, keep=run.keep) as session:
             _merge_batch(session, run, batch, stations)
         done += len(batch)
         if progress is not None:
             progress(done)
     if run.keep:
-        frames = (SpareFrame(*item) for item in _parsed(tree, SPARE, report, parse_spare))
-        ingest_spare(run.store, run.dataset, frames, source=run.source, actor=run.actor)
+        frames = (UnassignedFrame(*item) for item in _parsed(tree, SPARE, report, parse_unassigned))
+        ingest_unassigned(run.store, run.dataset, frames, source=run.source, actor=run.actor)
 
 
 def _parsed(tree: FileTree, name: str, report: Report, parse: Callable[[Json], T]) -> Iterator[T]:
@@ -283,8 +288,8 @@ def _note_policy(session: Session, run: _Run) -> None:
 def _merge_batch(
     session: Session,
     run: _Run,
-    batch: Sequence[CarriedGroup],
-    stations: Mapping[str, CarriedStation],
+    batch: Sequence[MergeGroup],
+    stations: Mapping[str, MergeStation],
 ) -> None:
     origin = run.origin(session)
     if not run.keep:
@@ -292,16 +297,16 @@ def _merge_batch(
         merge_stations(session, origin, stations.values(), IngestReport())
     items = {item.group.key: item for item in batch}
     known = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
-    upstream = _upstream(session, origin, items, known)
+    upstream = _groups_only_in_other(session, origin, items, known)
     ingest_batch(session, origin, upstream, run.report, run.counted)
     counted = {group.key for group in upstream}
     ids = {item.key: item.id for item in known_groups(session, origin.dataset_id, items)}
     stored = read_groups(session, list(ids.values()))
-    lineages = Lineages(session, origin.dataset_id).of(stored.values())
+    chains = RevisionChains(session, origin.dataset_id).of(stored.values())
     touched = []
     for key, number in ids.items():
         item = items[key]
-        changed = merge_group(session, origin, stored[number], lineages[number], item, run.report)
+        changed = merge_group(session, origin, stored[number], chains[number], item, run.report)
         judged = merge_verdicts(session, origin, number, item.verdicts)
         judged |= merge_dismissals(session, origin, number, item.dismissals)
         if changed or judged:
@@ -312,24 +317,24 @@ def _merge_batch(
     refresh_queue(session, touched)
 
 
-def _upstream(
-    session: Session, origin: Origin, items: Mapping[str, CarriedGroup], known: Mapping[str, int]
+def _groups_only_in_other(
+    session: Session, origin: Origin, items: Mapping[str, MergeGroup], known: Mapping[str, int]
 ) -> list[Group]:
     """What the other's dataset brought and this one's never did: groups as they came."""
     stored = read_groups(session, list(known.values()))
-    lineages = Lineages(session, origin.dataset_id).of(stored.values())
+    chains = RevisionChains(session, origin.dataset_id).of(stored.values())
     shared = _shared(session, origin.dataset_id)
     upstream = []
     for key, item in items.items():
-        base = _here(item.base, shared)
+        base = _with_own_stations(item.base, shared)
         if key not in known:
             upstream.append(base)
-        elif base_digest(base) not in lineages[known[key]].bases:
+        elif base_digest(base) not in chains[known[key]].bases:
             upstream.append(_with_media(base, stored[known[key]].group))
     return upstream
 
 
-def _here(group: Group, shared: Mapping[str, Station]) -> Group:
+def _with_own_stations(group: Group, shared: Mapping[str, Station]) -> Group:
     """The group with its static cameras as the dataset brought them here.
 
     They are merged on their own; in an import of groups they must look untouched.
@@ -353,6 +358,8 @@ def _with_media(group: Group, stored: Group) -> Group:
 def _shared(session: Session, dataset_id: int) -> dict[str, Station]:
     """The static cameras as the dataset last brought them, by key."""
     return {
-        item.station.key: station_lineage(session, item).base if item.edited else item.station
+        item.station.key: station_revision_chain(session, item).base
+        if item.edited
+        else item.station
         for item in shared_stations(session, dataset_id)
     }

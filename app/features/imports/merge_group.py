@@ -8,15 +8,15 @@ from typing import Any
 
 from app.db.log import Entry, append
 from app.db.session import Session, now
-from app.features.findings.queries import carried_dismissals, group_findings, insert_dismissal
+from app.features.findings.queries import dismissals_to_merge, group_findings, insert_dismissal
 from app.features.groups.digest import station_digest, view_digest
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KeptEdit
 from app.features.groups.revision_queries import save_group
-from app.features.groups.undo_stacks import Lineage, pitch_size
+from app.features.groups.undo_stacks import RevisionChain, pitch_size
 from app.features.imports.body import import_body, places_of
-from app.features.imports.ingest import IngestReport, Origin, note_kept
-from app.features.imports.merge_parse import CarriedGroup
+from app.features.imports.ingest import IngestReport, Origin, save_findings
+from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, group_verdicts
 from app.features.pitches.service import give_pitch
 from app.features.verdicts.queries import StoredVerdict, insert_verdicts, next_verdict_id
@@ -73,58 +73,58 @@ def merge_group(
     session: Session,
     origin: Origin,
     stored: StoredGroup,
-    lineage: Lineage,
-    carried: CarriedGroup,
+    chain: RevisionChain,
+    exported: MergeGroup,
     report: IngestReport,
 ) -> bool:
     """Bring a group up to what another installation made of it; whether anything changed."""
-    merged, kept = _merged(stored, lineage, carried)
-    pitch = decide(*_pitch_sides(stored, lineage, carried))
-    kept += _kept(None, pitch, f"pitch of {merged.key}")
+    merged, kept = _merged(stored, chain, exported)
+    pitch = decide(*_pitch_sides(stored, chain, exported))
+    kept += _kept_edits(None, pitch, f"pitch of {merged.key}")
     fresh = _not_noticed(session, stored.id, kept)
     if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
         return False
     at = now()
-    save_group(session, stored, merged, at=at, source=lineage.base)
+    save_group(session, stored, merged, at=at, source=chain.base)
     after = read_groups(session, [stored.id])[stored.id]
-    noticed = note_kept(session, after, kept)
-    base = lineage.base
+    noticed = save_findings(session, after, kept)
+    base = chain.base
     body = import_body(merged, base, origin.source, stored.source_hash, places_of(after))
     body["kept"] = [[item.view, item.sentence] for item in noticed]
-    body["carried"] = list(carried.log)
+    body["carried"] = list(exported.log)
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
     if pitch in (FOLLOW, UPSTREAM):
         # An edit of its own: the size before can be had back here, too.
-        give_pitch(session, origin.dataset_id, [stored.id], carried.group.pitch, origin.actor)
+        give_pitch(session, origin.dataset_id, [stored.id], exported.group.pitch, origin.actor)
     report.findings += len(fresh)
     return True
 
 
 def _merged(
-    stored: StoredGroup, lineage: Lineage, carried: CarriedGroup
+    stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
 ) -> tuple[Group, list[KeptEdit]]:
     group, kept = stored.group, list[KeptEdit]()
     for view in stored.group.views:
-        other, base = carried.group.view(view.key), carried.base.view(view.key)
+        other, base = exported.group.view(view.key), exported.base.view(view.key)
         if other is None or base is None or other.station.shared != view.station.shared:
             continue
-        ball = decide(_view_side(stored, lineage, view), _other_view(carried, other, base))
+        ball = decide(_view_side(stored, chain, view), _other_view(exported, other, base))
         if ball in (FOLLOW, UPSTREAM):
             view = replace(
                 view, balls=other.balls, included=other.included, left_out=other.left_out
             )
-        kept += _kept(view.key, ball, f"ball of {view.key}")
+        kept += _kept_edits(view.key, ball, f"ball of {view.key}")
         if not view.station.shared:
-            here, there = _station_side(stored, lineage, view), _other_station(carried, other, base)
+            here, there = _station_side(stored, chain, view), _other_station(exported, other, base)
             lines = decide(here, there)
             if lines in (FOLLOW, UPSTREAM):
-                view = replace(view, station=view.station.with_said(other.station))
-            kept += _kept(view.key, lines, f"lines or the camera of {view.key}")
+                view = replace(view, station=view.station.with_annotations_of(other.station))
+            kept += _kept_edits(view.key, lines, f"lines or the camera of {view.key}")
         group = group.with_view(view)
     return group, kept
 
 
-def _kept(view: str | None, decision: str, what: str) -> list[KeptEdit]:
+def _kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdit]:
     if decision == CONFLICT:
         sentence = (
             f"another installation edited the {what} too; the edit of this installation is kept"
@@ -139,29 +139,31 @@ def _kept(view: str | None, decision: str, what: str) -> list[KeptEdit]:
     return [KeptEdit(view, sentence)]
 
 
-def _pitch_sides(stored: StoredGroup, lineage: Lineage, carried: CarriedGroup) -> tuple[Side, Side]:
-    here = Side(pitch_size(stored.group.pitch), pitch_size(lineage.base.pitch), lineage.pitches)
-    size, base = pitch_size(carried.group.pitch), pitch_size(carried.base.pitch)
-    return here, Side(size, base, carried.pitches)
+def _pitch_sides(
+    stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
+) -> tuple[Side, Side]:
+    here = Side(pitch_size(stored.group.pitch), pitch_size(chain.base.pitch), chain.pitches)
+    size, base = pitch_size(exported.group.pitch), pitch_size(exported.base.pitch)
+    return here, Side(size, base, exported.pitches)
 
 
-def _view_side(stored: StoredGroup, lineage: Lineage, view: View) -> Side:
+def _view_side(stored: StoredGroup, chain: RevisionChain, view: View) -> Side:
     present, base = stored.view_digests[view.key]
-    return Side(present, base, lineage.views.get(view.key, (present,)))
+    return Side(present, base, chain.views.get(view.key, (present,)))
 
 
-def _other_view(carried: CarriedGroup, view: View, base: View) -> Side:
-    past = carried.views.get(view.key, ())
+def _other_view(exported: MergeGroup, view: View, base: View) -> Side:
+    past = exported.views.get(view.key, ())
     return Side(view_digest(view), view_digest(base), past)
 
 
-def _station_side(stored: StoredGroup, lineage: Lineage, view: View) -> Side:
+def _station_side(stored: StoredGroup, chain: RevisionChain, view: View) -> Side:
     own = stored.stations[view.key]
-    return Side(own.digest, own.source_digest, lineage.stations.get(view.key, (own.digest,)))
+    return Side(own.digest, own.source_digest, chain.stations.get(view.key, (own.digest,)))
 
 
-def _other_station(carried: CarriedGroup, view: View, base: View) -> Side:
-    past = carried.stations.get(view.key, ())
+def _other_station(exported: MergeGroup, view: View, base: View) -> Side:
+    past = exported.stations.get(view.key, ())
     return Side(station_digest(view.station), station_digest(base.station), past)
 
 
@@ -174,18 +176,18 @@ def _not_noticed(session: Session, group_id: int, kept: list[KeptEdit]) -> list[
 
 
 def merge_verdicts(
-    session: Session, origin: Origin, group_id: int, carried: Sequence[Mapping[str, Any]]
+    session: Session, origin: Origin, group_id: int, exported: Sequence[Mapping[str, Any]]
 ) -> bool:
     """Add the verdicts of another installation that are not here; whether there were any.
 
     The last one added is the one that counts, so one that was given here later than all of
     theirs is given once more, with its own time and person.
     """
-    if not carried:
+    if not exported:
         return False
     known = group_verdicts(session, [group_id]).get(group_id, [])
     seen = {_identity(item) for item in known}
-    fresh = [item for item in carried if _identity(item) not in seen]
+    fresh = [item for item in exported if _identity(item) not in seen]
     if not fresh:
         return False
     fresh = sorted(fresh, key=lambda item: str(item["at"]))
@@ -198,17 +200,17 @@ def merge_verdicts(
 
 
 def merge_dismissals(
-    session: Session, origin: Origin, group_id: int, carried: Sequence[Mapping[str, Any]]
+    session: Session, origin: Origin, group_id: int, exported: Sequence[Mapping[str, Any]]
 ) -> bool:
     """Add what was dismissed in another installation and is not here; whether there was any.
 
     The last one of a finding counts: what was said here later than the first of theirs is said
     once more, after them.
     """
-    if not carried:
+    if not exported:
         return False
-    known = carried_dismissals(session, [group_id]).get(group_id, [])
-    fresh = [item for item in carried if item not in known]
+    known = dismissals_to_merge(session, [group_id]).get(group_id, [])
+    fresh = [item for item in exported if item not in known]
     if not fresh:
         return False
     first = min(str(item["at"]) for item in fresh)

@@ -9,7 +9,7 @@ from typing import IO, Any
 
 from app.db.json_columns import Json
 from app.errors import DatasetFormatError, InputError, ReviewError
-from app.features.findings.queries import CARRIED
+from app.features.findings.queries import MERGED_COLUMNS
 from app.features.groups.codecs import extras_from_json, policy_from_json, station_from_json
 from app.features.groups.undo_stacks import logged_group, pitch_size
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, points_of
@@ -37,7 +37,7 @@ _MISSHAPEN = (ArithmeticError, AttributeError, LookupError, ReviewError, TypeErr
 
 
 @dataclass(frozen=True)
-class CarriedHead:
+class MergeHeader:
     """What the file says of itself."""
 
     dataset: str
@@ -45,7 +45,7 @@ class CarriedHead:
 
 
 @dataclass(frozen=True)
-class CarriedStation:
+class MergeStation:
     """A static camera: as it is there, as its dataset brought it, and its past."""
 
     station: Station
@@ -55,7 +55,7 @@ class CarriedStation:
 
 
 @dataclass(frozen=True)
-class CarriedGroup:
+class MergeGroup:
     """A group: as it is there, as its dataset brought it, its past, and what people decided."""
 
     group: Group
@@ -68,7 +68,7 @@ class CarriedGroup:
     dismissals: tuple[Mapping[str, Any], ...] = ()
 
 
-def read_head(tree: FileTree) -> CarriedHead:
+def read_head(tree: FileTree) -> MergeHeader:
     """What the file says of itself.
 
     Raises:
@@ -88,7 +88,7 @@ def read_head(tree: FileTree) -> CarriedHead:
         # Its values reach the solver: a text in place of a number would break there.
         policy_with(PAPER, policy_values(policy), name=CUSTOM)
         _text(policy.name)
-        return CarriedHead(_text(value["dataset"]), policy)
+        return MergeHeader(_text(value["dataset"]), policy)
     except InputError as error:
         raise DatasetFormatError(shown, None, "policy", f"is not a policy: {error}") from error
     except _MISSHAPEN as error:
@@ -123,7 +123,7 @@ def _line(file: IO[bytes], shown: str) -> bytes:
         raise DatasetFormatError(shown, None, None, problem) from error
 
 
-def parse_station(value: Json) -> CarriedStation:
+def parse_station(value: Json) -> MergeStation:
     """A static camera of its line.
 
     Raises:
@@ -134,12 +134,12 @@ def parse_station(value: Json) -> CarriedStation:
         base = station if value["base"] is None else _station(value["base"])
         if not (station.shared and base.shared and station.key == base.key):
             raise InputError("has a `base` that is another camera, or no static one")
-        return CarriedStation(station, base, _states(value["states"]), _log(value["log"]))
+        return MergeStation(station, base, _states(value["states"]), _log(value["log"]))
     except _MISSHAPEN as error:
         raise _problem(error) from error
 
 
-def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
+def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
     """A group of its line.
 
     Raises:
@@ -150,7 +150,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
         base = group if value["base"] is None else _group(value["base"], shared)
         if group.key != base.key:
             raise InputError("has a `base` that is another group")
-        return CarriedGroup(
+        return MergeGroup(
             group=group,
             base=base,
             views={key: _states(item) for key, item in _mapping(value["views"]).items()},
@@ -164,7 +164,7 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> CarriedGroup:
         raise _problem(error) from error
 
 
-def parse_spare(value: Json) -> tuple[str, str, Extras]:
+def parse_unassigned(value: Json) -> tuple[str, str, Extras]:
     """Camera, frame and extras of a line.
 
     Raises:
@@ -197,14 +197,14 @@ def _group(value: Json, shared: Mapping[str, Station]) -> Group:
         _text(text, empty=text is not group.key)
     if not (0 < group.pitch.length < 1000 and 0 < group.pitch.width < 1000):
         raise InputError("has a pitch of an impossible size")
-    for view, said in zip(group.views, views, strict=True):
-        _list(said["balls"], MAX_BALLS)
-        _extras(said["extras"])
+    for view, fields in zip(group.views, views, strict=True):
+        _list(fields["balls"], MAX_BALLS)
+        _extras(fields["extras"])
         if view.included not in (True, False):
             raise InputError("has another value where true or false is expected for a view")
         if view.left_out is not None:
             _check_left_out(view)
-        if not isinstance(said["station"], str) and _checked(view.station).shared:
+        if not isinstance(fields["station"], str) and _checked(view.station).shared:
             raise InputError(f"has the static camera {view.station.key} in a view")
     return group
 
@@ -227,7 +227,7 @@ def _checked(station: Station) -> Station:
     if station.calibration not in CALIBRATIONS:
         raise InputError("has a calibration that Touchline does not know")
     _require_truth_values("a station", station.flipped, station.shared)
-    for marking in station.said_lines:
+    for marking in station.annotated_lines:
         if canonical_marking(marking) != marking:
             raise InputError(f"has {marking}, which is not a pitch marking")
     if (count := points_of(station.lines)) > MAX_POINTS:
@@ -259,7 +259,7 @@ def _verdict(value: Json) -> Mapping[str, Any]:
 
 
 def _dismissal(value: Json) -> Mapping[str, Any]:
-    values = {name: _mapping(value)[name] for name in CARRIED}
+    values = {name: _mapping(value)[name] for name in MERGED_COLUMNS}
     for name in ("actor", "at", "sentence"):
         _text(values[name], most=MAX_NOTE)
     for name in ("view", "marking", "suggested", "note"):

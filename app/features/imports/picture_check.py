@@ -17,7 +17,7 @@ from app.media.files import picture_header, video_length, video_times
 from app.media.images import SIDEWAYS, ImageHeader
 from app.paint.picture_scale import SHAPES_APART
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
 from app.soccer.media import Media
@@ -29,7 +29,7 @@ NAMED = 5
 
 
 _SHAPE = "The picture has another shape than its annotations"
-_MEND = (
+_ADVICE = (
     "What is drawn on it lies in the wrong place. Import it with the right size or picture, or leave "
     "the view out."
 )
@@ -64,7 +64,7 @@ class PictureCheck:
 
     report: Report
     settings: Settings
-    progress: TellProgress | None = None
+    progress: ReportProgress | None = None
     shapes: list[str] = field(default_factory=list)
     outside: list[str] = field(default_factory=list)
     beyond: list[str] = field(default_factory=list)
@@ -126,7 +126,7 @@ class PictureCheck:
             difference = _difference(view.size, header)
             if difference:
                 self.shapes.append(f"{place}{_file(view.media)}: {difference}")
-                self.found.append((group.key, view.key, f"{_SHAPE} ({difference}). {_MEND}"))
+                self.found.append((group.key, view.key, f"{_SHAPE} ({difference}). {_ADVICE}"))
         if places := list(self._outside(view)):
             more = f" and {len(places) - 1} more" if len(places) > 1 else ""
             self.outside.append(
@@ -161,14 +161,14 @@ class PictureCheck:
         name = PurePosixPath(media.path).name
 
         def tell(frames: int) -> None:
-            self._tell(f"Counting the frames of {name}: {frames:,} so far.")
+            self._report(f"Counting the frames of {name}: {frames:,} so far.")
 
         tell(0)
         count = len(video_times(media, self.settings, tell))
-        self._tell("Reading the groups.")
+        self._report("Reading the groups.")
         return count
 
-    def _tell(self, sentence: str) -> None:
+    def _report(self, sentence: str) -> None:
         if self.progress is not None:
             self.progress(self._passed, None, sentence)
 
@@ -202,12 +202,12 @@ def _difference(size: ImageSize, header: ImageHeader) -> str:
     width, height = header.width, header.height
     if abs(width / height / (size.width / size.height) - 1) <= SHAPES_APART:
         return ""
-    said = f"{size.width} x {size.height} declared, the picture is {width} x {height}"
+    sentence = f"{size.width} x {size.height} declared, the picture is {width} x {height}"
     if (size.width, size.height) == (height, width):
-        said += ", the same on its side"
+        sentence += ", the same on its side"
         if header.orientation in SIDEWAYS:
-            said += " (its EXIF orientation turns it)"
-    return said
+            sentence += " (its EXIF orientation turns it)"
+    return sentence
 
 
 def _file(media: Media | None) -> str:

@@ -192,14 +192,14 @@ async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
 @uploads_router.get("", operation_id="listUploads", responses=responses())
 @may(Action.LEAD, where=Where.SOMEWHERE)
 @paged()
-def get_uploads(services: AppServices, sight: Sees, actor: Actor) -> UploadList:
+def get_uploads(services: AppServices, visibility: Sees, actor: Actor) -> UploadList:
     """Every file of one's own that is still here; an admin is shown everybody's.
 
     `used_bytes` and `quota_bytes` are of whoever asks.
     """
     settings = services.settings
     return UploadList(
-        items=own_uploads(settings, sight),
+        items=own_uploads(settings, visibility),
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
         used_bytes=used_bytes(settings, actor),
@@ -223,9 +223,9 @@ def get_one(upload: UploadId, services: AppServices) -> UploadDocument:
 )
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 @responds(no_content)
-def delete_one(upload: UploadId, services: AppServices, sight: Sees) -> None:
+def delete_one(upload: UploadId, services: AppServices, visibility: Sees) -> None:
     """Delete a file; 400 while a dataset reads its frames from it.
 
     Where others have sent the same file, it stays with them; an admin deletes it for all.
     """
-    delete_sent(services.store, upload, partial(sight.sees, None))
+    delete_sent(services.store, upload, partial(visibility.sees, None))

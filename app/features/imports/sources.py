@@ -14,7 +14,7 @@ from app.errors import DatasetFormatError, InputError
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import IngestReport, ingest
 from app.features.imports.picture_check import PictureCheck
-from app.features.imports.spare import SpareFrame, ingest_spare
+from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.formats.cameras_reader import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.file_tree import Limits, Root
@@ -33,7 +33,7 @@ from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.soccernet_v3d_reader import read_soccernet_v3d
 from app.media.images import check_size, read_header
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import ImageSize
@@ -71,7 +71,7 @@ BALLS_ELSEWHERE = ("sn-calibration", "frames", "coco")
 
 
 @dataclass
-class BallTally:
+class BallCounter:
     """Counts what groups bring on their way through an import."""
 
     groups: int = 0
@@ -192,7 +192,7 @@ class Imported:
     result: IngestReport
 
     @property
-    def something(self) -> bool:
+    def imported_anything(self) -> bool:
         """Whether anything of the files is in the dataset now."""
         return self.result.new + self.result.changed + self.result.unchanged > 0
 
@@ -201,9 +201,9 @@ class Imported:
         """Whether nothing was left out and no picture is missing."""
         report = self.report
         missing = self.result.without_picture or report.counts["views without frame"]
-        return self.something and not (report.problems or report.dropped or missing)
+        return self.imported_anything and not (report.problems or report.dropped or missing)
 
-    def nothing_read(self) -> tuple[str, str]:
+    def nothing_read_error(self) -> tuple[str, str]:
         """Why nothing could be imported, naming the file, and what to do about it."""
         source = self.source
         problems = [problem.message for problem in self.report.problems] + self.result.problems
@@ -228,7 +228,7 @@ class Imported:
 
     def _unannotated(self) -> tuple[str, str] | None:
         """What a source is that nothing was read of, where it has no annotations; what to do."""
-        if self.something:
+        if self.imported_anything:
             return None
         if holds_videos_alone(self.source.path):
             return "holds a video, which is a recording", RECORDING_HINT
@@ -247,7 +247,11 @@ class Imported:
         """Everything that there is to tell, as plain values."""
         shown = self.source.shown
         return {
-            "outcome": "complete" if self.complete else "partial" if self.something else "nothing",
+            "outcome": "complete"
+            if self.complete
+            else "partial"
+            if self.imported_anything
+            else "nothing",
             "read": self.report.read,
             "imported": self.report.imported,
             "new": self.result.new,
@@ -276,7 +280,7 @@ def import_source(
     dataset: str,
     source: Source,
     settings: Settings,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     *,
     actor: str = "local",
     dry_run: bool = False,
@@ -320,9 +324,9 @@ def import_source(
         return Imported(source, report, result)
     if source.format == "touchline":
         # It solves what it brings; who imports anything else need not load a solver.
-        from app.features.imports.merge import carry_in
+        from app.features.imports.merge import merge_edits
 
-        result = carry_in(
+        result = merge_edits(
             store,
             dataset,
             source.path,
@@ -338,17 +342,17 @@ def import_source(
     groups = _groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
-    tally, check = BallTally(), PictureCheck(report, settings, progress)
+    counts, check = BallCounter(), PictureCheck(report, settings, progress)
     result = ingest(
         store,
         dataset,
-        tally.watch(check.watch(groups)),
+        counts.watch(check.watch(groups)),
         source=source.label,
         actor=actor,
         progress=progress,
         dry_run=dry_run,
         policy=policy,
-        told=report,
+        limit_report=report,
         lines_left=folder is not None and source.calibration == "given",
     )
     result.problems += check.remarks()
@@ -357,10 +361,12 @@ def import_source(
     else:
         result.findings += check.note(store, dataset)
     if folder is not None and source.calibration is None:
-        _tell_contradicted(folder, dataset, source, report)
+        _report_contradicted(folder, dataset, source, report)
     if folder is not None and not dry_run:
-        ingest_spare(store, dataset, _spare(folder), source=source.label, actor=actor)
-    if source.format not in BALLS_ELSEWHERE and (sentence := tally.without_ball()):
+        ingest_unassigned(
+            store, dataset, _read_unassigned(folder), source=source.label, actor=actor
+        )
+    if source.format not in BALLS_ELSEWHERE and (sentence := counts.without_ball()):
         report.remark(sentence)
     return Imported(source, report, result)
 
@@ -410,12 +416,12 @@ def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
     return read(source.path, options, report, limits)
 
 
-def _tell_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
+def _report_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
-    from app.features.solutions.service import contradicted, sentence_of
+    from app.features.solutions.service import contradicted_cameras, sentence_of
 
     stations = {station.key: number for number, station in folder.stations.items()}
-    off = contradicted(((one, Pitch()) for one in folder.stations.values()), PAPER)
+    off = contradicted_cameras(((one, Pitch()) for one in folder.stations.values()), PAPER)
     showing = [folder.tracks[stations[key]].balls.keys() for key in off]
     groups = {frame for track in folder.tracks.values() for frame in track.balls}
     if not off:
@@ -430,6 +436,6 @@ def _tell_contradicted(folder: IssiaFolder, dataset: str, source: Source, report
     report.remark(sentence_of(off, where, f"`{command}`"))
 
 
-def _spare(folder: IssiaFolder) -> Iterator[SpareFrame]:
+def _read_unassigned(folder: IssiaFolder) -> Iterator[UnassignedFrame]:
     for item in folder.persons():
-        yield SpareFrame(item.camera, str(item.frame), Extras(boxes=item.boxes))
+        yield UnassignedFrame(item.camera, str(item.frame), Extras(boxes=item.boxes))

@@ -73,7 +73,7 @@ def _writing(settings: Settings) -> Iterator[None]:
         BusyError: Another process writes for too long.
     """
     with _WRITING:
-        with _reported():
+        with _storage_errors():
             _make_folder(settings)
             folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
         try:
@@ -118,7 +118,7 @@ def get_upload(settings: Settings, upload_id: str) -> Upload:
 
 def list_uploads(settings: Settings) -> list[Upload]:
     """All uploads, the newest first."""
-    return sorted(_all(settings), key=lambda item: (item.created, item.id), reverse=True)
+    return sorted(_all_uploads(settings), key=lambda item: (item.created, item.id), reverse=True)
 
 
 def keep_upload(settings: Settings, upload_id: str) -> None:
@@ -126,7 +126,7 @@ def keep_upload(settings: Settings, upload_id: str) -> None:
     with _writing(settings):
         upload = get_upload(settings, upload_id)
         if not upload.kept:
-            with _reported():
+            with _storage_errors():
                 _write_record(settings.uploads / upload_id, replace(upload, kept=True))
 
 
@@ -150,10 +150,10 @@ def delete_upload(
         others = tuple(actor for actor in upload.by if not mine(actor))
         if not others:
             _remove(settings.uploads / upload_id)
-            with _reported():
+            with _storage_errors():
                 sync(settings.uploads)
             return
-        with _reported():
+        with _storage_errors():
             _write_record(settings.uploads / upload_id, replace(upload, by=others))
 
 
@@ -199,7 +199,7 @@ def _may_be_kept(folder: Path) -> bool:
     return not isinstance(values, dict) or values.get("kept") is not False
 
 
-def _all(settings: Settings) -> Iterator[Upload]:
+def _all_uploads(settings: Settings) -> Iterator[Upload]:
     for record in settings.uploads.glob(f"*/{_RECORD}"):
         upload = _read(record.parent)
         if upload is not None:
@@ -299,11 +299,11 @@ class UploadWriter:
                 self._open()
             # Without an id it is none that is listed; ``finish`` writes the one that counts.
             draft = Upload("", self._name, self._reserved, now(), by=(by,))
-            with _reported():
+            with _storage_errors():
                 _write_record(self._folder, draft)
 
     def _open(self) -> None:
-        with _reported():
+        with _storage_errors():
             settings = self._settings
             _make_folder(settings)
             content = self._folder / _CONTENT
@@ -322,7 +322,7 @@ class UploadWriter:
         if self._quota is not None and self.bytes > self._reserved:
             self._reserve(self.bytes, self._quota)
         self._digest.update(chunk)
-        with _reported():
+        with _storage_errors():
             self._file.write(chunk)
 
     def finish(self, guess: Callable[[Path], str | None] = lambda path: None) -> Upload:
@@ -337,7 +337,7 @@ class UploadWriter:
         if not self.bytes:
             self.abort()
             raise InputError("the upload is empty", hint="Send the file as the request's body.")
-        with _reported():
+        with _storage_errors():
             self._file.flush()
             os.fsync(self._file.fileno())
             self._file.close()
@@ -348,7 +348,7 @@ class UploadWriter:
             self.abort()
             return shared
         upload = replace(upload, format=guess(Path(self._file.name)), by=(by,) if by else ())
-        with _reported():
+        with _storage_errors():
             sync(self._folder / _CONTENT)
             _write_record(self._folder, upload)
             return self._publish(upload)
@@ -396,7 +396,7 @@ def _shared(settings: Settings, upload_id: str, by: str | None = None) -> Upload
         if upload is None or by is None or by in upload.by:
             return upload
         shared = replace(upload, by=(*upload.by, by))
-        with _reported():
+        with _storage_errors():
             _write_record(settings.uploads / upload_id, shared)
         return shared
 
@@ -414,7 +414,7 @@ def _remove(folder: Path) -> None:
 
 
 @contextmanager
-def _reported() -> Iterator[None]:
+def _storage_errors() -> Iterator[None]:
     try:
         yield
     except OSError as error:

@@ -10,6 +10,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.groups.edit import (
+    CompositeEdit,
     Edit,
     IncludeView,
     SetBalls,
@@ -18,7 +19,6 @@ from app.features.groups.edit import (
     SetPicture,
     SetStationCalibration,
     SetStationLines,
-    Several,
     StationEdit,
 )
 from app.features.groups.edit_codec import step_to_json
@@ -29,8 +29,12 @@ from app.features.groups.submit import current_etag, solved_in, submit
 from app.features.groups.view_paint import PaintFollower
 from app.features.groups.view_queries import groups_of_station, save_station
 from app.features.independent_annotations.copying import aligned
-from app.features.independent_annotations.queries import GOLD, Take, update_take
-from app.features.independent_annotations.service import get_take, read_take
+from app.features.independent_annotations.queries import (
+    GOLD,
+    IndependentAnnotation,
+    update_annotation,
+)
+from app.features.independent_annotations.service import get_annotation, read_annotation
 from app.features.independent_annotations.submission_queries import KIND
 from app.features.queue.queries import refresh_queue
 from app.features.verdicts.queries import (
@@ -42,7 +46,7 @@ from app.features.verdicts.queries import (
 from app.soccer.group import Group, Station
 
 
-def adopt_take(
+def adopt_annotation(
     store: Store,
     take_id: int,
     *,
@@ -61,24 +65,24 @@ def adopt_take(
         ConflictError: It is not handed in, was decided about, or is of a gold group.
         StaleRevisionError: Somebody changed the original at the same moment.
     """
-    take = get_take(store, take_id)
-    _require_ready(take)
+    annotation = get_annotation(store, take_id)
+    _require_ready(annotation)
     # First: what changes the original from here on is seen by the edit that builds on it.
-    etag = current_etag(store, take.group_id)
+    etag = current_etag(store, annotation.group_id)
     with store.read() as session:
-        copy = need_group(session, take.copy_id)
-        original = need_group(session, take.group_id)
+        copy = need_group(session, annotation.copy_id)
+        original = need_group(session, annotation.group_id)
     copy = replace(copy, group=aligned(original.group, copy.group))
-    edit = Several(tuple(edits_between(original.group, copy.group)))
+    edit = CompositeEdit(tuple(edits_between(original.group, copy.group)))
     after: list[GroupState] = []
 
     def settle(session: Session) -> None:
-        _require_ready(read_take(session, take_id))
-        _adopt_stations(session, original, copy, take.person)
-        give_verdict_of(session, take, actor=take.person)
+        _require_ready(read_annotation(session, take_id))
+        _adopt_stations(session, original, copy, annotation.person)
+        give_verdict_of(session, annotation, actor=annotation.person)
         at = now()
-        update_take(session, take_id, settled=at)
-        body = {"take": take_id, "person": take.person, "did": "adopted"}
+        update_annotation(session, take_id, settled=at)
+        body = {"take": take_id, "person": annotation.person, "did": "adopted"}
         append(session, [Entry(KIND, actor, at, body, original.dataset_id, original.id)])
         if also is not None:
             also(session)
@@ -89,10 +93,10 @@ def adopt_take(
     if edit.edits:
         submit(
             store,
-            take.group_id,
+            annotation.group_id,
             edit,
             if_match=etag,
-            actor=take.person,
+            actor=annotation.person,
             then=lambda session, _state: settle(session),
             paint=paint,
         )
@@ -116,8 +120,8 @@ def edits_between(before: Group, after: Group) -> Iterator[Edit]:
             yield SetBalls(view.key, own.balls)
         if (own.included, own.left_out) != (view.included, view.left_out):
             why = own.left_out
-            said = (None, None) if why is None else (why.reason, why.note)
-            yield IncludeView(view.key, own.included, *said)
+            reason = (None, None) if why is None else (why.reason, why.note)
+            yield IncludeView(view.key, own.included, *reason)
         if view.station.shared:
             continue
         lines = _line_changes(view.station, own.station)
@@ -149,12 +153,12 @@ def _line_changes(before: Station, after: Station) -> SetStationLines | None:
     return SetStationLines(changed, proposed, not_visible)
 
 
-def _require_ready(take: Take) -> None:
-    if take.kind == GOLD:
+def _require_ready(annotation: IndependentAnnotation) -> None:
+    if annotation.kind == GOLD:
         raise ConflictError("this is an annotation of a gold group, whose true values are known")
-    if take.handed_in is None:
-        raise ConflictError(f"{take.person} has not submitted this yet")
-    if take.settled is not None:
+    if annotation.handed_in is None:
+        raise ConflictError(f"{annotation.person} has not submitted this yet")
+    if annotation.settled is not None:
         raise ConflictError("this annotation was adjudicated already")
 
 
@@ -185,21 +189,23 @@ def _adopt_stations(
 
 
 def give_verdict_of(
-    session: Session, take: Take, *, actor: str, note: str | None = None
+    session: Session, annotation: IndependentAnnotation, *, actor: str, note: str | None = None
 ) -> StoredVerdict | None:
-    """Give the original the verdict of a take's copy, where there is one.
+    """Give the original the verdict of an independent annotation's copy, where there is one.
 
     Args:
         session: The write session that takes the take over; what waits for the verdict is told
             once the queue is refreshed.
-        take: The take.
+        annotation: The independent annotation.
         actor: Whose verdict it is.
         note: Its note, where that of the copy has none.
     """
-    given = next(iter(read_last_verdicts(session, [take.copy_id]).get(take.copy_id, ())), None)
-    if take.verdict is None or given is None:
+    given = next(
+        iter(read_last_verdicts(session, [annotation.copy_id]).get(annotation.copy_id, ())), None
+    )
+    if annotation.verdict is None or given is None:
         return None
-    after = need_group(session, take.group_id)
+    after = need_group(session, annotation.group_id)
     verdict = StoredVerdict(
         **{
             **vars(given),

@@ -34,7 +34,7 @@ _BACK = frozenset({"edit", "undo", "redo", "pitch", "position", "noise", PAINT})
 
 
 @dataclass(frozen=True)
-class CopyOrder:
+class CopyRequest:
     """A copy that is wanted: of what, for which batch, for whom, and how it is called.
 
     ``name`` None: as the original is.
@@ -46,7 +46,7 @@ class CopyOrder:
     name: str | None
 
 
-def copy_group(session: Session, order: CopyOrder, start: Group) -> int:
+def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     """Insert a copy of a group, as ``start`` has it, into its person's dataset; returns its id.
 
     Frames are named, not copied; lines, balls, given cameras, what is known of the match and what
@@ -73,7 +73,7 @@ def gold_start_of(session: Session, stored: StoredGroup) -> Group:
     return stored.group
 
 
-def stripped(group: Group, start: str) -> Group:
+def without_extras(group: Group, start: str) -> Group:
     """A group without what annotators of a batch with gold groups draw themselves.
 
     Every copy of such a batch is stripped alike, ordinary ones too: else what a copy begins with
@@ -171,7 +171,7 @@ def _renamed(group: Group, names: Mapping[str, str]) -> Group:
     )
 
 
-def _dataset_of(session: Session, order: CopyOrder) -> int:
+def _dataset_of(session: Session, order: CopyRequest) -> int:
     """Id of the dataset of somebody's copies, which the first of them makes."""
     stored = order.original
     copies = CopiesOf(stored.dataset_id, order.batch_id or 0, order.person)

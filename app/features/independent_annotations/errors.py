@@ -38,17 +38,19 @@ class DistanceFromTruth:
 
 
 def error_of(
-    truth: Group, said: Group, ball: Point3 | None, own: Point3 | None
+    truth: Group, annotated: Group, ball: Point3 | None, own: Point3 | None
 ) -> DistanceFromTruth:
     """The error of an annotation; views are those of the truth that the annotation has, too.
 
     Args:
         truth: What is true.
-        said: What somebody annotated; its views have the keys of the truth's.
+        annotated: What somebody annotated; its views have the keys of the truth's.
         ball: The true 3D ball, pitch frame, metres.
         own: The 3D ball of the annotation.
     """
-    pairs = [(view, other) for view in truth.views if (other := said.view(view.key)) is not None]
+    pairs = [
+        (view, other) for view in truth.views if (other := annotated.view(view.key)) is not None
+    ]
     lines = [distance for view, other in pairs for distance in _line_distances(view, other)]
     missing = sum(len({*view.station.lines} - {*other.station.lines}) for view, other in pairs)
     centers = [(_center(view), _center(other)) for view, other in pairs]
@@ -75,7 +77,7 @@ class TrueView:
 def world_error(
     truth: Group,
     views: Mapping[str, TrueView],
-    said: Group,
+    annotated: Group,
     ball: Point3,
     own: Point3 | None,
 ) -> DistanceFromTruth:
@@ -87,14 +89,14 @@ def world_error(
     Args:
         truth: The group with its usual annotation, which says what is to be drawn.
         views: The true views by key; others are not measured.
-        said: What somebody annotated; its views have the keys of the truth's.
+        annotated: What somebody annotated; its views have the keys of the truth's.
         ball: The true 3D ball, pitch frame, metres.
         own: The 3D ball of the annotation.
     """
     seen = [
         (view, other, views[view.key])
         for view in truth.views
-        if view.key in views and (other := said.view(view.key)) is not None
+        if view.key in views and (other := annotated.view(view.key)) is not None
     ]
     lines: list[float] = []
     for _, other, known in seen:

@@ -34,7 +34,12 @@ from app.features.independent_annotations.gold_queries import (
     start_gold,
     unmark_gold,
 )
-from app.features.independent_annotations.queries import GOLD, Take, is_copy, takes_in
+from app.features.independent_annotations.queries import (
+    GOLD,
+    IndependentAnnotation,
+    annotations_in,
+    is_copy,
+)
 from app.features.independent_annotations.submission_queries import submissions_of
 from app.features.solutions.service import known_calibrations
 from app.finite import Moment
@@ -101,7 +106,7 @@ class GoldResult:
 
 
 @dataclass(frozen=True)
-class Middle:
+class MedianInterval:
     """The median of some numbers with an interval of 95 %, which few numbers do not have."""
 
     count: int
@@ -120,9 +125,9 @@ class PersonResults:
 
     person: str
     results: tuple[GoldResult, ...]
-    line_px: Middle
-    ball_px: Middle
-    ball_m: Middle
+    line_px: MedianInterval
+    ball_px: MedianInterval
+    ball_m: MedianInterval
     judged: int
     right: int
     right_low: float | None
@@ -209,16 +214,22 @@ def read_report(store: Store, dataset: str | int) -> GoldReport:
     with store.read() as session:
         dataset_id = need_dataset(session, dataset)
         found: dict[str, list[GoldResult]] = {}
-        known = {row.group_id: _known(session, row) for row in gold_heads(session, dataset_id)}
-        takes = [one for one in takes_in(session, dataset_id, kind=GOLD) if one.group_id in known]
-        submitted = submissions_of(session, [take.copy_id for take in takes])
-        for take in takes:
-            made = submitted.get(take.copy_id, [])
-            if take.handed_in is None and not made:
+        known = {
+            row.group_id: _gold_with_truth(session, row) for row in gold_heads(session, dataset_id)
+        }
+        annotations = [
+            one for one in annotations_in(session, dataset_id, kind=GOLD) if one.group_id in known
+        ]
+        submitted = submissions_of(session, [annotation.copy_id for annotation in annotations])
+        for annotation in annotations:
+            made = submitted.get(annotation.copy_id, [])
+            if annotation.handed_in is None and not made:
                 continue
-            gold, truth = known[take.group_id]
-            result = _result(gold, truth, _first(session, take, made), max(len(made), 1))
-            found.setdefault(take.person, []).append(result)
+            gold, truth = known[annotation.group_id]
+            result = _result(
+                gold, truth, _first_submission(session, annotation, made), max(len(made), 1)
+            )
+            found.setdefault(annotation.person, []).append(result)
     people = tuple(_person(name, results) for name, results in sorted(found.items()))
     return GoldReport(tuple(gold for gold, _ in known.values()), people)
 
@@ -238,7 +249,7 @@ def wilson(right: int, of: int) -> tuple[float | None, float | None]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def middle_of(values: Sequence[float | None]) -> Middle:
+def median_interval(values: Sequence[float | None]) -> MedianInterval:
     """The median of the numbers among some values, with the interval between two of them that
     holds the true median in 95 of 100 cases, whatever the distribution.
 
@@ -249,11 +260,11 @@ def middle_of(values: Sequence[float | None]) -> Middle:
     known = sorted(value for value in values if value is not None)
     count = len(known)
     if count == 0:
-        return Middle(0, None, None, None)
+        return MedianInterval(0, None, None, None)
     half = count // 2
     median = known[half] if count % 2 else (known[half - 1] + known[half]) / 2
     if count < _FEW:
-        return Middle(count, median, None, None)
+        return MedianInterval(count, median, None, None)
     # The largest rank of which the binomial tail (n, 1/2) on either side is at most 2.5 %.
     tail, rank = 0.0, 0
     for k in range(count):
@@ -261,7 +272,7 @@ def middle_of(values: Sequence[float | None]) -> Middle:
         if tail > 0.025:
             break
         rank = k + 1
-    return Middle(count, median, known[rank - 1], known[count - rank])
+    return MedianInterval(count, median, known[rank - 1], known[count - rank])
 
 
 def check_start(start: str) -> None:
@@ -279,15 +290,15 @@ def _truth(state: GroupState) -> Json:
     }
 
 
-def _known(session: Session, row: Any) -> tuple[GoldGroup, Json]:
+def _gold_with_truth(session: Session, row: Any) -> tuple[GoldGroup, Json]:
     """A gold group, and what is true of it."""
-    truth, said = gold_truth(session, row.group_id) or {}, row._mapping
+    truth, fields = gold_truth(session, row.group_id) or {}, row._mapping
     gold = GoldGroup(
-        said["group_id"],
-        said["label"] or said["key"],
-        said["start"],
-        said["marked"],
-        said["marked_by"],
+        fields["group_id"],
+        fields["label"] or fields["key"],
+        fields["start"],
+        fields["marked"],
+        fields["marked_by"],
         TruthSource(truth.get("source", TruthSource.VERDICT)),
     )
     return gold, truth
@@ -300,7 +311,7 @@ def _need_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
         raise NotFoundError.group(group_id)
     if row is None:
         raise NotFoundError(f"group {group_id} is no gold group")
-    return row.dataset_id, _known(session, row)[0]
+    return row.dataset_id, _gold_with_truth(session, row)[0]
 
 
 @dataclass(frozen=True)
@@ -313,15 +324,17 @@ class _Submission:
     solution: Solution | None
 
 
-def _first(session: Session, take: Take, made: Sequence[Mapping[str, Any]]) -> _Submission:
+def _first_submission(
+    session: Session, annotation: IndependentAnnotation, made: Sequence[Mapping[str, Any]]
+) -> _Submission:
     """What somebody submitted first of a copy; as the copy is now where no entry holds it."""
-    (state,) = read_states(session, [take.copy_id])
+    (state,) = read_states(session, [annotation.copy_id])
     if not made:
         # Whoever has submitted nothing of it has handed it in.
-        assert take.handed_in is not None
-        return _Submission(take.handed_in, take.verdict, state.group, state.solution)
+        assert annotation.handed_in is not None
+        return _Submission(annotation.handed_in, annotation.verdict, state.group, state.solution)
     first = made[0]
-    stored = need_group(session, take.copy_id)
+    stored = need_group(session, annotation.copy_id)
     if first["inputs_hash"] == stored.inputs_hash:
         return _Submission(first["at"], first["verdict"], state.group, state.solution)
     group = group_from_json(first["submitted"])
@@ -329,13 +342,13 @@ def _first(session: Session, take: Take, made: Sequence[Mapping[str, Any]]) -> _
     return _Submission(first["at"], first["verdict"], group, solve(group, state.policy, known))
 
 
-def _result(gold: GoldGroup, truth: Json, said: _Submission, submissions: int) -> GoldResult:
+def _result(gold: GoldGroup, truth: Json, submission: _Submission, submissions: int) -> GoldResult:
     group = group_from_json(truth["group"])
-    solution = said.solution
+    solution = submission.solution
     own = None if solution is None or solution.ball is None else solution.ball.point
     ball = None if truth["ball"] is None else tuple(truth["ball"])
-    verdict, judged = said.verdict, truth["verdict"] in JUDGED
-    annotated = aligned(group, said.group)
+    verdict, judged = submission.verdict, truth["verdict"] in JUDGED
+    annotated = aligned(group, submission.group)
     if ball is not None and "views" in truth:
         error = world_error(group, true_views(truth), annotated, ball, own)
     else:
@@ -343,7 +356,7 @@ def _result(gold: GoldGroup, truth: Json, said: _Submission, submissions: int) -
     return GoldResult(
         group=gold.group,
         label=gold.label,
-        handed_in=said.at,
+        handed_in=submission.at,
         verdict=verdict,
         true_verdict=truth["verdict"],
         right=verdict == truth["verdict"] if judged and verdict in JUDGED else None,
@@ -367,9 +380,9 @@ def _person(name: str, results: list[GoldResult]) -> PersonResults:
     return PersonResults(
         person=name,
         results=tuple(results),
-        line_px=middle_of([one.error.line_px for one in results]),
-        ball_px=middle_of([one.error.ball_px for one in results]),
-        ball_m=middle_of([one.error.ball_m for one in results]),
+        line_px=median_interval([one.error.line_px for one in results]),
+        ball_px=median_interval([one.error.ball_px for one in results]),
+        ball_m=median_interval([one.error.ball_m for one in results]),
         judged=len(judged),
         right=sum(judged),
         right_low=low,

@@ -11,7 +11,7 @@ from app.db.dialects.statements import insert
 from app.db.json_columns import Json, pack, unpack
 from app.db.session import Session, now
 from app.features.datasets.tables import GroupModel
-from app.features.independent_annotations.tables import GoldModel, TakeModel
+from app.features.independent_annotations.tables import GoldModel, IndependentAnnotationModel
 from app.soccer.choices import GoldStart
 
 IMPORTED = "imported"
@@ -83,7 +83,9 @@ def gold_truth(session: Session, group_id: int) -> Json | None:
 
 def fresh_gold(session: Session, dataset_id: int, person: str) -> list[int]:
     """Ids of the gold groups of a dataset of which a person has had no copy yet."""
-    had = select(TakeModel.group_id).where(TakeModel.person == person)
+    had = select(IndependentAnnotationModel.group_id).where(
+        IndependentAnnotationModel.person == person
+    )
     mine = GoldModel.dataset_id == dataset_id
     statement = select(GoldModel.group_id).where(mine, GoldModel.group_id.not_in(had))
     return list(session.scalars(statement.order_by(GoldModel.group_id)))

@@ -27,9 +27,9 @@ from app.features.independent_annotations.gold_queries import fresh_gold, mark_g
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
-    Take,
+    IndependentAnnotation,
+    annotations_of_batch,
     is_copy,
-    takes_of_batch,
 )
 from app.features.independent_annotations.service import begin
 from app.features.queue.listing_queries import Listing
@@ -70,7 +70,7 @@ class GoldChoice:
 
 
 @dataclass(frozen=True)
-class GoldChosen:
+class GoldChoiceResult:
     """What came of it: groups that are gold by now, and how many of those asked for are not.
 
     Attributes:
@@ -82,7 +82,9 @@ class GoldChosen:
     left_out: int
 
 
-def mark_known(store: Store, dataset: str | int, choice: GoldChoice, *, actor: str) -> GoldChosen:
+def mark_known(
+    store: Store, dataset: str | int, choice: GoldChoice, *, actor: str
+) -> GoldChoiceResult:
     """Make gold groups of those whose truth is known, also while batches are under way.
 
     Of a sample those are left out whose pictures do not show one moment, or were taken from one
@@ -99,14 +101,14 @@ def mark_known(store: Store, dataset: str | int, choice: GoldChoice, *, actor: s
     with store.read() as session:
         if is_copy(session, number):
             raise ConflictError("a person's own annotation cannot be a gold group")
-        asked = Listing(session, number, query.conditions).ids(query.order)
-        found = _of_sample(session, asked)
+        ids = Listing(session, number, query.conditions).ids(query.order)
+        found = _of_sample(session, ids)
         if version is not None:
-            found = _of_version(session, asked, version)
+            found = _of_version(session, ids, version)
         truths = dict(islice(found, choice.size))
     if not truths:
         raise _nothing(choice.source)
-    chosen = GoldChosen(tuple(truths), len(asked) - len(truths))
+    chosen = GoldChoiceResult(tuple(truths), len(ids) - len(truths))
     with store.write() as session:
         for group_id, truth in truths.items():
             mark_gold(session, group_id, number, choice.start, truth, actor)
@@ -159,12 +161,12 @@ def _sample_truth(group: Group, truth: SceneTruth) -> Json:
         center = view.camera.project(np.array([view.ball]))[0]
         views[view.view] = {"camera": camera_to_json(view.camera), "center": [*map(float, center)]}
     # Whether a group is good enough is a question to the policy, which no scene answers.
-    said = {
+    values = {
         "group": group_to_json(group),
         "verdict": "unreviewed",
         "source": str(TruthSource.SAMPLE),
     }
-    return {**said, "ball": [*truth.ball], "views": views}
+    return {**values, "ball": [*truth.ball], "views": views}
 
 
 def _version(store: Store, dataset: str | int, choice: GoldChoice) -> Version | None:
@@ -179,12 +181,12 @@ def _version(store: Store, dataset: str | int, choice: GoldChoice) -> Version | 
 
 
 def _of_version(
-    session: Session, asked: Sequence[int], version: Version
+    session: Session, group_ids: Sequence[int], version: Version
 ) -> Iterator[tuple[int, Json]]:
     """Truths of groups that a version holds, and upon which people agreed or somebody decided."""
     ids: dict[str, int] = {}
-    for start in range(0, len(asked), BATCH):
-        states = states_of(session, asked[start : start + BATCH])
+    for start in range(0, len(group_ids), BATCH):
+        states = states_of(session, group_ids[start : start + BATCH])
         settled = [group for group, state in states.items() if state in (AGREED, DECIDED)]
         ids |= {one.group.key: group for group, one in read_groups(session, settled).items()}
     for row in read_rows(session, version.id, members=True):
@@ -192,8 +194,8 @@ def _of_version(
             continue
         (frozen,) = thaw(session, version, [row])
         verdict = (row.verdict or {}).get("state", "unreviewed")
-        said = {"group": group_to_json(frozen.group), "verdict": verdict, "ball": [*row.ball]}
-        yield ids[row.key], {**said, "source": str(TruthSource.VERSION)}
+        values = {"group": group_to_json(frozen.group), "verdict": verdict, "ball": [*row.ball]}
+        yield ids[row.key], {**values, "source": str(TruthSource.VERSION)}
 
 
 def _nothing(source: TruthSource) -> InputError:
@@ -236,8 +238,8 @@ class Terms:
 
 def begin_next(
     store: Store, terms: Terms, *, person: str, chance: Random | None = None
-) -> Take | None:
-    """The take that a person shall work on now: the one that is open, else a new one.
+) -> IndependentAnnotation | None:
+    """The independent annotation that a person shall work on now: the one that is open, else a new one.
 
     New are groups that they have no take of and that fewer than ``verdicts`` people have, in the
     batch's order; where gold groups are mixed in by chance, lest an order that is known tells which
@@ -254,24 +256,26 @@ def begin_next(
         None where there is nothing left for them.
     """
     with store.write() as session:
-        take = _next(session, terms, person_of(person), chance or SystemRandom())
-    if take is not None:
-        solved(store, take.copy_id)
-    return take
+        annotation = _next(session, terms, person_of(person), chance or SystemRandom())
+    if annotation is not None:
+        solved(store, annotation.copy_id)
+    return annotation
 
 
-def _next(session: Session, terms: Terms, person: str, chance: Random) -> Take | None:
-    takes = takes_of_batch(session, terms.batch_id, terms.dataset_id)
-    mine = [take for take in takes if take.person == person]
-    waiting = next((take for take in mine if take.handed_in is None), None)
+def _next(
+    session: Session, terms: Terms, person: str, chance: Random
+) -> IndependentAnnotation | None:
+    annotations = annotations_of_batch(session, terms.batch_id, terms.dataset_id)
+    mine = [annotation for annotation in annotations if annotation.person == person]
+    waiting = next((annotation for annotation in mine if annotation.handed_in is None), None)
     if waiting is not None:
         return waiting
-    begun = Counter(row.group_id for row in takes if row.kind == INDEPENDENT)
-    had = {take.group_id for take in mine}
+    begun = Counter(row.group_id for row in annotations if row.kind == INDEPENDENT)
+    had = {annotation.group_id for annotation in mine}
     free = [one for one in terms.groups if one not in had and begun[one] < terms.verdicts]
     kind, choice = INDEPENDENT, free if terms.gold_every else free[:1]
     if terms.gold_every and is_gold_turn(
-        [take.kind for take in mine], terms.gold_every, len(free), chance
+        [annotation.kind for annotation in mine], terms.gold_every, len(free), chance
     ):
         fresh = fresh_outside(session, terms.dataset_id, person, terms.groups)
         kind, choice = (GOLD, fresh) if fresh else (kind, choice)
@@ -299,13 +303,13 @@ def fresh_outside(
 
 
 def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) -> bool:
-    """Whether the take after these is a gold one: one of each ``every``, at a place by chance.
+    """Whether the independent annotation after these is a gold one: one of each ``every``, at a place by chance.
 
     The last ones of a batch, which may be fewer, have one among them, too: the last take is a gold
     one as often as any other.
 
     Args:
-        kinds: Of the takes of a person so far, in order.
+        kinds: Of the independent annotations of a person so far, in order.
         every: How many takes have one gold group among them.
         free: How many ordinary groups there are left for them.
         chance: Decides where.
@@ -317,11 +321,11 @@ def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) ->
 
 
 def count_gold_left(kinds: Sequence[str], every: int, free: int, fresh: int) -> int:
-    """How many gold takes are still to come, by ``is_gold_turn``: what is left for somebody counts
-    them, so that it falls by one with each take, whatever it is of.
+    """How many gold independent annotations are still to come, by ``is_gold_turn``: what is left for somebody counts
+    them, so that it falls by one with each independent annotation, whatever it is of.
 
     Args:
-        kinds: Of the takes of a person so far, in order.
+        kinds: Of the independent annotations of a person so far, in order.
         every: How many takes have one gold group among them.
         free: How many ordinary groups there are left for them.
         fresh: How many gold groups they never had.

@@ -13,19 +13,22 @@ from app.db.session import Session, now
 from app.features.batches.tables import BatchGroupModel
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.groups.insert_queries import next_id
-from app.features.independent_annotations.tables import CopyDatasetModel, TakeModel
+from app.features.independent_annotations.tables import CopyDatasetModel, IndependentAnnotationModel
 from app.features.queue.tables import QueueModel
 
 GOLD = "gold"
 INDEPENDENT = "independent"
-_TAKES = select(*TakeModel.__table__.columns)
+_ANNOTATIONS = select(*IndependentAnnotationModel.__table__.columns)
 # What somebody made of a gold group tells nothing of its own: nobody is to know which one it is.
-_READY = (TakeModel.kind == INDEPENDENT, TakeModel.handed_in.is_not(None))
-_OF_COPY = _TAKES.where(TakeModel.copy_id == bindparam("copy"))
+_READY = (
+    IndependentAnnotationModel.kind == INDEPENDENT,
+    IndependentAnnotationModel.handed_in.is_not(None),
+)
+_OF_COPY = _ANNOTATIONS.where(IndependentAnnotationModel.copy_id == bindparam("copy"))
 
 
 @dataclass(frozen=True)
-class Take:
+class IndependentAnnotation:
     """A person's own annotation of a group.
 
     Attributes:
@@ -52,11 +55,11 @@ class Take:
 
 def _takes(
     session: Session, statement: Select[*tuple[Any, ...]], values: dict[str, Any] | None = None
-) -> list[Take]:
-    return [Take(**row._mapping) for row in session.execute(statement, values)]
+) -> list[IndependentAnnotation]:
+    return [IndependentAnnotation(**row._mapping) for row in session.execute(statement, values)]
 
 
-def insert_take(
+def insert_annotation(
     session: Session,
     *,
     batch_id: int | None,
@@ -66,44 +69,55 @@ def insert_take(
     kind: str,
     place: int,
 ) -> int:
-    """Insert a take that begins now; returns its id."""
-    identity = next_id(session, TakeModel)
+    """Insert an independent annotation that begins now; returns its id."""
+    identity = next_id(session, IndependentAnnotationModel)
     values = {"batch_id": batch_id, "group_id": group_id, "copy_id": copy_id, "person": person}
     ends = dict.fromkeys(("handed_in", "verdict", "settled"))
     row = {"id": identity, **values, "kind": kind, "place": place, "begun": now(), **ends}
-    session.execute(insert(TakeModel), [row])
+    session.execute(insert(IndependentAnnotationModel), [row])
     return identity
 
 
-def find_take(session: Session, take_id: int) -> Take | None:
+def find_annotation(session: Session, take_id: int) -> IndependentAnnotation | None:
     """A take by its id."""
-    return next(iter(_takes(session, _TAKES.where(TakeModel.id == take_id))), None)
+    return next(
+        iter(_takes(session, _ANNOTATIONS.where(IndependentAnnotationModel.id == take_id))), None
+    )
 
 
-def take_of_copy(session: Session, copy_id: int) -> Take | None:
+def annotation_of_copy(session: Session, copy_id: int) -> IndependentAnnotation | None:
     """The take whose copy a group is; None for an ordinary group."""
     return next(iter(_takes(session, _OF_COPY, {"copy": copy_id})), None)
 
 
 def closed_copies(session: Session, dataset_id: int) -> set[int]:
     """Ids of the copies in a dataset that were handed in or settled: nothing in them changes."""
-    closed = or_(TakeModel.handed_in.is_not(None), TakeModel.settled.is_not(None))
-    statement = select(TakeModel.copy_id).join(GroupModel, GroupModel.id == TakeModel.copy_id)
+    closed = or_(
+        IndependentAnnotationModel.handed_in.is_not(None),
+        IndependentAnnotationModel.settled.is_not(None),
+    )
+    statement = select(IndependentAnnotationModel.copy_id).join(
+        GroupModel, GroupModel.id == IndependentAnnotationModel.copy_id
+    )
     return set(session.scalars(statement.where(GroupModel.dataset_id == dataset_id, closed)))
 
 
-def takes_of_group(session: Session, group_id: int) -> list[Take]:
+def annotations_of_group(session: Session, group_id: int) -> list[IndependentAnnotation]:
     """The takes of a group in the order in which they began."""
-    mine = TakeModel.group_id == group_id
-    return _takes(session, _TAKES.where(mine).order_by(TakeModel.id))
+    mine = IndependentAnnotationModel.group_id == group_id
+    return _takes(session, _ANNOTATIONS.where(mine).order_by(IndependentAnnotationModel.id))
 
 
-def takes_of_batch(session: Session, batch_id: int | None, dataset_id: int) -> list[Take]:
+def annotations_of_batch(
+    session: Session, batch_id: int | None, dataset_id: int
+) -> list[IndependentAnnotation]:
     """The takes of a batch (None: of none) of a dataset, in the order in which they began."""
-    batch = TakeModel.batch_id
+    batch = IndependentAnnotationModel.batch_id
     mine = batch.is_(None) if batch_id is None else batch == batch_id
-    statement = _TAKES.where(mine, TakeModel.copy_id.in_(_copies_of(dataset_id)))
-    return _takes(session, statement.order_by(TakeModel.id))
+    statement = _ANNOTATIONS.where(
+        mine, IndependentAnnotationModel.copy_id.in_(_copies_of(dataset_id))
+    )
+    return _takes(session, statement.order_by(IndependentAnnotationModel.id))
 
 
 def count_left(
@@ -113,19 +127,21 @@ def count_left(
 
     ``verdicts`` people may have a group.
     """
-    take, group = TakeModel, BatchGroupModel
-    here = (take.batch_id == batch_id, take.copy_id.in_(_copies_of(dataset_id)))
-    mine, this = take.person == person, take.group_id == group.group_id
-    ends = (take.handed_in.is_(None), take.settled.is_(None))
-    asked = select(func.count()).where(*here, this, take.kind == INDEPENDENT).scalar_subquery()
+    annotation, group = IndependentAnnotationModel, BatchGroupModel
+    here = (annotation.batch_id == batch_id, annotation.copy_id.in_(_copies_of(dataset_id)))
+    mine, this = annotation.person == person, annotation.group_id == group.group_id
+    ends = (annotation.handed_in.is_(None), annotation.settled.is_(None))
+    begun_by_others = (
+        select(func.count()).where(*here, this, annotation.kind == INDEPENDENT).scalar_subquery()
+    )
     free = select(func.count()).where(
         group.batch_id == batch_id,
         group.settled.is_(None),
         group.handed_in.is_(None),
         ~exists().where(*here, this, mine),
-        asked < verdicts,
+        begun_by_others < verdicts,
     )
-    begun = select(func.count()).select_from(take).where(*here, mine, *ends)
+    begun = select(func.count()).select_from(annotation).where(*here, mine, *ends)
     return session.scalar(begun) or 0, session.scalar(free) or 0
 
 
@@ -137,44 +153,57 @@ def _copies_of(dataset_id: int) -> Select[int]:
     )
 
 
-def groups_with_takes(
+def groups_with_annotations(
     compare: Callable[[Any, float], Any] | None = None, number: float = 0
 ) -> Select[int]:
     """Ids of groups of which somebody handed in an annotation of their own, or so many people did."""
-    statement = select(TakeModel.group_id).where(*_READY).group_by(TakeModel.group_id)
+    statement = (
+        select(IndependentAnnotationModel.group_id)
+        .where(*_READY)
+        .group_by(IndependentAnnotationModel.group_id)
+    )
     return statement if compare is None else statement.having(compare(func.count(), number))
 
 
-def count_handed_in(session: Session, group_ids: Sequence[int]) -> dict[int, int]:
+def count_submitted(session: Session, group_ids: Sequence[int]) -> dict[int, int]:
     """How many people handed in an annotation of their own, by group; groups without are left out."""
-    statement = select(TakeModel.group_id, func.count()).where(*_READY)
+    statement = select(IndependentAnnotationModel.group_id, func.count()).where(*_READY)
     rows = session.execute(
-        statement.where(TakeModel.group_id.in_(group_ids)).group_by(TakeModel.group_id)
+        statement.where(IndependentAnnotationModel.group_id.in_(group_ids)).group_by(
+            IndependentAnnotationModel.group_id
+        )
     )
     return {row[0]: row[1] for row in rows}
 
 
-def open_takes(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
+def open_annotations(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
     """Rows (batch_id, group_id) of the copies in batches that somebody has begun and not handed in."""
-    mine = (TakeModel.person == person, TakeModel.handed_in.is_(None), TakeModel.settled.is_(None))
-    columns = (TakeModel.batch_id, TakeModel.copy_id.label("group_id"))
-    statement = select(*columns).where(TakeModel.batch_id.in_(batch_ids), *mine)
-    return session.execute(statement.order_by(TakeModel.id)).all()
-
-
-def takes_in(
-    session: Session, dataset_id: int, person: str | None = None, kind: str | None = None
-) -> list[Take]:
-    """The takes of a dataset, of one person or one kind where these are named, oldest first."""
-    statement = _TAKES.join(GroupModel, GroupModel.id == TakeModel.copy_id).join(
-        CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id
+    mine = (
+        IndependentAnnotationModel.person == person,
+        IndependentAnnotationModel.handed_in.is_(None),
+        IndependentAnnotationModel.settled.is_(None),
     )
+    columns = (
+        IndependentAnnotationModel.batch_id,
+        IndependentAnnotationModel.copy_id.label("group_id"),
+    )
+    statement = select(*columns).where(IndependentAnnotationModel.batch_id.in_(batch_ids), *mine)
+    return session.execute(statement.order_by(IndependentAnnotationModel.id)).all()
+
+
+def annotations_in(
+    session: Session, dataset_id: int, person: str | None = None, kind: str | None = None
+) -> list[IndependentAnnotation]:
+    """The takes of a dataset, of one person or one kind where these are named, oldest first."""
+    statement = _ANNOTATIONS.join(
+        GroupModel, GroupModel.id == IndependentAnnotationModel.copy_id
+    ).join(CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id)
     where = [CopyDatasetModel.of_id == dataset_id]
     if person is not None:
-        where.append(TakeModel.person == person)
+        where.append(IndependentAnnotationModel.person == person)
     if kind is not None:
-        where.append(TakeModel.kind == kind)
-    return _takes(session, statement.where(*where).order_by(TakeModel.id))
+        where.append(IndependentAnnotationModel.kind == kind)
+    return _takes(session, statement.where(*where).order_by(IndependentAnnotationModel.id))
 
 
 def names_of(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
@@ -193,24 +222,28 @@ def names_of(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
             QueueModel.number,
         )
         .join(CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id)
-        .join(TakeModel, TakeModel.copy_id == GroupModel.id)
-        .join(original, original.id == TakeModel.group_id)
+        .join(IndependentAnnotationModel, IndependentAnnotationModel.copy_id == GroupModel.id)
+        .join(original, original.id == IndependentAnnotationModel.group_id)
         .join(QueueModel, QueueModel.group_id == original.id)
     )
     return session.execute(statement.where(GroupModel.id.in_(copy_ids))).all()
 
 
-def count_takes(session: Session, batch_id: int | None, person: str) -> int:
+def count_annotations(session: Session, batch_id: int | None, person: str) -> int:
     """How many takes a person has begun in a batch."""
-    batch = TakeModel.batch_id
+    batch = IndependentAnnotationModel.batch_id
     mine = batch.is_(None) if batch_id is None else batch == batch_id
-    statement = select(func.count()).where(mine, TakeModel.person == person)
+    statement = select(func.count()).where(mine, IndependentAnnotationModel.person == person)
     return session.scalar(statement) or 0
 
 
-def update_take(session: Session, take_id: int, **values: str | None) -> None:
-    """Write when a take was handed in, judged or settled."""
-    session.execute(update(TakeModel).where(TakeModel.id == take_id).values(**values))
+def update_annotation(session: Session, take_id: int, **values: str | None) -> None:
+    """Write when an independent annotation was handed in, judged or settled."""
+    session.execute(
+        update(IndependentAnnotationModel)
+        .where(IndependentAnnotationModel.id == take_id)
+        .values(**values)
+    )
 
 
 _COPIES = select(*CopyDatasetModel.__table__.columns, DatasetModel.name).join(

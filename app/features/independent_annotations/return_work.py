@@ -8,11 +8,11 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.groups.queries import StoredGroup
 from app.features.groups.state import need_group
-from app.features.independent_annotations.queries import take_of_copy
-from app.features.independent_annotations.service import TakeView, read_take, show
+from app.features.independent_annotations.queries import annotation_of_copy
+from app.features.independent_annotations.service import DisclosedAnnotation, read_annotation, show
 from app.features.independent_annotations.submission_queries import KIND, RETURNED, return_copy
-from app.features.notifications.queries import RingKind
-from app.features.notifications.service import tell
+from app.features.notifications.queries import NotificationKind
+from app.features.notifications.service import notify
 from app.features.webhooks.queries import HANDED_BACK, announce, stamp
 from app.soccer.actors import person_of
 
@@ -20,7 +20,9 @@ MAX_REASON = 500
 """Letters of the sentence that says why."""
 
 
-def hand_back_take(store: Store, take_id: int, reason: str = "", *, actor: str) -> TakeView:
+def return_annotation(
+    store: Store, take_id: int, reason: str = "", *, actor: str
+) -> DisclosedAnnotation:
     """Let the person of an annotation that was handed in go on with it, and tell them why.
 
     A comparison of it that waits for a decision waits no longer: it is made anew once it is handed
@@ -31,24 +33,26 @@ def hand_back_take(store: Store, take_id: int, reason: str = "", *, actor: str) 
         ConflictError: It is not handed in, or it was decided about.
         InputError: There is no sentence, or it is too long.
     """
-    said = checked_reason(reason)
-    if not said:
+    checked = checked_reason(reason)
+    if not checked:
         raise InputError(
             "an annotation goes back with a reason",
             hint="Say in a sentence what its person shall change.",
             pointer="/reason",
         )
     with store.write() as session:
-        take = read_take(session, take_id)
-        return_copy(session, take)
-        copy = take.copy_id
-        note_hand_back(session, KIND, copy, take.person, said, actor=actor, batch=take.batch_id)
-        back = show(session, read_take(session, take_id))
+        annotation = read_annotation(session, take_id)
+        return_copy(session, annotation)
+        copy = annotation.copy_id
+        log_return(
+            session, KIND, copy, annotation.person, checked, actor=actor, batch=annotation.batch_id
+        )
+        back = show(session, read_annotation(session, take_id))
         session.respond(back)
         return back
 
 
-def note_hand_back(
+def log_return(
     session: Session,
     kind: str,
     group_id: int,
@@ -80,8 +84,8 @@ def note_hand_back(
     _announce(session, group, person, actor=actor, at=at, batch=batch)
     why = f": {reason}" if reason else ""
     walk = "" if batch is None else f"?q=batch%3A{batch}"
-    tell(
-        session, person, RingKind.RETURNED, f"{person_of(actor)} returned {group.group.label or group.group.key} to you{why}",
+    notify(
+        session, person, NotificationKind.RETURNED, f"{person_of(actor)} returned {group.group.label or group.group.key} to you{why}",
         actor=actor, address=f"/review/{group_id}{walk}", dataset_id=group.dataset_id, group_id=group_id,
     )  # fmt: skip
 
@@ -90,18 +94,18 @@ def _announce(
     session: Session, group: StoredGroup, person: str, *, actor: str, at: str, batch: int | None
 ) -> None:
     """Tell webhooks of the dataset, for a copy of the one that it is of."""
-    row = take_of_copy(session, group.id)
-    where, told = group.dataset_id, {"group": group.id, "person": person}
+    row = annotation_of_copy(session, group.id)
+    where, details = group.dataset_id, {"group": group.id, "person": person}
     if row is not None:
         where = need_group(session, row.group_id).dataset_id
-        told = {"group": row.group_id, "person": person, "copy": group.id}
+        details = {"group": row.group_id, "person": person, "copy": group.id}
     event = f"group{group.id}_handed_back{stamp(at)}"
-    announce(session, where, HANDED_BACK, event, actor=actor, at=at, batch_id=batch, also=told)
+    announce(session, where, HANDED_BACK, event, actor=actor, at=at, batch_id=batch, also=details)
 
 
 def checked_reason(reason: str) -> str:
     """The sentence without blanks around it; raises InputError where it is too long."""
-    said = " ".join(reason.split())
-    if len(said) > MAX_REASON:
+    text = " ".join(reason.split())
+    if len(text) > MAX_REASON:
         raise InputError(f"the reason has at most {MAX_REASON} letters", pointer="/reason")
-    return said
+    return text

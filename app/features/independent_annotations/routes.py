@@ -4,24 +4,28 @@ from __future__ import annotations
 
 from fastapi import APIRouter, BackgroundTasks, Request, Response
 
-from app.features.agreement.adjudicate import take_over
-from app.features.agreement.service import after_hand_in
+from app.features.agreement.adjudicate import adopt_into_group
+from app.features.agreement.service import after_submission
 from app.features.groups.routes import ETAG, group_answer
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.independent_annotations import gold
 from app.features.independent_annotations import service as takes
 from app.features.independent_annotations.gold import GoldGroup
-from app.features.independent_annotations.known_truth import GoldChoice, GoldChosen, mark_known
-from app.features.independent_annotations.return_work import hand_back_take
+from app.features.independent_annotations.known_truth import (
+    GoldChoice,
+    GoldChoiceResult,
+    mark_known,
+)
+from app.features.independent_annotations.return_work import return_annotation
 from app.features.independent_annotations.schemas import (
     GoldChoiceDocument,
     GoldEdit,
     GoldReportDocument,
-    HandBack,
-    TakeList,
+    IndependentAnnotationList,
+    ReturnReason,
 )
-from app.features.independent_annotations.service import TakeView
+from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.people.roles import lets
 from app.http.access import login_of
 from app.http.cursor import paged
@@ -32,92 +36,101 @@ from app.http.request_limits import LOOKS, limit
 from app.http.respond import document, responds
 from app.http.route import Route
 
-takes_router = APIRouter(tags=["takes"], route_class=Route)
+annotations_router = APIRouter(tags=["independent annotations"], route_class=Route)
 
 
-@takes_router.get("/datasets/{dataset}/takes", operation_id="listTakes", responses=responses(404))
+@annotations_router.get(
+    "/datasets/{dataset}/independent-annotations",
+    operation_id="listIndependentAnnotations",
+    responses=responses(404),
+)
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
-def list_takes(dataset: DatasetPath, store: AppStore, request: Request, actor: Actor) -> TakeList:
+def list_independent_annotations(
+    dataset: DatasetPath, store: AppStore, request: Request, actor: Actor
+) -> IndependentAnnotationList:
     """Own annotations of a dataset's groups: for a lead everybody's, else those of whoever asks."""
     login = login_of(request.scope)
-    found = takes.list_takes(
+    found = takes.list_annotations(
         store,
         dataset,
         lambda dataset_id: login is None or lets(login.roles.role_in(dataset_id), Action.LEAD),
         person=actor,
     )
-    return TakeList(items=found)
+    return IndependentAnnotationList(items=found)
 
 
-def _begun(take: TakeView) -> Response:
+def _begun(take: DisclosedAnnotation) -> Response:
     return document(take, 201)
 
 
-@takes_router.post(
-    "/groups/{group}/takes",
-    operation_id="beginTake",
-    response_model=TakeView,
+@annotations_router.post(
+    "/groups/{group}/independent-annotations",
+    operation_id="beginIndependentAnnotation",
+    response_model=DisclosedAnnotation,
     status_code=201,
     responses=responses(404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(_begun)
-def begin(group: Id, store: AppStore, actor: Actor) -> takes.TakeView:
+def begin(group: Id, store: AppStore, actor: Actor) -> takes.DisclosedAnnotation:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
-    return takes.begin_take(store, group, person=actor)
+    return takes.begin_annotation(store, group, person=actor)
 
 
-@takes_router.get(
-    "/groups/{group}/take",
-    operation_id="getTake",
-    response_model=TakeView,
+@annotations_router.get(
+    "/groups/{group}/independent-annotation",
+    operation_id="getIndependentAnnotation",
+    response_model=DisclosedAnnotation,
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(LOOKS)
-def get_take(group: Id, store: AppStore) -> takes.TakeView:
+def get_independent_annotation(group: Id, store: AppStore) -> takes.DisclosedAnnotation:
     """Whose own annotation a group is; 404 for an ordinary group."""
-    return takes.shown(store, takes.get_take_of(store, group))
+    return takes.shown(store, takes.get_annotation_of_copy(store, group))
 
 
-@takes_router.post(
-    "/groups/{group}/hand-in",
-    operation_id="handInTake",
-    response_model=TakeView,
+@annotations_router.post(
+    "/groups/{group}/submission",
+    operation_id="submitIndependentAnnotation",
+    response_model=DisclosedAnnotation,
     responses=responses(403, 404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(document)
 def hand_in(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
-) -> takes.TakeView:
+) -> takes.DisclosedAnnotation:
     """Submit an independent annotation; a verdict on it does the same. Only a lead can return it."""
     store = services.store
-    take = takes.get_take_of(store, group)
-    background.add_task(after_hand_in, store, group, services.paint)
-    return takes.hand_in(store, take.id, actor=actor)
+    annotation = takes.get_annotation_of_copy(store, group)
+    background.add_task(after_submission, store, group, services.paint)
+    return takes.submit_annotation(store, annotation.id, actor=actor)
 
 
-@takes_router.post(
-    "/groups/{group}/hand-back",
-    operation_id="handBackTake",
-    response_model=TakeView,
+@annotations_router.post(
+    "/groups/{group}/return",
+    operation_id="returnIndependentAnnotation",
+    response_model=DisclosedAnnotation,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @responds(document)
 def hand_back(
-    group: Id, store: AppStore, actor: Actor, why: HandBack | None = None
-) -> takes.TakeView:
+    group: Id, store: AppStore, actor: Actor, why: ReturnReason | None = None
+) -> takes.DisclosedAnnotation:
     """Let the person of an annotation that was handed in go on with it, and tell them why."""
-    take, reason = takes.get_take_of(store, group), "" if why is None else why.reason
-    return hand_back_take(store, take.id, reason, actor=actor)
+    annotation, reason = (
+        takes.get_annotation_of_copy(store, group),
+        "" if why is None else why.reason,
+    )
+    return return_annotation(store, annotation.id, reason, actor=actor)
 
 
-@takes_router.post(
+@annotations_router.post(
     "/groups/{group}/adoption",
-    operation_id="adoptTake",
+    operation_id="adoptIndependentAnnotation",
     response_model=GroupDocument,
     responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
 )
@@ -128,11 +141,11 @@ def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
 
     They are its person's there, as one edit that undo takes back.
     """
-    take = takes.get_take_of(services.store, group)
-    return take_over(services.store, take, actor=actor, paint=services.paint)
+    annotation = takes.get_annotation_of_copy(services.store, group)
+    return adopt_into_group(services.store, annotation, actor=actor, paint=services.paint)
 
 
-gold_router = APIRouter(tags=["takes"], route_class=Route)
+gold_router = APIRouter(tags=["independent annotations"], route_class=Route)
 
 
 @gold_router.get(
@@ -150,14 +163,14 @@ def get_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
 @gold_router.post(
     "/datasets/{dataset}/gold",
     operation_id="chooseGoldGroups",
-    response_model=GoldChosen,
+    response_model=GoldChoiceResult,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(document)
 def choose(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
-) -> GoldChosen:
+) -> GoldChoiceResult:
     """Make gold groups of those whose truth is known, also while batches are under way."""
     values = choice.model_dump(exclude={"q", "source"})
     wanted = GoldChoice(gold.TruthSource(choice.source), query=choice.q, **values)

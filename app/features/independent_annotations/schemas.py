@@ -9,17 +9,22 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.guidelines.service import MAX_LETTERS
 from app.features.independent_annotations.errors import DistanceFromTruth
-from app.features.independent_annotations.gold import GoldGroup, GoldResult, Middle, PersonResults
+from app.features.independent_annotations.gold import (
+    GoldGroup,
+    GoldResult,
+    MedianInterval,
+    PersonResults,
+)
 from app.features.independent_annotations.known_truth import MOST
 from app.features.independent_annotations.return_work import MAX_REASON
-from app.features.independent_annotations.service import TakeView
+from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
 from app.soccer.choices import GoldStart
 
 
-class HandBack(BaseModel):
+class ReturnReason(BaseModel):
     """Why something that was handed in goes back."""
 
     model_config = ConfigDict(
@@ -32,7 +37,7 @@ class HandBack(BaseModel):
     )
 
 
-class TakeHandBack(HandBack):
+class AnnotationReturn(ReturnReason):
     """Which annotation of a group goes back, and why."""
 
     model_config = ConfigDict(
@@ -43,7 +48,7 @@ class TakeHandBack(HandBack):
     take: Annotated[int, Field(ge=1, le=MAX_ID)]
 
 
-class TakeList(ListDocument[TakeView]):
+class IndependentAnnotationList(ListDocument[DisclosedAnnotation]):
     """Own annotations, oldest first: for a lead everybody's, else those of whoever asks."""
 
 
@@ -108,9 +113,9 @@ class PersonResultsDocument(Document, shows=PersonResults):
     """What somebody made of gold groups, oldest first."""
 
     results: list[GoldResultDocument]
-    line_px: Middle
-    ball_px: Middle
-    ball_m: Middle
+    line_px: MedianInterval
+    ball_px: MedianInterval
+    ball_m: MedianInterval
     right_low: float | None = Field(description="Wilson's interval of the share, 95 %.")
 
 

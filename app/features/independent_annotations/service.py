@@ -15,24 +15,24 @@ from app.features.groups.queries import read_groups
 from app.features.groups.state import need_group
 from app.features.groups.submit import solved
 from app.features.independent_annotations.copying import (
-    CopyOrder,
+    CopyRequest,
     copy_group,
     gold_start_of,
     start_of,
-    stripped,
+    without_extras,
 )
 from app.features.independent_annotations.gold_queries import common_start
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
-    Take,
-    count_takes,
-    find_take,
-    insert_take,
+    IndependentAnnotation,
+    annotation_of_copy,
+    annotations_in,
+    annotations_of_group,
+    count_annotations,
+    find_annotation,
+    insert_annotation,
     names_of,
-    take_of_copy,
-    takes_in,
-    takes_of_group,
 )
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
@@ -45,7 +45,7 @@ _KINDS = ("work", "take")
 
 
 @dataclass(frozen=True)
-class HandedBack:
+class ReturnedGroup:
     """A group that was handed back: by whom, when, and why; the reason may be empty.
 
     Attributes:
@@ -61,7 +61,7 @@ class HandedBack:
     reason: str
 
 
-def read_handed_back(session: Session, group_ids: Sequence[int]) -> dict[int, HandedBack]:
+def read_returned(session: Session, group_ids: Sequence[int]) -> dict[int, ReturnedGroup]:
     """How groups were handed back last, by their ids; the caller knows that they wait again."""
     last = {
         entry.group_id: entry
@@ -73,7 +73,7 @@ def read_handed_back(session: Session, group_ids: Sequence[int]) -> dict[int, Ha
         for row in read_columns(session, list(last), (), ("group_id", "label", "key"))
     }
     return {
-        group: HandedBack(
+        group: ReturnedGroup(
             group, names.get(group, ""), person_of(entry.actor), entry.at, entry.body["reason"]
         )
         for group, entry in last.items()
@@ -81,7 +81,7 @@ def read_handed_back(session: Session, group_ids: Sequence[int]) -> dict[int, Ha
 
 
 @dataclass(frozen=True)
-class TakeView:
+class DisclosedAnnotation:
     """A take as everybody may see it who sees its copy; that it is a gold one it does not say.
 
     Attributes:
@@ -108,10 +108,10 @@ class TakeView:
     handed_in: Moment | None
     verdict: str | None
     settled: Moment | None
-    handed_back: HandedBack | None = None
+    handed_back: ReturnedGroup | None = None
 
 
-def begin_take(store: Store, group_id: int, *, person: str) -> TakeView:
+def begin_annotation(store: Store, group_id: int, *, person: str) -> DisclosedAnnotation:
     """Let a person begin their own annotation of a group; the one that they have already, if so.
 
     Args:
@@ -124,10 +124,10 @@ def begin_take(store: Store, group_id: int, *, person: str) -> TakeView:
         ConflictError: It is a copy itself.
     """
     with store.write() as session:
-        take = begin(session, group_id, person=person_of(person))
-        begun = show(session, take)
+        annotation = begin(session, group_id, person=person_of(person))
+        begun = show(session, annotation)
         session.respond(begun)
-    solved(store, take.copy_id)
+    solved(store, annotation.copy_id)
     return begun
 
 
@@ -141,8 +141,8 @@ def begin(
     since: str | None = None,
     blind: bool = True,
     nameless: bool = False,
-) -> Take:
-    """``begin_take`` within a write session; the copy is solved by the caller.
+) -> IndependentAnnotation:
+    """``begin_annotation`` within a write session; the copy is solved by the caller.
 
     Args:
         session: Writes.
@@ -156,15 +156,15 @@ def begin(
             begins with what all copies of such a batch begin with.
     """
     stored = need_group(session, group_id)
-    others = [one for one in takes_of_group(session, group_id) if one.batch_id == batch_id]
+    others = [one for one in annotations_of_group(session, group_id) if one.batch_id == batch_id]
     for one in others:
         if one.person == person:
             return one
-    if take_of_copy(session, group_id) is not None:
+    if annotation_of_copy(session, group_id) is not None:
         raise ConflictError(
             "this is an own annotation already", hint="Begin from the group that it is of."
         )
-    place = count_takes(session, batch_id, person) + 1
+    place = count_annotations(session, batch_id, person) + 1
     ready = [one.copy_id for one in others if one.handed_in is not None]
     start = stored.group
     if kind == GOLD:
@@ -175,10 +175,10 @@ def begin(
         start = need_group(session, ready[-1]).group
     common = common_start(session, stored.dataset_id) if nameless else None
     if common is not None:
-        start = stripped(start, common)
-    order = CopyOrder(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
+        start = without_extras(start, common)
+    order = CopyRequest(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
     copy_id = copy_group(session, order, start)
-    take_id = insert_take(
+    take_id = insert_annotation(
         session,
         batch_id=batch_id,
         group_id=group_id,
@@ -187,10 +187,10 @@ def begin(
         kind=kind,
         place=place,
     )
-    return read_take(session, take_id)
+    return read_annotation(session, take_id)
 
 
-def hand_in(store: Store, take_id: int, *, actor: str) -> TakeView:
+def submit_annotation(store: Store, take_id: int, *, actor: str) -> DisclosedAnnotation:
     """Submit an independent annotation; from then on it stays as it is.
 
     Raises:
@@ -199,28 +199,28 @@ def hand_in(store: Store, take_id: int, *, actor: str) -> TakeView:
         ConflictError: It was submitted already.
     """
     with store.write() as session:
-        take = read_take(session, take_id)
-        submit_copy(session, take, actor=actor, at=now())
-        handed = show(session, read_take(session, take_id))
+        annotation = read_annotation(session, take_id)
+        submit_copy(session, annotation, actor=actor, at=now())
+        handed = show(session, read_annotation(session, take_id))
         session.respond(handed)
         return handed
 
 
-def get_take(store: Store, take_id: int) -> Take:
-    """A take; raises NotFoundError where there is none."""
+def get_annotation(store: Store, take_id: int) -> IndependentAnnotation:
+    """An independent annotation; raises NotFoundError where there is none."""
     with store.read() as session:
-        return read_take(session, take_id)
+        return read_annotation(session, take_id)
 
 
-def get_take_of(store: Store, copy_id: int) -> Take:
-    """The take whose copy a group is.
+def get_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation:
+    """The independent annotation whose copy a group is.
 
     Raises:
         NotFoundError: It is an ordinary group.
     """
-    take = find_take_of(store, copy_id)
-    if take is not None:
-        return take
+    annotation = find_annotation_of_copy(store, copy_id)
+    if annotation is not None:
+        return annotation
     with store.read() as session:
         there = bool(read_groups(session, [copy_id]))
     if not there:
@@ -228,16 +228,16 @@ def get_take_of(store: Store, copy_id: int) -> Take:
     raise NotFoundError(f"group {copy_id} is not an independent annotation")
 
 
-def find_take_of(store: Store, copy_id: int) -> Take | None:
+def find_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation | None:
     """The take whose copy a group is; None for an ordinary group."""
-    with store.glance() as session:
-        return take_of_copy(session, copy_id)
+    with store.read_one() as session:
+        return annotation_of_copy(session, copy_id)
 
 
-def list_takes(
+def list_annotations(
     store: Store, dataset: str | int, sees_all: Callable[[int], bool], *, person: str
-) -> list[TakeView]:
-    """The takes of a dataset's groups as they are shown, oldest first.
+) -> list[DisclosedAnnotation]:
+    """The independent annotations of a dataset's groups as they are shown, oldest first.
 
     Args:
         store: The database.
@@ -251,29 +251,31 @@ def list_takes(
     with store.read() as session:
         dataset_id = need_dataset(session, dataset)
         whose = None if sees_all(dataset_id) else person_of(person)
-        found = takes_in(session, dataset_id, whose)
-        return _shown(session, found)
+        found = annotations_in(session, dataset_id, whose)
+        return _disclosed_annotations(session, found)
 
 
-def shown(store: Store, take: Take) -> TakeView:
-    """A take as it is shown."""
+def shown(store: Store, annotation: IndependentAnnotation) -> DisclosedAnnotation:
+    """An independent annotation as it is shown."""
     with store.read() as session:
-        return show(session, take)
+        return show(session, annotation)
 
 
-def show(session: Session, take: Take) -> TakeView:
+def show(session: Session, annotation: IndependentAnnotation) -> DisclosedAnnotation:
     """``shown`` within a session."""
-    return _shown(session, [take])[0]
+    return _disclosed_annotations(session, [annotation])[0]
 
 
-def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
-    heads = {row.id: row for row in names_of(session, [one.copy_id for one in takes])}
+def _disclosed_annotations(
+    session: Session, annotations: Sequence[IndependentAnnotation]
+) -> list[DisclosedAnnotation]:
+    heads = {row.id: row for row in names_of(session, [one.copy_id for one in annotations])}
     reader = READER.get()
     blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
-    waiting = [one.copy_id for one in takes if one.handed_in is None and one.settled is None]
-    back = read_handed_back(session, waiting)
+    waiting = [one.copy_id for one in annotations if one.handed_in is None and one.settled is None]
+    back = read_returned(session, waiting)
 
-    def is_told(one: Take) -> bool:
+    def is_told(one: IndependentAnnotation) -> bool:
         """Whether it may be known of what it is a copy, and what became of it: its person is told neither
         while they work blind, nor ever of a copy without a name, which may be of a gold group."""
         if one.batch_id in blind:
@@ -282,34 +284,34 @@ def _shown(session: Session, takes: Sequence[Take]) -> list[TakeView]:
         return bool(heads[one.copy_id].same) or not own
 
     return [
-        TakeView(
+        DisclosedAnnotation(
             id=one.id,
             batch=one.batch_id,
             group=one.copy_id,
             dataset=heads[one.copy_id].of_id,
-            of=one.group_id if told else None,
-            number=heads[one.copy_id].number if told else None,
-            title=_title(heads[one.copy_id], told),
+            of=one.group_id if disclosed else None,
+            number=heads[one.copy_id].number if disclosed else None,
+            title=_title(heads[one.copy_id], disclosed),
             person=one.person,
             place=one.place,
             begun=one.begun,
             handed_in=one.handed_in,
             verdict=one.verdict,
             # Of a gold group nothing is ever decided.
-            settled=one.settled if told else None,
+            settled=one.settled if disclosed else None,
             handed_back=back.get(one.copy_id),
         )
-        for one, told in ((one, is_told(one)) for one in takes)
+        for one, disclosed in ((one, is_told(one)) for one in annotations)
     ]
 
 
-def _title(head: Any, told: bool) -> str:
-    return str((head.of_label or head.of_key) if told else (head.label or head.key))
+def _title(head: Any, disclosed: bool) -> str:
+    return str((head.of_label or head.of_key) if disclosed else (head.label or head.key))
 
 
-def read_take(session: Session, take_id: int) -> Take:
-    """``get_take`` within a session."""
-    row = find_take(session, take_id)
+def read_annotation(session: Session, take_id: int) -> IndependentAnnotation:
+    """``get_annotation`` within a session."""
+    row = find_annotation(session, take_id)
     if row is None:
         raise NotFoundError(f"there is no annotation {take_id}")
     return row

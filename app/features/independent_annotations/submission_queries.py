@@ -16,7 +16,11 @@ from app.errors import ConflictError, ForbiddenError
 from app.features.agreement.queries import forget_open
 from app.features.groups.codecs import group_to_json
 from app.features.groups.queries import read_groups
-from app.features.independent_annotations.queries import Take, take_of_copy, update_take
+from app.features.independent_annotations.queries import (
+    IndependentAnnotation,
+    annotation_of_copy,
+    update_annotation,
+)
 from app.soccer.actors import LOCAL_USER, person_of
 
 KIND = "take"
@@ -27,26 +31,33 @@ RETURNED = "handed back"
 _ONLY_LEADS = "Only a lead can return it, and says why."
 
 
-def require_open(take: Take | None) -> None:
+def require_open(annotation: IndependentAnnotation | None) -> None:
     """Raise ConflictError where a copy was submitted; ``None`` is an ordinary group.
 
     Whether it was adjudicated since the sentence does not say: copies of gold groups never are.
     """
-    if take is not None and (take.handed_in is not None or take.settled is not None):
+    if annotation is not None and (
+        annotation.handed_in is not None or annotation.settled is not None
+    ):
         raise ConflictError(
             "this annotation was submitted, and can no longer be changed", hint=_ONLY_LEADS
         )
 
 
-def _require_person(take: Take, actor: str) -> None:
+def _require_person(annotation: IndependentAnnotation, actor: str) -> None:
     """Raise ForbiddenError where a copy is somebody else's."""
     # On a server without accounts everybody is the local user.
-    if person_of(actor) not in (take.person, LOCAL_USER):
-        raise ForbiddenError(f"only {take.person} submits and judges this annotation")
+    if person_of(actor) not in (annotation.person, LOCAL_USER):
+        raise ForbiddenError(f"only {annotation.person} submits and judges this annotation")
 
 
 def submit_copy(
-    session: Session, take: Take, *, actor: str, at: str, verdict: str | None = None
+    session: Session,
+    annotation: IndependentAnnotation,
+    *,
+    actor: str,
+    at: str,
+    verdict: str | None = None,
 ) -> None:
     """Submit a copy, with its person's verdict where they judged it.
 
@@ -54,15 +65,15 @@ def submit_copy(
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already.
     """
-    _require_person(take, actor)
-    require_open(take)
-    (stored,) = read_groups(session, [take.copy_id]).values()
+    _require_person(annotation, actor)
+    require_open(annotation)
+    (stored,) = read_groups(session, [annotation.copy_id]).values()
     # Of a copy that was returned the verdict stays, unless its person gives another one.
-    verdict = verdict or take.verdict
-    update_take(session, take.id, handed_in=at, verdict=verdict)
+    verdict = verdict or annotation.verdict
+    update_annotation(session, annotation.id, handed_in=at, verdict=verdict)
     body: dict[str, Json] = {
-        "take": take.id,
-        "person": take.person,
+        "take": annotation.id,
+        "person": annotation.person,
         "did": SUBMITTED,
         "verdict": verdict,
         "inputs_hash": stored.inputs_hash,
@@ -78,18 +89,18 @@ def judge_copy(session: Session, copy_id: int, state: str, *, actor: str, at: st
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already: its verdict stays, too.
     """
-    take = take_of_copy(session, copy_id)
-    if take is None:
+    annotation = annotation_of_copy(session, copy_id)
+    if annotation is None:
         return
     if state != "unreviewed":
-        submit_copy(session, take, actor=actor, at=at, verdict=state)
+        submit_copy(session, annotation, actor=actor, at=at, verdict=state)
     else:
-        _require_person(take, actor)
-        require_open(take)
-        update_take(session, take.id, verdict=None)
+        _require_person(annotation, actor)
+        require_open(annotation)
+        update_annotation(session, annotation.id, verdict=None)
 
 
-def return_copy(session: Session, take: Take) -> None:
+def return_copy(session: Session, annotation: IndependentAnnotation) -> None:
     """Let the person of a submitted copy go on with it; the caller logs who returned it, and why.
 
     What was compared with it waits for no decision any more.
@@ -97,12 +108,12 @@ def return_copy(session: Session, take: Take) -> None:
     Raises:
         ConflictError: It is not submitted, or it was decided about.
     """
-    if take.settled is not None:
+    if annotation.settled is not None:
         raise ConflictError("this annotation was adjudicated already")
-    if take.handed_in is None:
-        raise ConflictError(f"{take.person} has not submitted this yet")
-    update_take(session, take.id, handed_in=None)
-    forget_open(session, take.group_id, take.batch_id or 0)
+    if annotation.handed_in is None:
+        raise ConflictError(f"{annotation.person} has not submitted this yet")
+    update_annotation(session, annotation.id, handed_in=None)
+    forget_open(session, annotation.group_id, annotation.batch_id or 0)
 
 
 def submissions_of(

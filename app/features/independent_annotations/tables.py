@@ -29,11 +29,11 @@ class CopyDatasetModel(Base):
     person: Mapped[str]
 
 
-class TakeModel(Base):
+class IndependentAnnotationModel(Base):
     """One person's own annotation of a group: ``copy_id`` is the copy, ``group_id`` the original.
 
     ``kind`` is ``independent`` or ``gold`` (the original is a gold group, whose truth is known).
-    ``place`` counts the takes of a person in a batch, from 1. ``verdict`` is what they judged,
+    ``place`` counts the independent annotations of a person in a batch, from 1. ``verdict`` is what they judged,
     NULL where they did not; ``settled`` is when a result was taken over or set aside.
     """
 

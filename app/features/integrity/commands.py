@@ -109,12 +109,12 @@ def transfer(
     from app.features.integrity.transfer import transfer as run_transfer
 
     settings = read_settings()
-    told: set[str] = set()
+    printed: set[str] = set()
 
     def tell(table: str, _rows: int) -> None:
-        if table not in told and not json_:
+        if table not in printed and not json_:
             say(f"  {table}")
-        told.add(table)
+        printed.add(table)
 
     done = run_transfer(*ends_of(source, target, settings), tell, replace_null=replace_null)
     if json_:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 
-from app.db.check import Check, as_logged, compared
+from app.db.check import Check, compare_with_log, compared
 from app.db.dialects.dialect import dialect_in
 from app.db.log import entries_of_kinds, newest_entry
 from app.db.session import Session
@@ -15,11 +15,11 @@ from app.features.groups.codecs import paint_to_json
 from app.features.groups.digest import group_inputs_hash, station_digest, view_digest
 from app.features.groups.projection_queries import all_groups, all_stations
 from app.features.groups.replay import replay
-from app.features.groups.state_snapshot import Ledger, read_ledger
+from app.features.groups.state_snapshot import StateSnapshot, read_state_snapshot
 from app.features.guidelines.queries import GUIDELINE, all_guidelines
 from app.features.integrity.records import DELETED, examine_computed, examine_people
 from app.features.integrity.transfer import find_null_characters, named
-from app.features.queue.queries import rows_apart
+from app.features.queue.queries import differing_rows
 from app.features.solutions.service import stale_groups
 
 
@@ -30,12 +30,12 @@ def examine_guidelines(session: Session, restore: str) -> Check:
         session: A read session on a log whose chain is whole.
         restore: What to do where a text is not what was written.
     """
-    said = _said(session)
+    logged = _logged_guidelines(session)
     present = {
         (row.dataset_id, row.number): hashlib.sha256(row.text.encode()).hexdigest()
         for row in all_guidelines(session)
     }
-    return as_logged("guidelines", said, present, restore, _name)
+    return compare_with_log("guidelines", logged, present, restore, _name)
 
 
 def _name(key: tuple[int, int]) -> str:
@@ -43,25 +43,25 @@ def _name(key: tuple[int, int]) -> str:
     return f"version {number} of dataset {dataset}"
 
 
-def _said(session: Session) -> dict[tuple[int, int], str]:
-    said: dict[tuple[int, int], str] = {}
+def _logged_guidelines(session: Session) -> dict[tuple[int, int], str]:
+    digests: dict[tuple[int, int], str] = {}
     for entry in entries_of_kinds(session, [GUIDELINE, DELETED]):
         assert entry.dataset_id is not None
         if entry.kind == DELETED:
-            said = {key: digest for key, digest in said.items() if key[0] != entry.dataset_id}
+            digests = {key: digest for key, digest in digests.items() if key[0] != entry.dataset_id}
         else:
-            said[entry.dataset_id, entry.body["number"]] = entry.body["digest"]
-    return said
+            digests[entry.dataset_id, entry.body["number"]] = entry.body["digest"]
+    return digests
 
 
 REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
 REBUILT = {
     "groups": "groups",
     "stations": "cameras",
-    "spare": "unassigned frames",
+    "unassigned": "unassigned frames",
     "noticed": "findings of imports",
 }
-"""Parts of the ledger that ``rebuild`` writes, with the words for them."""
+"""Parts of the state snapshot that ``rebuild`` writes, with the words for them."""
 KEPT = {
     "datasets": "datasets",
     "verdicts": "groups' verdicts",
@@ -81,13 +81,13 @@ def examine(store: Store) -> list[Check]:
         checks = [_file(session, restore)]
         entries = newest_entry(session)
         try:
-            said = replay(session)
+            logged = replay(session)
         except StorageError as error:
             checks.append(Check("log", False, error.message, error.hint or restore))
         else:
             checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
             checks.append(_texts(session))
-            checks += _compared_tables(session, said, restore)
+            checks += _compared_tables(session, logged, restore)
             checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
         computed = examine_computed(session, restore)
         is_whole = all(check.ok for check in computed)
@@ -115,19 +115,19 @@ def _texts(session: Session) -> Check:
     return Check("texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there.")
 
 
-def _compared_tables(session: Session, said: Ledger, restore: str) -> list[Check]:
+def _compared_tables(session: Session, logged: StateSnapshot, restore: str) -> list[Check]:
     try:
-        present = read_ledger(session)
+        present = read_state_snapshot(session)
     except StorageError as error:
         return [Check("tables", False, error.message, REBUILD)]
-    checks = _tables(said, present, restore)
+    checks = _tables(logged, present, restore)
     # Of a row that is not what was said, the digest says nothing.
     return [*checks, _digests(session)] if all(check.ok for check in checks) else checks
 
 
-def _tables(said: Ledger, present: Ledger, restore: str) -> list[Check]:
+def _tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list[Check]:
     return [
-        as_logged(words, getattr(said, name), getattr(present, name), mend)
+        compare_with_log(words, getattr(logged, name), getattr(present, name), mend)
         for names, mend in ((REBUILT, REBUILD), (KEPT, restore))
         for name, words in names.items()
     ]
@@ -154,7 +154,7 @@ def _digests(session: Session) -> Check:
 def _queue(session: Session, mend: str) -> Check:
     """Whether the row of each group follows from what was said of it and computed for it."""
     try:
-        count, apart = rows_apart(session)
+        count, apart = differing_rows(session)
     except StorageError as error:
         return Check("queue", False, error.message, mend)
     whole = f"{count:,} rows, as groups, verdicts and solutions say"

@@ -23,7 +23,7 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.features.comments.check import examine_threads
-from app.features.datasets.orphan_queries import spare_calibrations, unread_uploads, unused_frames
+from app.features.datasets.orphan_queries import unread_uploads, unused_calibrations, unused_frames
 from app.features.integrity.database import examine
 from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import linked_admins, read_rules
@@ -58,7 +58,7 @@ def _examine(settings: Settings, name: str) -> Check:
         if found is not None and found.size:
             store.read(found.key, 0, 1, found.etag)
             done.append("reads")
-            if not _keeps_apart(store, found.key):
+            if not _checks_content(store, found.key):
                 return Check(title, False, _UNCONDITIONAL, CONDITIONS)
         if store.settings.exports:
             _write(store)
@@ -70,7 +70,7 @@ def _examine(settings: Settings, name: str) -> Check:
     return Check(title, True, f"{', '.join(done)}{empty}")
 
 
-def _keeps_apart(store: ObjectStore, key: str) -> bool:
+def _checks_content(store: ObjectStore, key: str) -> bool:
     """Whether an object is not given out as the content that it is not."""
     try:
         store.read(key, 0, 1, _NO_CONTENT)
@@ -93,7 +93,7 @@ _FORMATS = (".jpg", ".png", ".webp")
 
 def examine_home(settings: Settings) -> list[Check]:
     """What can be said of a home without its database."""
-    examined = (_settings, _permissions, _room, _anchor, _sign_on, _mail)
+    examined = (_settings, _permissions, _free_space, _anchor, _sign_on, _mail)
     return [*(examine(settings) for examine in examined), _versions(), *examine_stores(settings)]
 
 
@@ -179,7 +179,7 @@ def _permissions(settings: Settings) -> Check:
     return Check("permissions", True, "the home is its owner's alone")
 
 
-def _room(settings: Settings) -> Check:
+def _free_space(settings: Settings) -> Check:
     free = shutil.disk_usage(settings.home).free
     # A migration copies the database twice: once as it is, once packed.
     database = settings.database_file
@@ -240,7 +240,7 @@ def _leftovers(settings: Settings) -> Check:
 
 
 def _calibrations(session: Session) -> Check:
-    count = len(spare_calibrations(session))
+    count = len(unused_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
     return Check("unused calibrations", True, f"{count:,} that no solution rests on", mend)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.db.check import Check, as_logged, compared
+from app.db.check import Check, compare_with_log, compared
 from app.db.log import LogEntry, entries_of_kinds
 from app.db.session import Session
 from app.errors import StorageError
@@ -18,14 +18,14 @@ from app.features.groups.queries import read_groups
 from app.features.people.alias_queries import given_aliases
 from app.features.people.queries import all_dataset_roles, all_people
 from app.features.people.roles import PERSON
-from app.features.solutions.kept_queries import (
+from app.features.solutions.queries import read_summary
+from app.features.solutions.stored_queries import (
     calibrations_of,
     damaged_calibrations,
     damaged_readings,
     decode_row,
     solution_batches,
 )
-from app.features.solutions.queries import read_summary
 from app.features.solutions.summary import SolutionSummary, summarize
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -60,13 +60,13 @@ def examine_people(session: Session, restore: str) -> list[Check]:
         session: A read session on a log whose chain is whole.
         restore: What to do where a row is not what was said.
     """
-    said, present = _said(session), _present(session)
-    for key, role in said.unsure.items():
+    logged, present = _logged_people(session), _present(session)
+    for key, role in logged.unsure.items():
         if present.roles.get(key) == role:
-            said.roles[key] = role
+            logged.roles[key] = role
     parts = {"accounts": "accounts", "roles": "roles in datasets", "shown": "adopted names"}
     return [
-        as_logged(words, getattr(said, name), getattr(present, name), restore, _name)
+        compare_with_log(words, getattr(logged, name), getattr(present, name), restore, _name)
         for name, words in parts.items()
     ]
 
@@ -83,20 +83,20 @@ def _present(session: Session) -> People:
     )
 
 
-def _said(session: Session) -> People:
+def _logged_people(session: Session) -> People:
     people, deleted = People(), None
     for entry in entries_of_kinds(session, [PERSON, DELETED, DATASET]):
         if entry.kind == DELETED:
-            _moved(people, entry)
+            _move_roles(people, entry)
         elif entry.kind == DATASET:
-            _followed(people, entry, deleted)
+            _restore_roles(people, entry, deleted)
         elif (step := _STEPS.get(entry.body["did"])) is not None:
             step(people, entry, str(entry.body["person"]))
         deleted = entry if entry.kind == DELETED else None
     return people
 
 
-def _moved(people: People, deleted: LogEntry) -> None:
+def _move_roles(people: People, deleted: LogEntry) -> None:
     """Roles in a dataset go with it, or to the one that begins afresh in its place."""
     gone = {key: role for key, role in people.roles.items() if key[1] == deleted.dataset_id}
     for name, dataset in gone:
@@ -107,7 +107,7 @@ def _moved(people: People, deleted: LogEntry) -> None:
             people.unsure[name, dataset] = role
 
 
-def _followed(people: People, made: LogEntry, deleted: LogEntry | None) -> None:
+def _restore_roles(people: People, made: LogEntry, deleted: LogEntry | None) -> None:
     """A dataset that an earlier version made right after it deleted another may have its roles."""
     if deleted is None or made.body["name"] != deleted.body["name"]:
         return
@@ -179,11 +179,11 @@ def examine_computed(session: Session, restore: str) -> list[Check]:
     solutions, apart = 0, list[str]()
     for rows in solution_batches(session):
         solutions += len(rows)
-        apart += _apart(session, rows, {*damaged})
+        apart += _differing_solutions(session, rows, {*damaged})
     return [
-        _told("calibrations", calibrations, damaged, restore),
-        _told("readings of paint", readings, unread, restore),
-        _told("solutions", solutions, apart, restore),
+        _check_of("calibrations", calibrations, damaged, restore),
+        _check_of("readings of paint", readings, unread, restore),
+        _check_of("solutions", solutions, apart, restore),
     ]
 
 
@@ -196,11 +196,11 @@ def _damaged(items: Iterable[tuple[str, bool]]) -> tuple[int, list[str]]:
     return count, damaged
 
 
-def _told(name: str, count: int, apart: Sequence[str], restore: str) -> Check:
+def _check_of(name: str, count: int, apart: Sequence[str], restore: str) -> Check:
     return compared(name, f"{count:,}, each as it was written", apart, WRONG, restore)
 
 
-def _apart(session: Session, rows: Sequence[Any], damaged: Set[str]) -> Iterator[str]:
+def _differing_solutions(session: Session, rows: Sequence[Any], damaged: Set[str]) -> Iterator[str]:
     """Names of the solutions that are not as they were written.
 
     What rests on a damaged calibration cannot be told; the calibration is named by itself.
@@ -239,11 +239,11 @@ def _is_whole(session: Session, row: Any, groups: Mapping[int, Group]) -> bool:
     if not row.current or row.group_id not in groups:
         return True
     group = groups[row.group_id]
-    is_theirs = _is_of(group, solution, policy_of(row.policy))
+    is_theirs = _fits_group(group, solution, policy_of(row.policy))
     return is_theirs and _agree(summary, summarize(group, solution))
 
 
-def _is_of(group: Group, solution: Solution, policy: Policy) -> bool:
+def _fits_group(group: Group, solution: Solution, policy: Policy) -> bool:
     """Whether a solution has the views of a group, with cameras of what was said of them."""
     if [view.key for view in group.views] != [view.view for view in solution.views]:
         return False

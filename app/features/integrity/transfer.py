@@ -211,11 +211,11 @@ def transfer(
         with store.read() as session:
             writer = engine.execution_options(**WRITE)
             if not replace_null and (found := find_null_characters(session)):
-                raise _unkeepable(found)
+                raise _unstorable(found)
             return _transfer(session, writer, dialect, target.yields, tell)
 
 
-def _unkeepable(found: Sequence[NullCharacter]) -> InputError:
+def _unstorable(found: Sequence[NullCharacter]) -> InputError:
     count = plural(len(found), "text holds", "texts hold")
     return InputError(
         f"{count} U+0000, which no database takes any more: {named(found)}",

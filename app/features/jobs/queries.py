@@ -17,7 +17,7 @@ from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
 from app.features.jobs.tables import JobModel
 from app.features.people.alias_queries import columns_shown
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.finite import finite
 from app.soccer.choices import JobState
 
@@ -123,7 +123,7 @@ def read_jobs(
     states: Sequence[str] = (),
     before: int | None = None,
     limit: int = 50,
-    sight: Sight = EVERYTHING,
+    visibility: Visibility = EVERYTHING,
 ) -> list[Job]:
     """Jobs, the newest first.
 
@@ -134,12 +134,12 @@ def read_jobs(
         states: In these states alone.
         before: Those older than the job of this id.
         limit: How many at most.
-        sight: Those that somebody sees.
+        visibility: Those that somebody sees.
     """
     statement = _SELECT.order_by(JobModel.id.desc()).limit(limit)
     if dataset_id is not None:
         statement = statement.where(JobModel.dataset_id == dataset_id)
-    seen = sight.condition(JobModel.dataset_id, JobModel.actor)
+    seen = visibility.condition(JobModel.dataset_id, JobModel.actor)
     if seen is not None:
         statement = statement.where(seen)
     if kinds:

@@ -10,7 +10,7 @@ from typing import Any
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, StorageError
-from app.features.audit.audit_events import note_deed
+from app.features.audit.audit_events import add_audit_event
 from app.features.jobs.queries import DONE as DONE
 from app.features.jobs.queries import (
     FAILED,
@@ -23,15 +23,15 @@ from app.features.jobs.queries import (
 )
 from app.features.jobs.queries import Job as Job
 from app.features.jobs.run import JobRun
-from app.features.notifications.queries import RingKind
-from app.features.notifications.service import tell
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.notifications.queries import NotificationKind
+from app.features.notifications.service import notify
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.soccer.actors import person_of
 
 TICK = 0.25
 """Seconds between two looks at the progress of the running job."""
 
-_TOLD = {DONE: "done", FAILED: "it failed"}
+_REPORTED = {DONE: "done", FAILED: "it failed"}
 """Ends of jobs of which people are told, in words."""
 
 Listener = Callable[[Job], None]
@@ -66,7 +66,7 @@ class JobRecords:
         states: Sequence[str] = (),
         before: int | None = None,
         limit: int = 50,
-        sight: Sight = EVERYTHING,
+        visibility: Visibility = EVERYTHING,
     ) -> list[Job]:
         """Jobs that somebody sees, the newest first; ``before`` is the last id of the page before."""
         with self._store.read() as session:
@@ -77,12 +77,12 @@ class JobRecords:
                 states=states,
                 before=before,
                 limit=limit,
-                sight=sight,
+                visibility=visibility,
             )
 
-    def under_way(self, dataset_id: int | None, sight: Sight) -> list[Job]:
+    def under_way(self, dataset_id: int | None, visibility: Visibility) -> list[Job]:
         """Jobs that somebody sees and that wait or run, the oldest first."""
-        return self.find(dataset_id=dataset_id, states=OPEN, sight=sight)[::-1]
+        return self.find(dataset_id=dataset_id, states=OPEN, visibility=visibility)[::-1]
 
     def every(self, *, dataset_id: int, kind: str) -> list[int]:
         """Ids of all jobs of a kind in a dataset, however many there are."""
@@ -125,12 +125,12 @@ class JobRecords:
             job = read_job(session, job_id)
             if job is not None:
                 cancelled_by(session, job, by)
-            if job is not None and job.state in _TOLD:
-                tell(
+            if job is not None and job.state in _REPORTED:
+                notify(
                     session,
                     person_of(job.actor),
-                    RingKind.JOB,
-                    f"{job.title}: {_TOLD[job.state]}",
+                    NotificationKind.JOB,
+                    f"{job.title}: {_REPORTED[job.state]}",
                     actor=job.actor,
                     address="/jobs",
                     dataset_id=job.dataset_id if job.dataset is not None else None,
@@ -155,6 +155,6 @@ def need_job(session: Session, job_id: int) -> Job:
 def cancelled_by(session: Session, job: Job, by: str | None) -> Job:
     """Note who cancels a job and answer their request with it; None: it ends with other work."""
     if by is not None:
-        note_deed(session, by, "job cancelled", job.dataset_id, job=job.id, title=job.title)
+        add_audit_event(session, by, "job cancelled", job.dataset_id, job=job.id, title=job.title)
         session.respond(job)
     return job

@@ -30,7 +30,7 @@ DatasetFilter = Annotated[
 @may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE, whole=True)
 def list_jobs(
     services: AppServices,
-    sight: SeesWhole,
+    visibility: SeesWhole,
     dataset: DatasetFilter = None,
     kind: Annotated[JobKind | None, Query()] = None,
     state: Annotated[JobState | None, Query()] = None,
@@ -45,7 +45,7 @@ def list_jobs(
         states=[state] if state else [],
         before=parse_cursor(cursor),
         limit=limit + 1,
-        sight=sight,
+        visibility=visibility,
     )
     more = str(jobs[limit - 1].id) if len(jobs) > limit else None
     return JobPage(items=jobs[:limit], next=more)

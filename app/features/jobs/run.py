@@ -21,7 +21,7 @@ from app.features.datasets.queries import has_more_groups
 from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job
 from app.formats.export_formats import lacking
 from app.plural import counted, plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.worker_process import EndReason, WorkerEnded
 
 
@@ -67,17 +67,17 @@ def _estimated(result: Json) -> str:
 def _imported(result: Json) -> str:
     counts = {name: result.get(name, 0) for name in ("new", "changed", "unchanged")}
     would = " (dry run: nothing was changed)" if result.get("dry_run") else ""
-    told = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    counted_groups = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     left = len(result.get("skipped", ())) + result.get("more_skipped", 0)
     more = f"; {plural(left, 'record')} left out" if left else ""
-    return f"{plural(sum(counts.values()), 'group')} read: {told}{more}{would}."
+    return f"{plural(sum(counts.values()), 'group')} read: {counted_groups}{more}{would}."
 
 
 def _exported(result: Json) -> str:
     counts = result["counts"]
-    told = ", ".join(counted(count, name) for name, count in counts.items())
-    lacks = lacking(result.get("format", ""), counts)
-    return f"Written: {told}." + ("" if lacks is None else f" {lacks}.")
+    written = ", ".join(counted(count, name) for name, count in counts.items())
+    missing = lacking(result.get("format", ""), counts)
+    return f"Written: {written}." + ("" if missing is None else f" {missing}.")
 
 
 def _frozen(result: Json) -> str:
@@ -202,7 +202,7 @@ class FailedWithReportError(ReviewError):
         self.result = result
 
 
-def counting(progress: JobProgress, what: str) -> TellProgress:
+def counting_progress(progress: JobProgress, what: str) -> ReportProgress:
     """A progress that says its numbers in words, too: ``1,200 of 12,764 groups solved``.
 
     Where the work says a sentence, it is that one.
@@ -292,8 +292,12 @@ class JobRun:
             self.progress.require_wanted()
             with structlog.contextvars.bound_contextvars(job=self.job.id):
                 result = self.work(self.progress)
-            told = ending(self.job.kind, result)
-            return {"state": DONE, "result": result, **({} if told is None else {"sentence": told})}
+            sentence = ending(self.job.kind, result)
+            return {
+                "state": DONE,
+                "result": result,
+                **({} if sentence is None else {"sentence": sentence}),
+            }
         except JobCancelled:
             if not self.progress.cancelled.is_set():
                 return None
@@ -375,7 +379,7 @@ def run_job_in_worker(
     *arguments: Any,
     dataset_id: int | None,
     progress: JobProgress,
-    report: TellProgress | None = None,
+    report: ReportProgress | None = None,
     answer: Callable[[Any], Any] = no_answer,
 ) -> Result:
     """Call ``work(store, *arguments, caller)`` in a worker process (``database_worker.run_in_worker``).

@@ -5,7 +5,7 @@ is left. Those who wait have their turns person by person.
 
 The record of a job is a row of the database; the work itself is a function of this process. A
 server that stops leaves its jobs where they are, and the next one takes up again those whose kind
-knows how (``Jobs.resumes``) and marks the others failed.
+knows how (``Jobs.register_resume``) and marks the others failed.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Jobs(JobRecords):
         self._resumers: dict[str, Work] = {}
         self._beginners: list[Callable[[], None]] = []
 
-    def resumes(self, kind: str, work: Work) -> None:
+    def register_resume(self, kind: str, work: Work) -> None:
         """Start jobs of a kind again after a restart; to be told before ``start``.
 
         Args:
@@ -95,31 +95,31 @@ class Jobs(JobRecords):
         """
         self._resumers[kind] = work
 
-    def makes(self, kind: str, work: Work) -> None:
+    def register_work(self, kind: str, work: Work) -> None:
         """How the work of a kind is done where a process carries out what another one was asked for;
         it is not begun again after a death."""
 
-    def leads(self) -> bool:
+    def is_leader(self) -> bool:
         """Whether this process carries out jobs and what else is one process's."""
         return True
 
-    def on_lead(self, begin: Callable[[], None]) -> None:
+    def on_leadership(self, begin: Callable[[], None]) -> None:
         """Call a function once this process leads, on whichever thread finds that out."""
         self._beginners.append(begin)
 
     def start(self) -> None:
         """Take up what an earlier server left behind, or say that it is lost; then lead."""
-        self._take_up()
+        self._recover()
         for begin in self._beginners:
             begin()
 
-    def _take_up(self) -> None:
+    def _recover(self) -> None:
         with self._store.write() as session:
             for kind, keep in KEPT.items():
                 trim_jobs(session, kind, keep)
             left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
             for job in left:
-                update_job(session, job.id, **self._settled(job))
+                update_job(session, job.id, **self._recovered(job))
         with self._changed:
             resumed = [self._run(job) for job in left if self._is_resumed(job)]
             self._queue = self._queue.joined_by(*resumed)
@@ -201,7 +201,7 @@ class Jobs(JobRecords):
         with self._store.write() as session:
             return cancelled_by(session, need_job(session, job_id), by)
 
-    def belongs(self, job_id: int, dataset_id: int) -> None:
+    def set_dataset(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
         self._save(job_id, dataset_id=dataset_id)
         running = self._queue.running_of(job_id)
@@ -289,7 +289,7 @@ class Jobs(JobRecords):
         if any(worker.is_alive() for worker in self._workers):
             for run in self._queue.running:
                 log.warning("a job did not end in time", job=run.job.id)
-                self._take_back(run)
+                self._forgive_start(run)
 
     def _waiting_for(self, session: Session, new: NewJob) -> int | None:
         """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
@@ -345,7 +345,7 @@ class Jobs(JobRecords):
                 self._entering -= 1
                 self._wake()
 
-    def _settled(self, job: Job) -> dict[str, Any]:
+    def _recovered(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
         if self._is_resumed(job):
             return {"state": WAITING, "started": None, "sentence": "Started again."}
@@ -375,7 +375,7 @@ class Jobs(JobRecords):
     def _work(self, ready: Callable[[], list[JobRun]]) -> None:
         while (run := self._next(ready)) is not None:
             try:
-                self._carry_out(run)
+                self._execute(run)
             except Exception:
                 log.exception("the record of a job could not be written", job=run.job.id)
             finally:
@@ -393,16 +393,16 @@ class Jobs(JobRecords):
             )
             if self._closing.is_set():
                 return None
-            run = min(ready(), key=self._turn_of)
+            run = min(ready(), key=self._priority)
             self._turns[run.job.actor] = max(self._turns.values(), default=0) + 1
             self._queue = self._queue.begun(run)
             return run
 
-    def _turn_of(self, run: JobRun) -> tuple[bool, int, int]:
+    def _priority(self, run: JobRun) -> tuple[bool, int, int]:
         """Its place among those that may run: the smallest is the next."""
         return run.job.kind not in PROMPT, self._turns.get(run.job.actor, 0), run.job.id
 
-    def _carry_out(self, run: JobRun) -> None:
+    def _execute(self, run: JobRun) -> None:
         if not self._begin(run):
             return
         run.counted = True
@@ -417,14 +417,14 @@ class Jobs(JobRecords):
         if values is not None:
             self._finish(run, **values)
         else:
-            self._take_back(run)
+            self._forgive_start(run)
 
     def _begin(self, run: JobRun) -> bool:
         """Write that a job is begun; False where it shall not be."""
         self._save(run.job.id, state=RUNNING, started=now(), begun=1)
         return True
 
-    def _take_back(self, run: JobRun) -> None:
+    def _forgive_start(self, run: JobRun) -> None:
         """Let a server that stops in good order count for no death: it is none of this job's doing."""
         with self._changed:
             counted, run.counted = run.counted, False

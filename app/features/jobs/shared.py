@@ -43,7 +43,7 @@ log = structlog.get_logger("touchline.jobs")
 CLAIM = "jobs"
 LOOK_SECONDS = 1.0
 """Between two looks for what no word came of, and whether whoever carries out jobs still lives."""
-GLANCE_SECONDS = 0.05
+POLL_SECONDS = 0.05
 MOST = 10_000
 _WORD = "job"
 
@@ -61,7 +61,7 @@ class SharedProgress(JobProgress):
         if self._closing.is_set():
             # Another process may carry it out by now.
             raise JobCancelled
-        with self._store.glance() as session:
+        with self._store.read_one() as session:
             if is_asked_to_end(session, self.job_id):
                 self.cancelled.set()
         super().require_wanted()
@@ -80,23 +80,23 @@ class SharedJobs(Jobs):
         self._alone = True
         """Before the start no other process knows of this one: what it is asked for it does itself."""
 
-    def makes(self, kind: str, work: Work) -> None:
+    def register_work(self, kind: str, work: Work) -> None:
         """See ``Jobs``."""
         self._makers[kind] = work
 
-    def resumes(self, kind: str, work: Work) -> None:
+    def register_resume(self, kind: str, work: Work) -> None:
         """See ``Jobs``."""
-        super().resumes(kind, work)
-        self.makes(kind, work)
+        super().register_resume(kind, work)
+        self.register_work(kind, work)
 
-    def leads(self) -> bool:
+    def is_leader(self) -> bool:
         """See ``Jobs``."""
         return self._lost is not None
 
     def start(self) -> None:
         """Carry out jobs from when no other process does."""
         self._alone = False
-        self._store.sharing.hear(self._hear)
+        self._store.sharing.subscribe(self._receive)
         self._attempt()
         self._leader = threading.Thread(target=self._follow, name="leader", daemon=True)
         self._leader.start()
@@ -116,7 +116,7 @@ class SharedJobs(Jobs):
         if self._leader is not None:
             self._leader.join(seconds)
         super().close(max(until - time.monotonic(), 0.0))
-        self._store.sharing.give_back(CLAIM)
+        self._store.sharing.release(CLAIM)
 
     def cancel(self, job_id: int, *, by: str | None = None) -> Job:
         """See ``Jobs``."""
@@ -130,7 +130,7 @@ class SharedJobs(Jobs):
 
     def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
         """See ``Jobs``; whichever process works on them."""
-        with self._store.glance() as session:
+        with self._store.read_one() as session:
             return jobs_of(session, dataset_id, kinds, OPEN)
 
     def end_with(self, session: Session, ids: Collection[int]) -> None:
@@ -148,23 +148,23 @@ class SharedJobs(Jobs):
         while left := self._running_of(dataset_id):
             if time.monotonic() > until:
                 raise ConflictError(f"job {left[0]} of this dataset is still running")
-            time.sleep(GLANCE_SECONDS)
+            time.sleep(POLL_SECONDS)
 
     def wait(self, job_id: int, seconds: float) -> Job:
         """See ``Jobs``."""
         until = time.monotonic() + seconds
         while (job := self.get(job_id)).state in OPEN and time.monotonic() < until:
-            time.sleep(GLANCE_SECONDS)
+            time.sleep(POLL_SECONDS)
         return job
 
     def is_open(self, job_id: int, kind: str) -> bool:
         """See ``Jobs``; asks the database."""
-        with self._store.glance() as session:
+        with self._store.read_one() as session:
             job = read_job(session, job_id)
         return job is not None and job.kind == kind and job.state in OPEN
 
     def _running_of(self, dataset_id: int) -> list[int]:
-        with self._store.glance() as session:
+        with self._store.read_one() as session:
             return jobs_of(session, dataset_id, (), (RUNNING,))
 
     def _ask_to_end(self, session: Session, ids: Collection[int]) -> None:
@@ -183,17 +183,17 @@ class SharedJobs(Jobs):
         super()._announce(job)
         self._follow_row(job)
         try:
-            self._store.say(f"{_WORD} {job.id}")
+            self._store.publish(f"{_WORD} {job.id}")
         except StorageError as error:
             log.warning(
                 "other processes were not notified of a job", job=job.id, error=error.message
             )
 
-    def _hear(self, word: str) -> None:
+    def _receive(self, word: str) -> None:
         kind, _, number = word.partition(" ")
         if kind != _WORD:
             return
-        with self._store.glance() as session:
+        with self._store.read_one() as session:
             job = read_job(session, int(number))
         if job is not None:
             super()._announce(job)
@@ -225,12 +225,12 @@ class SharedJobs(Jobs):
     def _lead(self) -> None:
         sharing = self._store.sharing
         if self._lost is None:
-            if not sharing.take(CLAIM):
+            if not sharing.claim(CLAIM):
                 return
             try:
-                self._take_up()
+                self._recover()
             except BaseException:
-                sharing.give_back(CLAIM)
+                sharing.release(CLAIM)
                 raise
             self._lost = threading.Event()
             log.info("this process carries out jobs")
@@ -251,17 +251,17 @@ class SharedJobs(Jobs):
         if lost is not None:
             lost.set()
 
-    def _take_up(self) -> None:
+    def _recover(self) -> None:
         """Settle what a process that died was at; what waits is begun as its turn comes."""
         with self._store.write() as session:
             for kind, keep in KEPT.items():
                 trim_jobs(session, kind, keep)
             for job in read_jobs(session, states=(RUNNING,), limit=MOST):
                 ended = {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
-                update_job(session, job.id, **(ended if job.ending else self._settled(job)))
+                update_job(session, job.id, **(ended if job.ending else self._recovered(job)))
 
     def _join_waiting(self) -> None:
-        with self._store.glance() as session:
+        with self._store.read_one() as session:
             rows = read_jobs(session, states=OPEN, limit=MOST)
         for job in reversed(rows):
             self._follow_ending(job)
@@ -313,7 +313,7 @@ class SharedJobs(Jobs):
         """See ``Jobs``: another process may have ended or begun it."""
         with self._store.write() as session:
             job = read_job(session, run.job.id)
-            if job is None or job.state != WAITING or not (self._alone or self.leads()):
+            if job is None or job.state != WAITING or not (self._alone or self.is_leader()):
                 return False
             update_job(session, run.job.id, state=RUNNING, started=now(), begun=1)
             job = need_job(session, run.job.id)
@@ -321,7 +321,7 @@ class SharedJobs(Jobs):
         return True
 
     def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
-        if self._alone or self.leads():
+        if self._alone or self.is_leader():
             return super()._finish(run, by, **values)
         # Whoever carries out jobs now begins it again.
         run.over.set()

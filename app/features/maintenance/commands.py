@@ -47,10 +47,10 @@ def maintenance(
     print_values(vars(banner) if banner else {"text": None}, json_)
 
 
-def _time(said: str | None, option: str) -> datetime | None:
-    if said is None:
+def _time(text: str | None, option: str) -> datetime | None:
+    if text is None:
         return None
     try:
-        return datetime.fromisoformat(said).astimezone()
+        return datetime.fromisoformat(text).astimezone()
     except (ValueError, OverflowError):
-        raise typer.BadParameter(f'{option} "{said}" is no time, such as {WHEN}') from None
+        raise typer.BadParameter(f'{option} "{text}" is no time, such as {WHEN}') from None

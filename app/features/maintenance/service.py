@@ -10,7 +10,7 @@ from app.config import Settings
 from app.db.session import now, text_of
 from app.db.store import Store
 from app.errors import InputError
-from app.features.audit.audit_events import note_deed
+from app.features.audit.audit_events import add_audit_event
 from app.features.maintenance.queries import find_banner, put_banner
 from app.finite import Moment
 from app.hosts import is_local
@@ -67,7 +67,7 @@ def set_banner(
     banner = Banner(text, begin, end)
     with store.write() as session:
         put_banner(session, asdict(banner))
-        note_deed(session, actor, "maintenance notice set", None, text=text)
+        add_audit_event(session, actor, "maintenance notice set", None, text=text)
     return banner
 
 
@@ -77,7 +77,7 @@ def clear_banner(store: Store, *, actor: str) -> bool:
         if find_banner(session) is None:
             return False
         put_banner(session, None)
-        note_deed(session, actor, "maintenance notice cleared", None)
+        add_audit_event(session, actor, "maintenance notice cleared", None)
         return True
 
 

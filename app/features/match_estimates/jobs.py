@@ -24,7 +24,7 @@ from app.features.datasets.service import (
 from app.features.groups.codecs import picture_to_json
 from app.features.jobs.queries import Job
 from app.features.jobs.records import need_job
-from app.features.jobs.run import JobProgress, Work, counting
+from app.features.jobs.run import JobProgress, Work, counting_progress
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.pictures import estimate_pictures
 from app.features.match_estimates.positions import (
@@ -43,7 +43,7 @@ from app.features.solve.jobs import change_and_solve, request_solve
 
 
 @dataclass(frozen=True)
-class MatchesAsked:
+class MatchCall:
     """What one job was asked for.
 
     Attributes:
@@ -122,7 +122,7 @@ class MatchJob:
 
     kind: str
     title: str
-    work: Callable[[MatchesAsked, JobProgress], Json]
+    work: Callable[[MatchCall, JobProgress], Json]
     require: Callable[[Store, str | int, Collection[str] | None], Dataset | DatasetHead] = (
         with_matches
     )
@@ -158,7 +158,9 @@ class MatchJob:
 
     def take_up(self, jobs: Jobs, store: Store) -> None:
         """Let another process carry out what this one is asked for, or the next one go on with it."""
-        (jobs.resumes if self.resumes else jobs.makes)(self.kind, self._work(jobs, store))
+        (jobs.register_resume if self.resumes else jobs.register_work)(
+            self.kind, self._work(jobs, store)
+        )
 
     def take_back(
         self, jobs: Jobs, store: Store, dataset: str | int, match: str | None = None, *, actor: str
@@ -187,13 +189,13 @@ class MatchJob:
         return job
 
     def _work(self, jobs: Jobs, store: Store) -> Work:
-        return lambda progress: self.work(MatchesAsked(jobs, store, progress.job), progress)
+        return lambda progress: self.work(MatchCall(jobs, store, progress.job), progress)
 
 
-def _estimate(asked: MatchesAsked, progress: JobProgress) -> Json:
-    with asked.jobs.pool() as executor:
-        told = counting(progress, "matches")
-        found = estimate_pictures(asked.store, asked.dataset_id, executor, told, asked.matches)
+def _estimate(call: MatchCall, progress: JobProgress) -> Json:
+    with call.jobs.pool() as executor:
+        counter = counting_progress(progress, "matches")
+        found = estimate_pictures(call.store, call.dataset_id, executor, counter, call.matches)
     return {
         "items": [
             {
@@ -213,21 +215,21 @@ def _estimate(asked: MatchesAsked, progress: JobProgress) -> Json:
 PICTURES = MatchJob("pictures", "Estimate the pictures of {}", _estimate)
 
 
-def _share(asked: MatchesAsked, progress: JobProgress) -> Json:
+def _share(call: MatchCall, progress: JobProgress) -> Json:
     try:
-        with asked.jobs.pool() as executor:
+        with call.jobs.pool() as executor:
             found = share_positions(
-                asked.store,
-                asked.dataset_id,
-                asked.matches,
-                actor=asked.job.actor,
+                call.store,
+                call.dataset_id,
+                call.matches,
+                actor=call.job.actor,
                 executor=executor,
-                progress=counting(progress, "matches"),
+                progress=counting_progress(progress, "matches"),
                 require_wanted=progress.require_wanted,
             )
     finally:
         # What some matches were given before it ended is solved, however it ended.
-        asked.solve()
+        call.solve()
     return {"matches": len(found.items), "shared": sum(item.shared for item in found.items)}
 
 
@@ -242,13 +244,13 @@ POSITIONS = MatchJob(
 )
 
 
-def _adjust(asked: MatchesAsked, progress: JobProgress) -> Json:
+def _adjust(call: MatchCall, progress: JobProgress) -> Json:
     """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept`` takes it (none:
     nothing), with the ``inputs`` of the proposal that a person saw: no other one is saved."""
-    what, inputs = asked.job.request["what"], asked.job.request["inputs"]
+    what, inputs = call.job.request["what"], call.job.request["inputs"]
     progress(0, None, "Adjusting cameras to lines and balls.")
-    with asked.jobs.pool() as executor:
-        proposed = propose(asked.store, asked.dataset_id, executor=executor)
+    with call.jobs.pool() as executor:
+        proposed = propose(call.store, call.dataset_id, executor=executor)
     progress.check()
     if what is not None:
         if inputs != proposed.inputs:
@@ -256,8 +258,8 @@ def _adjust(asked: MatchesAsked, progress: JobProgress) -> Json:
                 "balls, lines or cameras have changed since that proposal",
                 hint="Look at a new one, and accept that.",
             )
-        accept(asked.store, proposed, what, actor=asked.job.actor)
-        asked.solve()
+        accept(call.store, proposed, what, actor=call.job.actor)
+        call.solve()
     return {**proposal_values(proposed), "accepted": what}
 
 

@@ -21,7 +21,7 @@ from app.features.groups.group_edits import give_edits
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.match_estimates.queries import MatchPictures, match_pictures
 from app.features.pitches.queries import groups_of_match, match_pitches
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CalibrationPolicy
@@ -90,7 +90,7 @@ def estimate_pictures(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     only: Collection[str] | None = None,
 ) -> list[PictureState]:
     """What the lines of each match's main cameras say of their pictures; saves nothing.

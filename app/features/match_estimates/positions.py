@@ -32,7 +32,7 @@ from app.features.match_estimates.queries import (
     position_inputs,
 )
 from app.features.solutions.queries import read_calibrations
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group, SharedPosition, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -120,7 +120,7 @@ def share_positions(
     *,
     actor: str,
     executor: Executor | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> DatasetPositions:
     """Estimate where matches' main cameras stand, and give it to their groups; stale until solved.
@@ -240,7 +240,7 @@ def _give(
         }
 
     where = (session, dataset_id, POSITION, ids, of_match)
-    give_edits(*where, actor=actor, body=body, told=ids[0] if ids else None)
+    give_edits(*where, actor=actor, body=body, always_logged=ids[0] if ids else None)
 
 
 def _read(session: Session, dataset: str | int) -> DatasetPositions:
@@ -335,7 +335,7 @@ def _picture(group_id: int, group: Group, alone: Calibration | None) -> _Picture
 
 def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]:
     """Positions by group and view; runs in a worker."""
-    found = list(_alone(task))
+    found = list(_calibrated_alone(task))
     places = [place for _, _, place in found if place is not None]
     every, row = Places(places), iter(range(len(places)))
     positions: dict[int, dict[str, SharedPosition]] = {}
@@ -351,7 +351,9 @@ def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]
     return replace(task, pictures=()), positions
 
 
-def _alone(task: _Task) -> Iterator[tuple[_Picture, Calibration | None, FramePlace | None]]:
+def _calibrated_alone(
+    task: _Task,
+) -> Iterator[tuple[_Picture, Calibration | None, FramePlace | None]]:
     """Pictures, calibrated; None where solving would take no position from others."""
     for picture in task.pictures:
         station = picture.station

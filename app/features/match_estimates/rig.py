@@ -88,11 +88,11 @@ def propose(
         for state in states
         if (camera := calibrate_station(state.station, pitch, policy.calibration).camera)
     ]
-    asked = cameras, frames, pitch, policy
+    arguments = cameras, frames, pitch, policy
     if executor is None:
-        proposal = propose_rig(*asked)
+        proposal = propose_rig(*arguments)
     else:
-        proposal = executor.submit(propose_rig, *asked).result()
+        proposal = executor.submit(propose_rig, *arguments).result()
     inputs = digest(
         [
             SOLVER_VERSION,

@@ -60,7 +60,7 @@ def share_positions(
     return POSITIONS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@positions_router.delete("", operation_id="takePositionsBack", **by_job(404, 409))
+@positions_router.delete("", operation_id="revertPositions", **by_job(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def take_back_positions(
@@ -91,8 +91,8 @@ def adjust_rig(
     were used and on instants that were held out. With `accept` and the `inputs` of the
     proposal that was looked at it is saved as an edit of each camera.
     """
-    asked = {"what": request.accept, "inputs": request.inputs}
-    return RIG.request(services.jobs, services.store, dataset, actor=actor, **asked)
+    subject = {"what": request.accept, "inputs": request.inputs}
+    return RIG.request(services.jobs, services.store, dataset, actor=actor, **subject)
 
 
 def _taken_back(count: int) -> Response:
@@ -101,7 +101,7 @@ def _taken_back(count: int) -> Response:
 
 @rig_router.delete(
     "/datasets/{dataset}/rig",
-    operation_id="takeRigBack",
+    operation_id="revertRig",
     response_model=RigTakenBack,
     responses=responses(404, 409),
 )
@@ -147,7 +147,7 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     return change_and_solve(services.jobs, store, found.dataset_id, change, actor=actor)
 
 
-@noise_router.delete("", operation_id="takeNoiseBack", **by_job(404))
+@noise_router.delete("", operation_id="revertNoise", **by_job(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(QUESTIONS)
 @responds(job_answer)

@@ -10,14 +10,14 @@ from typing import Any
 from sqlalchemy import ColumnElement, delete, func, insert, literal, select, update
 
 from app.db.session import Session
-from app.features.comments.tables import BellModel
+from app.features.comments.tables import NotificationModel
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
-from app.features.people.visibility_queries import Sight, seen_anywhere
+from app.features.people.visibility_queries import Visibility, seen_anywhere
 from app.finite import Moment
 
 
-class RingKind(StrEnum):
+class NotificationKind(StrEnum):
     """Why somebody is told."""
 
     MENTION = "mention"
@@ -28,7 +28,7 @@ class RingKind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Ring:
+class Notification:
     """One thing that a person was told.
 
     Attributes:
@@ -41,7 +41,7 @@ class Ring:
 
     id: int
     at: Moment
-    kind: RingKind
+    kind: NotificationKind
     actor: str
     sentence: str
     address: str
@@ -50,61 +50,65 @@ class Ring:
     read: Moment | None
 
 
-def insert_ring(session: Session, person_id: int, values: dict[str, Any]) -> int:
+def insert_notification(session: Session, person_id: int, values: dict[str, Any]) -> int:
     """Tell a person of something; returns its id."""
-    identity = next_id(session, BellModel)
-    session.execute(insert(BellModel), {"id": identity, "person_id": person_id, **values})
+    identity = next_id(session, NotificationModel)
+    session.execute(insert(NotificationModel), {"id": identity, "person_id": person_id, **values})
     return identity
 
 
-def forget_rings(session: Session, person_id: int, before: str) -> None:
+def delete_notifications(session: Session, person_id: int, before: str) -> None:
     """Forget what a person was told before a time."""
-    mine = BellModel.person_id == person_id
-    session.execute(delete(BellModel).where(mine, BellModel.at < before))
+    mine = NotificationModel.person_id == person_id
+    session.execute(delete(NotificationModel).where(mine, NotificationModel.at < before))
 
 
-def read_rings(
+def select_notifications(
     session: Session,
     person_id: int,
-    sight: Sight,
+    visibility: Visibility,
     since: str,
     limit: int,
     before: int | None = None,
-) -> list[Ring]:
+) -> list[Notification]:
     """What a person was told since a time of what they see now, the newest first."""
-    columns = [getattr(BellModel, name) for name in Ring.__dataclass_fields__ if name != "dataset"]
+    columns = [
+        getattr(NotificationModel, name)
+        for name in Notification.__dataclass_fields__
+        if name != "dataset"
+    ]
     statement = (
         select(*columns, DatasetModel.name.label("dataset"))
-        .outerjoin(DatasetModel, DatasetModel.id == BellModel.dataset_id)
-        .where(*_seen(person_id, sight, since))
-        .order_by(BellModel.id.desc())
+        .outerjoin(DatasetModel, DatasetModel.id == NotificationModel.dataset_id)
+        .where(*_visible(person_id, visibility, since))
+        .order_by(NotificationModel.id.desc())
         .limit(limit)
     )
     if before is not None:
-        statement = statement.where(BellModel.id < before)
+        statement = statement.where(NotificationModel.id < before)
     rows = session.execute(statement)
-    return [Ring(**{**row._mapping, "kind": RingKind(row.kind)}) for row in rows]
+    return [Notification(**{**row._mapping, "kind": NotificationKind(row.kind)}) for row in rows]
 
 
-def count_unread(session: Session, person_id: int, sight: Sight, since: str) -> int:
+def count_unread(session: Session, person_id: int, visibility: Visibility, since: str) -> int:
     """How much of it they have not seen yet."""
-    unread = (*_seen(person_id, sight, since), BellModel.read.is_(None))
-    return session.scalar(select(func.count()).select_from(BellModel).where(*unread)) or 0
+    unread = (*_visible(person_id, visibility, since), NotificationModel.read.is_(None))
+    return session.scalar(select(func.count()).select_from(NotificationModel).where(*unread)) or 0
 
 
 def mark_read(
-    session: Session, person_id: int, sight: Sight, ids: Sequence[int] | None, at: str
+    session: Session, person_id: int, visibility: Visibility, ids: Sequence[int] | None, at: str
 ) -> None:
     """They have seen some of it, or (None) all that they see now."""
-    where = [*_seen(person_id, sight, ""), BellModel.read.is_(None)]
+    where = [*_visible(person_id, visibility, ""), NotificationModel.read.is_(None)]
     if ids is not None:
-        where.append(BellModel.id.in_(ids))
-    session.execute(update(BellModel).where(*where).values(read=at))
+        where.append(NotificationModel.id.in_(ids))
+    session.execute(update(NotificationModel).where(*where).values(read=at))
 
 
-def _seen(person_id: int, sight: Sight, since: str) -> list[ColumnElement[bool]]:
-    where = [BellModel.person_id == person_id, BellModel.at >= since]
+def _visible(person_id: int, visibility: Visibility, since: str) -> list[ColumnElement[bool]]:
+    where = [NotificationModel.person_id == person_id, NotificationModel.at >= since]
     # What is of no dataset was told to them, and is theirs.
-    seen = sight.condition(BellModel.dataset_id, literal(sight.name))
-    where += seen_anywhere(BellModel.dataset_id, BellModel.group_id)
+    seen = visibility.condition(NotificationModel.dataset_id, literal(visibility.name))
+    where += seen_anywhere(NotificationModel.dataset_id, NotificationModel.group_id)
     return where if seen is None else [*where, seen]

@@ -7,8 +7,8 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from app.features.notifications import service as bell
-from app.features.notifications.schemas import BellDocument, BellRead
-from app.features.notifications.service import Bell
+from app.features.notifications.schemas import NotificationsDocument, SeenNotifications
+from app.features.notifications.service import NotificationState
 from app.features.people.session_routes import Me
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
@@ -19,23 +19,23 @@ from app.http.respond import as_document, responds
 from app.http.route import Route
 from app.http.team import AppTeam
 
-router = APIRouter(prefix="/bell", tags=["comments"], route_class=Route)
+router = APIRouter(prefix="/notifications", tags=["comments"], route_class=Route)
 
 
-@router.get("", operation_id="getBell", responses=responses(401, 409))
+@router.get("", operation_id="getNotifications", responses=responses(401, 409))
 @may(Action.ACCOUNT)
 @limit(LOOKS)
-def get_bell(
+def get_notifications(
     store: AppStore,
     _team: AppTeam,
     me: Me,
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
     cursor: Cursor = None,
     before: Before = None,
-) -> BellDocument:
+) -> NotificationsDocument:
     """What one was told in the last 90 days, of what one sees now, the newest first."""
-    found = bell.read_bell(store, me, limit + 1, first_below(cursor, before))
-    document = BellDocument.model_validate(found)
+    found = bell.read_notifications(store, me, limit + 1, first_below(cursor, before))
+    document = NotificationsDocument.model_validate(found)
     if len(document.items) > limit:
         document.items = document.items[:limit]
         document.next = str(document.items[-1].id)
@@ -44,12 +44,14 @@ def get_bell(
 
 @router.post(
     "/read",
-    operation_id="readBell",
-    response_model=BellDocument,
+    operation_id="markNotificationsRead",
+    response_model=NotificationsDocument,
     responses=responses(401, 409, 413, 415),
 )
 @may(Action.ACCOUNT)
-@responds(as_document(BellDocument.model_validate))
-def read_bell(said: BellRead, store: AppStore, _team: AppTeam, me: Me) -> Bell:
+@responds(as_document(NotificationsDocument.model_validate))
+def mark_notifications_read(
+    body: SeenNotifications, store: AppStore, _team: AppTeam, me: Me
+) -> NotificationState:
     """One has seen some of it, or all."""
-    return bell.read_all(store, me, said.ids)
+    return bell.read_all(store, me, body.ids)

@@ -6,18 +6,18 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.features.notifications.queries import Ring
+from app.features.notifications.queries import Notification
 from app.finite import MAX_ID
 from app.http.documents import ListDocument
 
 
-class BellDocument(ListDocument[Ring]):
+class NotificationsDocument(ListDocument[Notification]):
     """What somebody was told in the last 90 days, of what they see now, the newest first."""
 
     unread: int = Field(description="How much of all of it they have not seen yet.")
 
 
-class BellRead(BaseModel):
+class SeenNotifications(BaseModel):
     """What somebody has seen."""
 
     model_config = ConfigDict(

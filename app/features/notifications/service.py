@@ -9,13 +9,13 @@ from datetime import UTC, datetime, timedelta
 from app.db.session import Session, now, text_of
 from app.db.store import Store
 from app.features.notifications.queries import (
-    Ring,
-    RingKind,
+    Notification,
+    NotificationKind,
     count_unread,
-    forget_rings,
-    insert_ring,
+    delete_notifications,
+    insert_notification,
     mark_read,
-    read_rings,
+    select_notifications,
 )
 from app.features.people.logins import Login, read_roles
 from app.features.people.queries import person_by_name
@@ -27,17 +27,17 @@ KEPT_DAYS = 90
 
 
 @dataclass(frozen=True)
-class Bell:
+class NotificationState:
     """What a person was told, the newest first, and how much of all of it they have not seen."""
 
-    items: list[Ring]
+    items: list[Notification]
     unread: int
 
 
-def tell(
+def notify(
     session: Session,
     person: str,
-    kind: RingKind,
+    kind: NotificationKind,
     sentence: str,
     *,
     actor: str,
@@ -62,7 +62,7 @@ def tell(
     Returns:
         Whether they were told.
     """
-    if kind is not RingKind.JOB and person_of(actor) == person:
+    if kind is not NotificationKind.JOB and person_of(actor) == person:
         return False
     row = person_by_name(session, person)
     if row is None or row.disabled:
@@ -71,31 +71,37 @@ def tell(
     if dataset_id is not None and roles.role_in(dataset_id) is Role.NONE:
         return False
     at = now()
-    forget_rings(session, row.id, _oldest())
+    delete_notifications(session, row.id, _oldest())
     what = {"at": at, "kind": str(kind), "actor": actor, "sentence": sentence}
     where = {"address": address, "dataset_id": dataset_id, "group_id": group_id}
-    insert_ring(session, row.id, {**what, **where})
+    insert_notification(session, row.id, {**what, **where})
     return True
 
 
-def read_bell(store: Store, login: Login, limit: int = 50, before: int | None = None) -> Bell:
+def read_notifications(
+    store: Store, login: Login, limit: int = 50, before: int | None = None
+) -> NotificationState:
     """What somebody was told in the last 90 days, of what they see at this moment."""
     with store.read() as session:
         return _read(session, login, limit, before)
 
 
-def read_all(store: Store, login: Login, ids: Sequence[int] | None = None) -> Bell:
+def read_all(store: Store, login: Login, ids: Sequence[int] | None = None) -> NotificationState:
     """They have seen some of what they were told, or (None) all of it."""
     with store.write() as session:
-        mark_read(session, login.person_id, login.sight, ids, now())
+        mark_read(session, login.person_id, login.visibility, ids, now())
         bell = _read(session, login)
         session.respond(bell)
         return bell
 
 
-def _read(session: Session, login: Login, limit: int = 50, before: int | None = None) -> Bell:
-    mine = (login.person_id, login.sight, _oldest())
-    return Bell(read_rings(session, *mine, limit, before), count_unread(session, *mine))
+def _read(
+    session: Session, login: Login, limit: int = 50, before: int | None = None
+) -> NotificationState:
+    mine = (login.person_id, login.visibility, _oldest())
+    return NotificationState(
+        select_notifications(session, *mine, limit, before), count_unread(session, *mine)
+    )
 
 
 def _oldest() -> str:

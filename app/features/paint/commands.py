@@ -195,9 +195,11 @@ def _propose_for_views(
                 return
             for item in items:
                 counts = ", ".join(f"{item[name]} {name}" for name in get_args(ProposalOutcome))
-                said = f"{item['looked']} of {plural(item['views'], 'view')} looked at: {counts}"
+                sentence = (
+                    f"{item['looked']} of {plural(item['views'], 'view')} looked at: {counts}"
+                )
                 name = f"{item['match']}: " if item["match"] else ""
-                say(f"{name}{said}, {item['accepted']} accepted")
+                say(f"{name}{sentence}, {item['accepted']} accepted")
             return
         with show_progress("Proposing") as progress:
             run = propose_views(store, dataset, matches, workers=workers, progress=progress)

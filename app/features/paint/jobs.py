@@ -7,34 +7,34 @@ from dataclasses import asdict
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
-from app.features.jobs.run import JobProgress, counting
+from app.features.jobs.run import JobProgress, counting_progress
 from app.features.jobs.service import Jobs
-from app.features.match_estimates.jobs import MatchesAsked, MatchJob
+from app.features.match_estimates.jobs import MatchCall, MatchJob
 from app.features.paint.proposals import forget_proposals, propose_views
 from app.features.paint.service import read_paint, require_readable, take_back_paint
 
-TOLD = (
+REPORTED = (
     *("views", "without_picture", "read"),
     *("painted", "no_paint", "paint_disagrees", "no_frame"),
 )
 """What a result counts of all matches."""
 
 
-def _read(asked: MatchesAsked, progress: JobProgress) -> Json:
+def _read(call: MatchCall, progress: JobProgress) -> Json:
     try:
         found = read_paint(
-            asked.store,
-            asked.dataset_id,
-            asked.matches,
-            actor=asked.job.actor,
-            run=asked.job.request["run"],
-            progress=counting(progress, "groups looked at"),
+            call.store,
+            call.dataset_id,
+            call.matches,
+            actor=call.job.actor,
+            run=call.job.request["run"],
+            progress=counting_progress(progress, "groups looked at"),
             require_wanted=progress.require_wanted,
         )
     finally:
         # What some groups were given before it ended is solved, however it ended.
-        asked.solve()
-    return {name: sum(getattr(item, name) for item in found.items) for name in TOLD}
+        call.solve()
+    return {name: sum(getattr(item, name) for item in found.items) for name in REPORTED}
 
 
 PAINT = MatchJob(
@@ -59,12 +59,12 @@ def stop_and_forget(jobs: Jobs, store: Store, dataset: str | int) -> int:
     return forget_proposals(store, number)
 
 
-def _propose(asked: MatchesAsked, progress: JobProgress) -> Json:
+def _propose(call: MatchCall, progress: JobProgress) -> Json:
     run = propose_views(
-        asked.store,
-        asked.dataset_id,
-        asked.matches,
-        progress=counting(progress, "views looked at"),
+        call.store,
+        call.dataset_id,
+        call.matches,
+        progress=counting_progress(progress, "views looked at"),
         require_wanted=progress.require_wanted,
     )
     return asdict(run)

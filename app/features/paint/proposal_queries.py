@@ -190,9 +190,9 @@ def match_proposals(
 ) -> list[MatchProposals]:
     """How far each match of a dataset is, or each of these, by name."""
     lost = lost_views(session, dataset_id, matches)
-    asked, outcome = _is_asked(lost), ProposalModel.outcome
+    is_candidate, outcome = _is_asked(lost), ProposalModel.outcome
     # What was said of a view as it was before says nothing of it now.
-    looked = and_(asked, _is_open())
+    looked = and_(is_candidate, _is_open())
 
     def number(*conditions: ColumnElement[bool]) -> ColumnElement[int]:
         return func.coalesce(func.sum(case((and_(*conditions), 1), else_=0)), 0)
@@ -200,7 +200,7 @@ def match_proposals(
     statement = (
         select(
             GroupModel.match,
-            number(asked),
+            number(is_candidate),
             number(looked),
             *(number(looked, outcome == name) for name in PROPOSAL_OUTCOMES),
             number(outcome == "proposed", StationModel.proposed.is_not(None)),

@@ -33,7 +33,7 @@ from app.features.paint.proposal_queries import (
 from app.features.paint.proposal_queries import Proposal as Proposal
 from app.media.frames import VideoIndexer
 from app.paint.propose import SEARCH_VERSION
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerLimits
 
@@ -122,7 +122,7 @@ def propose_views(
     matches: Collection[str] | None = None,
     *,
     workers: int | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> ProposalRun:
     """Look at the pictures of all views that have neither a given camera nor one of their lines.
@@ -144,15 +144,15 @@ def propose_views(
     """
     with store.read() as session:
         found = require_matches(session, dataset, matches)
-        asked = views_to_look_at(session, found.id, matches)
-    count, total = workers or store.settings.image_workers, sum(len(views) for _, views in asked)
+        pending = views_to_look_at(session, found.id, matches)
+    count, total = workers or store.settings.image_workers, sum(len(views) for _, views in pending)
     run = ProposalRun()
     with (
         closing(VideoIndexer(store.settings)) as videos,
         closing(WorkerPool(LIMITS, count, 0, "pictures", COUNTS["proposals"])) as pool,
     ):
-        for start in range(0, len(asked), _PER_WORKER * count):
-            tasks = _tasks(store, found, dict(asked[start : start + _PER_WORKER * count]))
+        for start in range(0, len(pending), _PER_WORKER * count):
+            tasks = _tasks(store, found, dict(pending[start : start + _PER_WORKER * count]))
             views = [task.media for task in tasks]
             videos.make_ready(views, run.views, total, progress)
             answers = _answers(store, pool, videos, tasks)
@@ -181,15 +181,17 @@ def forget_proposals(store: Store, dataset: str | int) -> int:
     return gone
 
 
-def _tasks(store: Store, dataset: DatasetHead, asked: dict[int, list[int]]) -> list[ProposalTask]:
+def _tasks(
+    store: Store, dataset: DatasetHead, views_by_group: dict[int, list[int]]
+) -> list[ProposalTask]:
     tasks = []
     with store.read() as session:
-        old = read_proposals(session, [view for views in asked.values() for view in views])
-        for stored in read_groups(session, list(asked), extras=False).values():
+        old = read_proposals(session, [view for views in views_by_group.values() for view in views])
+        for stored in read_groups(session, list(views_by_group), extras=False).values():
             # The replays of a group look from elsewhere, but its main camera may be known, too.
             known = known_cameras(session, stored)
             for key, number in stored.view_ids.items():
-                if number in asked[stored.id]:
+                if number in views_by_group[stored.id]:
                     tasks.append(_task(stored, key, known, dataset, old.get(number)))
     return [task for task in tasks if task is not None]
 
@@ -201,7 +203,7 @@ def _task(
     if view is None or view.media is None:
         return None
     station, pitch = view.station, stored.group.pitch
-    said = [
+    inputs = [
         SEARCH_VERSION,
         [camera_to_json(camera) for camera in known],
         [float(pitch.length), float(pitch.width)],
@@ -216,7 +218,7 @@ def _task(
         known=tuple(known),
         pitch=pitch,
         policy=policy,
-        sought_with=digest(said),
+        sought_with=digest(inputs),
         old=old,
         drawn=station.lines,
         beside=station_digest(station) if station.lines else "",
@@ -226,11 +228,11 @@ def _task(
 def _answers(
     store: Store, pool: WorkerPool, videos: VideoIndexer, tasks: Sequence[ProposalTask]
 ) -> list[Proposal | None]:
-    asked = [
+    futures = [
         PictureTask(pool, *videos.with_index(task.media, read_proposal, task, store.settings))
         for task in tasks
     ]
-    return [_result(task, reads) for task, reads in zip(tasks, asked, strict=True)]
+    return [_result(task, reads) for task, reads in zip(tasks, futures, strict=True)]
 
 
 def _result(task: ProposalTask, reads: PictureTask) -> Proposal | None:

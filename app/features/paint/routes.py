@@ -11,7 +11,7 @@ from fastapi import APIRouter, Request, Response
 
 from app.features.groups.schemas import points_of
 from app.features.groups.view_paint import PaintQuestion, paint_question, proposal_question
-from app.features.groups.view_routes import CLIENT_GONE, told_with_view
+from app.features.groups.view_routes import CLIENT_GONE, with_view_in_error
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument
 from app.features.match_estimates.schemas import MatchRequest
@@ -65,7 +65,7 @@ def read_paint(
     return PAINT.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@paint_router.delete("", operation_id="takeDatasetPaintBack", **by_job(404, 409))
+@paint_router.delete("", operation_id="revertDatasetPaint", **by_job(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
 def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -124,7 +124,7 @@ async def propose_lines(
 
 async def _answer(request: Request, question: PaintQuestion, ask: Callable[[], PoolTask]) -> Any:
     """What was found, or None where nobody waits for it any more."""
-    with told_with_view(question.view.key):
+    with with_view_in_error(question.view.key):
         return await ask().result_unless(request.is_disconnected)
 
 

@@ -37,10 +37,10 @@ from app.features.paint.queries import (
 )
 from app.features.solutions.service import known_calibrations
 from app.media.frames import VideoIndexer
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import clicks_key, sought_key
+from app.solving.calibrate import clicks_key, paint_search_key
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerLimits
 
@@ -119,7 +119,7 @@ def read_paint(
     actor: str,
     run: str | None = None,
     workers: int | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     require_wanted: Callable[[], None] | None = None,
 ) -> DatasetPaint:
     """Read the paint of pictures and give it to their groups; stale until solved.
@@ -250,8 +250,10 @@ def _give(
             insert_readings(session, dataset_id, group.paint.values())
         return {number: SetPaint(group.paint) for number, group in fitting.items()}
 
-    told = ids[0] if ids and "takes_back" in body else None
-    give_edits(session, dataset_id, PAINT, ids, edits, actor=actor, body=body, told=told)
+    always_logged = ids[0] if ids and "takes_back" in body else None
+    give_edits(
+        session, dataset_id, PAINT, ids, edits, actor=actor, body=body, always_logged=always_logged
+    )
 
 
 def _tasks(store: Store, ids: Sequence[int], dataset: DatasetHead) -> dict[int, list[PaintTask]]:
@@ -278,7 +280,7 @@ def _group_tasks(
         if view.takes_paint:
             clicked = known.get(clicks_key(group, view, policy))
             alone = replace(group, views=(view,), paint={})
-            key, old = sought_key(group, view, policy), group.paint.get(view.key)
+            key, old = paint_search_key(group, view, policy), group.paint.get(view.key)
             yield PaintTask(alone, policy, key, clicked, old)
 
 
@@ -295,14 +297,14 @@ def _readings(
         media = task.view.media
         return PictureTask(pool, *(work if media is None else videos.with_index(media, *work)))
 
-    asked = {number: [(task, ask(task)) for task in some] for number, some in tasks.items()}
+    futures = {number: [(task, ask(task)) for task in some] for number, some in tasks.items()}
     return {
         number: {
             task.view.key: reading
             for task, reads in some
             if (reading := _result(task, reads)) is not None
         }
-        for number, some in asked.items()
+        for number, some in futures.items()
     }
 
 

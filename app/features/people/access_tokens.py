@@ -19,7 +19,7 @@ from typing import Any
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
-from app.features.people.links import hash_of
+from app.features.people.links import token_hash
 from app.features.people.login_queries import (
     access_tokens,
     delete_access_token,
@@ -72,14 +72,14 @@ class AccessToken:
     expired: bool
 
 
-def new_text() -> str:
+def new_token_text() -> str:
     """The text of a new token."""
     body = PREFIX + "".join(secrets.choice(_LETTERS) for _ in range(SHOWN + SECRET))
     return body + _checksum(body)
 
 
-def is_whole(text: str) -> bool:
-    """Whether a text is one that ``new_text`` can have made: no letter is missing or mistyped."""
+def has_valid_checksum(text: str) -> bool:
+    """Whether a text is one that ``new_token_text`` can have made: no letter is missing or mistyped."""
     return LOOKS.fullmatch(text) is not None and _checksum(text[:-CHECK]) == text[-CHECK:]
 
 
@@ -132,9 +132,9 @@ class AccessTokens:
             raise InputError("a token needs a scope", pointer="/scopes")
         if not 1 <= days <= MOST_DAYS:
             raise InputError(f"a token lasts 1 to {MOST_DAYS} days", pointer="/days")
-        at, text = self._clock(), new_text()
+        at, text = self._clock(), new_token_text()
         values = {
-            "token_hash": hash_of(text),
+            "token_hash": token_hash(text),
             "person_id": login.person_id,
             "dataset_id": dataset_id,
             "name": name,
@@ -152,7 +152,7 @@ class AccessTokens:
             mine = access_tokens(session, person.id)
             _require_room([row.name for row in mine], name)
             token_id = insert_access_token(session, values)
-            _note(session, person.name, person, "token made", values | {"id": token_id})
+            _log(session, person.name, person, "token made", values | {"id": token_id})
             made = next(row for row in access_tokens(session, person.id) if row.id == token_id)
         return self._read(made), text
 
@@ -162,10 +162,10 @@ class AccessTokens:
         Raises:
             NotLoggedInError: It is none, has expired or was ended, or its person is disabled.
         """
-        if not is_whole(text):
+        if not has_valid_checksum(text):
             raise NotLoggedInError(CUT, hint="Copy it again, all of it.")
-        with self._store.glance() as session:
-            row = find_access_token(session, hash_of(text), text_of(self._clock()), LEADING)
+        with self._store.read_one() as session:
+            row = find_access_token(session, token_hash(text), text_of(self._clock()), LEADING)
         if row is None:
             raise NotLoggedInError(INVALID, hint=ANOTHER)
         roles = roles_with(Role(row.role), rights_in(row))
@@ -175,7 +175,7 @@ class AccessTokens:
         use = TokenUse(row.name, _scopes(row), fresh=row.used is None)
         return Login(row.id, row.person_id, row.person, roles, seen, use)
 
-    def is_stale(self, login: Login) -> bool:
+    def is_use_unlogged(self, login: Login) -> bool:
         """Whether it should be written down that a token is used."""
         fresh = login.token is not None and login.token.fresh
         return fresh or self._clock() - login.seen > NOTED_AFTER
@@ -214,7 +214,7 @@ class AccessTokens:
                     hint="Account in the browser, or touchline users tokens, lists those there are.",
                 )
             delete_access_token(session, token_id)
-            _note(session, actor, person, "token ended", {"id": token_id, "name": row.name})
+            _log(session, actor, person, "token ended", {"id": token_id, "name": row.name})
             return self._read(row)
 
     def _read(self, row: Any) -> AccessToken:
@@ -224,8 +224,8 @@ class AccessTokens:
         return AccessToken(**values, scopes=_scopes(row), expired=expired)
 
 
-def _checked_name(said: str) -> str:
-    name = said.strip()
+def _checked_name(text: str) -> str:
+    name = text.strip()
     if not _NAME.fullmatch(name):
         raise InputError(
             "the name of a token is up to 40 letters, digits, spaces and . _ -", pointer="/name"
@@ -244,7 +244,7 @@ def _scopes(row: Any) -> tuple[Scope, ...]:
     return tuple(Scope(name) for name in row.scopes.split())
 
 
-def _note(session: Session, actor: str, person: Any, did: str, values: dict[str, Any]) -> None:
-    said = {name: values[name] for name in ("scopes", "expires", "dataset_id") if name in values}
+def _log(session: Session, actor: str, person: Any, did: str, values: dict[str, Any]) -> None:
+    changed = {name: values[name] for name in ("scopes", "expires", "dataset_id") if name in values}
     token = {"token": values["name"], "token_id": values["id"]}
-    note(session, actor, person.name, did, person.role, **token, **said)
+    note(session, actor, person.name, did, person.role, **token, **changed)

@@ -13,7 +13,7 @@ from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
     from app.features.people.access_tokens import AccessToken
-    from app.features.people.invitations import Invitation, Post
+    from app.features.people.invitations import Invitation, LinkMailer
     from app.features.people.roles import Role
     from app.features.people.service import Person
 
@@ -24,14 +24,14 @@ Email = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Send the lin
 Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
 
 
-def _role(said: str) -> Role:
+def _role(text: str) -> Role:
     from app.features.people.roles import Role
 
     try:
-        return Role(said.strip().lower())
+        return Role(text.strip().lower())
     except ValueError:
         known = ", ".join(Role)
-        raise typer.BadParameter(f'"{said}" is no role; there are {known}') from None
+        raise typer.BadParameter(f'"{text}" is no role; there are {known}') from None
 
 
 @commands.command()
@@ -75,21 +75,21 @@ def invite_many(
         print_json([vars(row) for row in report])
     else:
         for row in report:
-            told = [row.link, "link sent by mail" if row.mailed else None, row.problem]
-            more = "; ".join(part for part in told if part)
+            details = [row.link, "link sent by mail" if row.mailed else None, row.problem]
+            more = "; ".join(part for part in details if part)
             say(f"row {row.row:<4} {row.name:24} {row.role:10} {row.state:9} {more}".rstrip())
         say(f"{len(report) - refused} {'possible' if dry_run else 'invited'}, {refused} refused")
     if refused:
         raise typer.Exit(1)
 
 
-def _post() -> Post:
-    from app.features.people.invitations import Post
+def _post() -> LinkMailer:
+    from app.features.people.invitations import LinkMailer
     from app.mail import read_mail_server
 
     settings = read_settings()
     base = settings.url or f"http://{settings.host}:{settings.port}"
-    return Post(read_mail_server(settings), settings.url, base)
+    return LinkMailer(read_mail_server(settings), settings.url, base)
 
 
 @commands.command("list")
@@ -239,9 +239,13 @@ def tokens(
     from app.features.people.service import find_person
 
     with opened_store() as store:
-        asked = AccessTokens(store)
+        access_tokens = AccessTokens(store)
         person = None if name is None else find_person(store, name).id
-        found = asked.of_person(person) if end is None else [asked.end(end, person, actor=acting())]
+        found = (
+            access_tokens.of_person(person)
+            if end is None
+            else [access_tokens.end(end, person, actor=acting())]
+        )
     _print_tokens(found, json_, ended=end is not None)
 
 

@@ -19,11 +19,11 @@ from typing import Protocol
 import pyotp
 from cryptography.fernet import Fernet
 
-from app.db.ephemeral_state import note_attempt, oldest_attempt, put_begun, take_begun
+from app.db.ephemeral_state import note_attempt, oldest_attempt, put_begun, take_pending
 from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, installation_key
 from app.db.session import Session, text_of
 from app.db.store import Store
-from app.features.people.links import hash_of
+from app.features.people.links import token_hash
 from app.features.people.queries import (
     find_second_factor,
     person_by_name,
@@ -72,7 +72,7 @@ class Devices:
 
     def _signature(self, name: str, issued: str, nonce: str) -> str:
         key = installation_key(self._store.settings, DEVICES)
-        with self._store.glance() as session:
+        with self._store.read_one() as session:
             person = person_by_name(session, name.strip().lower())
         password = "" if person is None else person.password or ""
         parts = (_folded(name), issued.encode("utf-8", "replace"), nonce.encode("utf-8", "replace"))
@@ -100,8 +100,8 @@ class Attempts:
 
         Who is refused writes nothing: a flood keeps nobody from writing.
         """
-        at, name = self._clock(), hash_of(whose)
-        with self._store.glance() as session:
+        at, name = self._clock(), token_hash(whose)
+        with self._store.read_one() as session:
             oldest = oldest_attempt(session, name, at - seconds, most)
         if oldest is None:
             with self._store.write(lasting=False) as session:
@@ -119,7 +119,7 @@ MOST = 10_000
 Clock = Callable[[], datetime]
 
 
-class Waiting(Protocol):
+class PendingActions(Protocol):
     """What waits to be taken, for a short while."""
 
     def put(self, asker: str, value: bytes) -> None:
@@ -129,7 +129,7 @@ class Waiting(Protocol):
         """What waits for somebody, and from then on does not; None where nothing does that is good."""
 
 
-class Remembered:
+class InMemoryPending:
     """What waits in the memory of this process: a restart forgets it.
 
     Args:
@@ -142,7 +142,7 @@ class Remembered:
         self._open: dict[str, tuple[bytes, datetime]] = {}
 
     def put(self, asker: str, value: bytes) -> None:
-        """See ``Waiting``."""
+        """See ``PendingActions``."""
         at = self._clock()
         with self._lock:
             self._open.pop(asker, None)
@@ -152,7 +152,7 @@ class Remembered:
             self._open[asker] = value, at + self._lasts
 
     def take(self, asker: str) -> bytes | None:
-        """See ``Waiting``."""
+        """See ``PendingActions``."""
         with self._lock:
             value, ends = self._open.pop(asker, (None, None))
         return value if ends is not None and self._clock() < ends else None
@@ -161,7 +161,7 @@ class Remembered:
         return next(iter(self._open.values()))[1] <= at
 
 
-class Written:
+class StoredPending:
     """What waits in the database, for whichever process is asked next; encrypted with a key of the home.
 
     Args:
@@ -175,36 +175,36 @@ class Written:
         self._store, self._clock, self._lasts, self._kind = store, clock, lasts, kind
 
     def put(self, asker: str, value: bytes) -> None:
-        """See ``Waiting``."""
+        """See ``PendingActions``."""
         at = self._clock()
         closed, ends = self._key().encrypt(value), text_of(at + self._lasts)
         with self._store.write(lasting=False) as session:
             put_begun(session, self._name(asker), closed, ends, text_of(at), MOST)
 
     def take(self, asker: str) -> bytes | None:
-        """See ``Waiting``."""
+        """See ``PendingActions``."""
         with self._store.write() as session:
-            closed = take_begun(session, self._name(asker), text_of(self._clock()))
+            closed = take_pending(session, self._name(asker), text_of(self._clock()))
         return None if closed is None else self._key().decrypt(closed)
 
     def _name(self, asker: str) -> str:
-        return hash_of(f"{self._kind}/{asker}")
+        return token_hash(f"{self._kind}/{asker}")
 
     def _key(self) -> Fernet:
         return Fernet(urlsafe_b64encode(installation_key(self._store.settings, BEGUN)))
 
 
-def waiting(store: Store, clock: Clock, lasts: timedelta, kind: str) -> Waiting:
+def waiting(store: Store, clock: Clock, lasts: timedelta, kind: str) -> PendingActions:
     """What waits, where every process finds it that may be asked for it."""
     if store.sharing.is_shared:
-        return Written(store, clock, lasts, kind)
-    return Remembered(clock, lasts)
+        return StoredPending(store, clock, lasts, kind)
+    return InMemoryPending(clock, lasts)
 
 
 class Challenges:
     """Challenges of passkeys."""
 
-    def __init__(self, waiting: Waiting):
+    def __init__(self, waiting: PendingActions):
         self._waiting = waiting
 
     def make(self, asker: str) -> bytes:
@@ -226,15 +226,15 @@ CODE_BYTES = 10
 """Random bytes of a recovery code."""
 
 
-def take_code(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
+def use_code(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
     """Whether a code is right at a time, of an authenticator or a recovery code; it is then used."""
     text = plain(code)
     if len(text) == DIGITS:
-        return take_totp(session, store, person_id, text, at)
-    return use_recovery_code(session, person_id, hash_of(text))
+        return use_totp(session, store, person_id, text, at)
+    return use_recovery_code(session, person_id, token_hash(text))
 
 
-def take_totp(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
+def use_totp(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
     """The same of the code of an authenticator, of a second factor that is not confirmed too."""
     found = find_second_factor(session, person_id)
     if found is None:

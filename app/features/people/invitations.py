@@ -27,7 +27,7 @@ _COLUMNS = ("name", "role", "email")
 
 
 @dataclass(frozen=True)
-class Wanted:
+class InvitationRow:
     """Somebody who shall be invited, as a list says it: nothing is checked yet.
 
     Attributes:
@@ -66,7 +66,7 @@ class Invitation:
 
 
 @dataclass(frozen=True)
-class Post:
+class LinkMailer:
     """How links reach people.
 
     Attributes:
@@ -106,7 +106,7 @@ class Post:
 
 
 def invite_one(
-    store: Store, name: str, role: Role, email: str | None, post: Post, *, actor: str
+    store: Store, name: str, role: Role, email: str | None, post: LinkMailer, *, actor: str
 ) -> tuple[Person, Invitation]:
     """Make an account, and hand over the link with which its person chooses a password.
 
@@ -122,7 +122,7 @@ def invite_one(
 
 
 def renew_one(
-    store: Store, person_id: int, email: str | None, post: Post, *, actor: str
+    store: Store, person_id: int, email: str | None, post: LinkMailer, *, actor: str
 ) -> tuple[Person, Invitation]:
     """Make another link for somebody, and hand it over as an invitation is.
 
@@ -140,7 +140,7 @@ def renew_one(
 
 
 def invite_many(
-    store: Store, wanted: Sequence[Wanted], post: Post, *, actor: str, dry_run: bool
+    store: Store, wanted: Sequence[InvitationRow], post: LinkMailer, *, actor: str, dry_run: bool
 ) -> list[Invitation]:
     """Invite everybody of a list whose row is right, and say of each row what became of it.
 
@@ -185,7 +185,7 @@ def invite_many(
     return sorted([*refused, *done, *post.hand_over(links, actor)], key=lambda row: row.row)
 
 
-def read_list(text: str) -> list[Wanted]:
+def read_list(text: str) -> list[InvitationRow]:
     """The rows of a list: ``name,role,email`` a line, with commas, semicolons or tabs between.
 
     A first line of names of columns says in which order they come. Empty lines, and those that begin
@@ -198,7 +198,7 @@ def read_list(text: str) -> list[Wanted]:
     divider = max(",;\t", key=text.count)
     reader = csv.reader(io.StringIO(text), delimiter=divider, skipinitialspace=True)
     columns: Sequence[str] | None = None
-    found: list[Wanted] = []
+    found: list[InvitationRow] = []
     for cells in reader:
         values = [cell.strip() for cell in cells]
         if not any(values) or values[0].startswith("#"):
@@ -222,17 +222,17 @@ def _header(names: Sequence[str]) -> Sequence[str]:
     return names
 
 
-def _row(number: int, columns: Sequence[str], values: Sequence[str]) -> Wanted:
+def _row(number: int, columns: Sequence[str], values: Sequence[str]) -> InvitationRow:
     last = len(columns) - 1
     # Cells beyond the last column make its value one that is refused, and that the report shows.
     cells = [*values[:last], ",".join(value for value in values[last:] if value)]
     named = dict(zip(columns, cells, strict=False))
-    return Wanted(
+    return InvitationRow(
         number, named.get("name", ""), named.get("role", ""), named.get("email", "") or None
     )
 
 
-def _checked(one: Wanted, seen: dict[str, int]) -> tuple[str, Role, str | None]:
+def _checked(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str | None]:
     name = checked_name(one.name)
     if name in seen:
         raise InputError(f"{name} stands in row {seen[name]}, too")
@@ -240,12 +240,12 @@ def _checked(one: Wanted, seen: dict[str, int]) -> tuple[str, Role, str | None]:
         role = Role(one.role.strip().lower())
     except ValueError:
         known = ", ".join(Role)
-        said = f"{quoted(one.role)} is no role" if one.role.strip() else "the role is missing"
-        raise InputError(f"{said}; there are {known}") from None
+        problem = f"{quoted(one.role)} is no role" if one.role.strip() else "the role is missing"
+        raise InputError(f"{problem}; there are {known}") from None
     return name, role, checked_address(one.email) if one.email else None
 
 
-def _refused(one: Wanted, problem: str) -> Invitation:
+def _refused(one: InvitationRow, problem: str) -> Invitation:
     return Invitation(one.row, one.name[:80], one.role[:40], "refused", problem=problem)
 
 

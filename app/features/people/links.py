@@ -38,7 +38,7 @@ def new_token() -> str:
     return secrets.token_urlsafe(BYTES)
 
 
-def hash_of(token: str) -> str:
+def token_hash(token: str) -> str:
     """What is kept of a token. It is random and long, so a plain hash suffices."""
     return hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()
 
@@ -91,12 +91,12 @@ def _is_easy_to_guess(password: str, name: str) -> bool:
 
 def is_password(password: str, known: str | None) -> bool:
     """Whether a password belongs to a hash; without one it takes as long, and is not."""
-    fits = _in_turn(lambda: HASHER.verify(password[:LONGEST], known or _nobodys()))
+    fits = _in_turn(lambda: HASHER.verify(password[:LONGEST], known or _placeholder_hash()))
     return fits and known is not None and len(password) <= LONGEST
 
 
 @cache
-def _nobodys() -> str:
+def _placeholder_hash() -> str:
     """A hash that no password is known of, which is asked where there is no account."""
     return HASHER.hash("a placeholder password, as long as others")
 
@@ -129,7 +129,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Meant:
+class LinkHolder:
     """Whom a link is for; ``name`` is None for the first admin, who chooses one.
 
     Attributes:
@@ -154,18 +154,18 @@ def insert_new(
 ) -> Link:
     """Make a link for a person (None: for the first admin), in the caller's transaction."""
     token, expires = new_token(), text_of(at + lasts)
-    insert_link(session, hash_of(token), person_id, by=by, expires=expires)
+    insert_link(session, token_hash(token), person_id, by=by, expires=expires)
     return Link(token, expires)
 
 
-def look(store: Store, token: str) -> Meant:
+def look(store: Store, token: str) -> LinkHolder:
     """Whom a link is for; it stays good.
 
     Raises:
         NotFoundError: It is not good.
     """
     with store.read() as session:
-        return _meant(session, token)[1]
+        return _find_holder(session, token)[1]
 
 
 def use(store: Store, token: str, password: str, name: str | None = None) -> str:
@@ -199,7 +199,7 @@ def take(session: Session, token: str, name: str | None, *, password: str | None
         InputError: The name of the first admin cannot be one.
         ConflictError: It is taken.
     """
-    person_id, _ = _meant(session, token)
+    person_id, _ = _find_holder(session, token)
     if person_id is None:
         person_id = _make_admin(session, checked_name(name or ""))
         forget_links(session, None)
@@ -209,19 +209,19 @@ def take(session: Session, token: str, name: str | None, *, password: str | None
     return person_id
 
 
-def _meant(session: Session, token: str) -> tuple[int | None, Meant]:
+def _find_holder(session: Session, token: str) -> tuple[int | None, LinkHolder]:
     """Id of the person of a good link (None: the first admin), and who it is."""
-    row = find_link(session, hash_of(token), now())
+    row = find_link(session, token_hash(token), now())
     if row is None:
         raise NotFoundError(GONE, hint=ASK)
     if row.person_id is None:
         if count_able(session, Role.ADMIN):
             raise NotFoundError(GONE, hint=ASK)
-        return None, Meant(None, False)
+        return None, LinkHolder(None, False)
     person = person_by_id(session, row.person_id)
     if person is None or person.disabled:
         raise NotFoundError(GONE, hint=ASK)
-    return row.person_id, Meant(person.name, has_joined(session, person))
+    return row.person_id, LinkHolder(person.name, has_joined(session, person))
 
 
 def has_joined(session: Session, person: Any) -> bool:

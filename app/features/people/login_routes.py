@@ -63,11 +63,11 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def begin_passkey(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> CreationOptions:
+def begin_passkey(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> CreationOptions:
     """What a browser needs to make a passkey; takes the password."""
     team.require_passwords()
     team.count_try(request, me.name)
-    return CreationOptions(options=team.passkeys.begin(me, said.password, team.site(request)))
+    return CreationOptions(options=team.passkeys.begin(me, body.password, team.site(request)))
 
 
 @passkeys_router.post(
@@ -92,11 +92,11 @@ def make(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMad
 )
 @may(Action.ACCOUNT)
 def remove_passkey(
-    passkey: Id, said: PasswordOnly, request: Request, team: AppTeam, me: Me
+    passkey: Id, body: PasswordOnly, request: Request, team: AppTeam, me: Me
 ) -> None:
     """Stop accepting a passkey; 409 for the last second factor, where everybody needs one."""
     team.count_try(request, me.name)
-    team.passkeys.remove(me, passkey, said.password)
+    team.passkeys.remove(me, passkey, body.password)
 
 
 @passkeys_router.post(
@@ -122,7 +122,7 @@ def begin_login(request: Request, response: Response, team: AppTeam) -> RequestO
 )
 @open_to_all
 def log_in(
-    said: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
+    body: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log in with a passkey: no name, no password, and no code."""
     team.require_passwords()
@@ -131,7 +131,7 @@ def log_in(
     try:
         token = team.passkeys.log_in(
             team.asker(request),
-            said.credential.model_dump(),
+            body.credential.model_dump(),
             team.site(request),
             browser=request.headers.get("user-agent", ""),
             address=address,
@@ -174,10 +174,10 @@ def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me:
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def confirm(said: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
+def confirm(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     """Ask for a code from now on; every other session ends. The recovery codes are shown this once."""
     team.tries.count_code(me.name)
-    return RecoveryCodes(codes=team.factors.confirm(me, said.code))
+    return RecoveryCodes(codes=team.factors.confirm(me, body.code))
 
 
 @second_factors_router.delete(
@@ -187,10 +187,10 @@ def confirm(said: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def remove_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
+def remove_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
     """Stop asking for a code; 409 where everybody needs a second factor."""
     team.count_try(request, me.name)
-    team.factors.remove(me, said.password)
+    team.factors.remove(me, body.password)
 
 
 @second_factors_router.delete(

@@ -155,7 +155,7 @@ class SignOnBegin(BaseModel):
     name: Name | None = Field(default=None, description="Of the first admin, who chooses one.")
 
 
-class SignOnBegun(Document):
+class SignOnStarted(Document):
     """Where to go."""
 
     address: str = Field(
@@ -192,7 +192,7 @@ class SignOnEnd(Document):
     to: str
 
 
-class OwnWaysDocument(Document):
+class OwnLoginMethods(Document):
     """How one can come in."""
 
     password: bool = Field(description="There is a password.")

@@ -10,8 +10,8 @@ from enum import StrEnum
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, NotLoggedInError
-from app.features.people.devices import take_code
-from app.features.people.links import LONGEST, hash_of, hash_password, is_password, new_token
+from app.features.people.devices import use_code
+from app.features.people.links import LONGEST, hash_password, is_password, new_token, token_hash
 from app.features.people.login_queries import (
     delete_ended,
     delete_login,
@@ -32,7 +32,7 @@ from app.features.people.queries import (
     update_person,
 )
 from app.features.people.roles import Action, DatasetRoles, Role, Scope, lets, note
-from app.features.people.visibility_queries import Reader, Sight
+from app.features.people.visibility_queries import RestrictedReader, Visibility
 from app.soccer.actors import with_token
 
 LEADING = tuple(role for role in Role if lets(role, Action.LEAD))
@@ -51,7 +51,7 @@ MOST = 20
 """Sessions of one person; the one that was used longest ago makes room."""
 
 
-class Way(StrEnum):
+class LoginMethod(StrEnum):
     """How somebody came in."""
 
     PASSWORD = "password"
@@ -85,7 +85,7 @@ class Login:
     token: TokenUse | None = None
     must_enrol: bool = False
     """They need a second factor, and have none: they may do nothing before they have."""
-    way: Way | None = None
+    way: LoginMethod | None = None
     """How the session began; None: there is none."""
     created: datetime | None = None
     """When it began."""
@@ -106,21 +106,21 @@ class Login:
         return self.actor if self.roles.limited else self.name
 
     @property
-    def sight(self) -> Sight:
+    def visibility(self) -> Visibility:
         """What they see."""
-        return self.roles.sight(self.owner)
+        return self.roles.visibility(self.owner)
 
     @property
-    def sight_of_whole(self) -> Sight:
+    def whole_visibility(self) -> Visibility:
         """What they see and nothing of which is hidden from them."""
-        return self.roles.sight_of_whole(self.owner)
+        return self.roles.whole_visibility(self.owner)
 
     @property
-    def reader(self) -> Reader | None:
+    def reader(self) -> RestrictedReader | None:
         """What is hidden from them; None: nothing."""
         if self.roles.is_admin:
             return None
-        return Reader(
+        return RestrictedReader(
             self.name, self.roles.blind, lambda one: lets(self.roles.role_in(one), Action.REVIEW)
         )
 
@@ -151,7 +151,7 @@ class Logins:
         store: Store,
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
         *,
-        only: Way | None = None,
+        only: LoginMethod | None = None,
     ):
         self._store, self._clock, self._only = store, clock, only
 
@@ -192,11 +192,11 @@ class Logins:
                 # What was not counted, for the account had no second factor yet, is asked for.
                 if code is None or not is_asked:
                     raise NotLoggedInError(ASK_CODE, hint=LOST, pointer="/code")
-                if not take_code(session, self._store, person.id, code, self._clock()):
+                if not use_code(session, self._store, person.id, code, self._clock()):
                     raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer="/code")
 
         return self.begin(
-            person.id, person.password, browser, address, before, require_code, Way.PASSWORD
+            person.id, person.password, browser, address, before, require_code, LoginMethod.PASSWORD
         )
 
     def begin(
@@ -207,7 +207,7 @@ class Logins:
         address: str,
         before: str | None,
         require: Callable[[Session], None] = lambda _session: None,
-        way: Way = Way.PASSWORD,
+        way: LoginMethod = LoginMethod.PASSWORD,
         *,
         vouched: bool = False,
     ) -> str:
@@ -228,7 +228,7 @@ class Logins:
         """
         token, at = new_token(), self._clock()
         values = {
-            "token_hash": hash_of(token),
+            "token_hash": token_hash(token),
             "person_id": person_id,
             "created": text_of(at),
             "seen": text_of(at),
@@ -246,14 +246,14 @@ class Logins:
             require(session)
             delete_ended(session, at=text_of(at), idle_since=text_of(at - IDLE))
             if before and (
-                old := find_login(session, hash_of(before), leading=LEADING, **self._alive(at))
+                old := find_login(session, token_hash(before), leading=LEADING, **self._alive(at))
             ):
                 delete_login(session, old.id, old.person_id)
-            for spare in logins_of(session, person_id, **self._alive(at))[MOST - 1 :]:
-                delete_login(session, spare.id, person_id)
+            for unassigned in logins_of(session, person_id, **self._alive(at))[MOST - 1 :]:
+                delete_login(session, unassigned.id, person_id)
             insert_login(session, values)
-            said = {"address": address[:60], "way": way.value}
-            note(session, person.name, person.name, "logged in", person.role, **said)
+            details = {"address": address[:60], "way": way.value}
+            note(session, person.name, person.name, "logged in", person.role, **details)
         return token
 
     def find(self, token: str, *, at_once: bool = False) -> Login | None:
@@ -263,19 +263,19 @@ class Logins:
             BusyError: It had to be said ``at_once``, and cannot be without waiting.
         """
         alive = self._alive(self._clock())
-        with self._store.peek() if at_once else self._store.glance() as session:
-            row = find_login(session, hash_of(token), leading=LEADING, **alive)
+        with self._store.read_without_waiting() if at_once else self._store.read_one() as session:
+            row = find_login(session, token_hash(token), leading=LEADING, **alive)
         if row is None or self._only not in (None, row.way):
             return None
         roles = roles_with(Role(row.role), rights_in(row))
         seen, created = datetime.fromisoformat(row.seen), datetime.fromisoformat(row.created)
         enrol = row.must_enrol and not row.vouched
-        way = Way(row.way)
+        way = LoginMethod(row.way)
         return Login(
             row.id, row.person_id, row.name, roles, seen, None, enrol, way=way, created=created
         )
 
-    def is_stale(self, login: Login) -> bool:
+    def is_use_unlogged(self, login: Login) -> bool:
         """Whether it should be written down that a session is used."""
         return self._clock() - login.seen > NOTED_AFTER
 
@@ -334,7 +334,7 @@ class Logins:
             delete_logins(session, login.person_id)
             forget_links(session, login.person_id)
             note(session, login.name, login.name, "password", login.role)
-        way, vouched = Way(mine.way), mine.vouched
+        way, vouched = LoginMethod(mine.way), mine.vouched
         return self.begin(
             login.person_id, hashed, mine.browser, mine.address, None, way=way, vouched=vouched
         )

@@ -17,7 +17,7 @@ from app.errors import NotFoundError
 from app.features.datasets.queries import dataset_of, find_dataset, owner_of_job, versions_like
 from app.features.imports.upload_queries import get_upload
 from app.features.people.roles import DatasetRoles, Role
-from app.features.people.visibility_queries import Reader, Sight, is_hidden_group
+from app.features.people.visibility_queries import RestrictedReader, Visibility, is_hidden_group
 from app.soccer.actors import is_of
 
 MIN_HASH = 8
@@ -96,7 +96,9 @@ _GROUPS: Mapping[OwnedKind, str] = {
 """What can be hidden from whoever annotates copies of groups, and its name in ``is_hidden_group``."""
 
 
-def is_hidden_from(store: Store, named: Named, found: Ownership, reader: Reader | None) -> bool:
+def is_hidden_from(
+    store: Store, named: Named, found: Ownership, reader: RestrictedReader | None
+) -> bool:
     """Whether a group, or what belongs to one, is hidden from somebody who annotates blind."""
     kind, dataset = _GROUPS.get(named.kind), found.dataset
     if reader is None or kind is None or not isinstance(named.by, int):
@@ -107,49 +109,49 @@ def is_hidden_from(store: Store, named: Named, found: Ownership, reader: Reader 
         return is_hidden_group(session, reader, dataset, **{kind: named.by})
 
 
-def find_ownership(store: Store, named: Named, sight: Sight) -> Ownership | None:
+def find_ownership(store: Store, named: Named, visibility: Visibility) -> Ownership | None:
     """Where something is that an address names; None where there is nothing of that name.
 
     Args:
         store: The database.
         named: What, and how it is named.
-        sight: Which datasets take part where a name alone does not say which of them is meant.
+        visibility: Which datasets take part where a name alone does not say which of them is meant.
     """
     if named.kind is OwnedKind.UPLOAD:
         return _upload(store, named.by)
     with store.read() as session:
         find = _FIND.get(named.kind)
         if find is not None:
-            return find(session, named.by, sight)
+            return find(session, named.by, visibility)
         if not isinstance(named.by, int):
             return None
         dataset = dataset_of(session, named.kind.value, named.by)
     return None if dataset is None else Ownership(dataset)
 
 
-def _dataset(session: Session, named: str | int, _sight: Sight) -> Ownership | None:
+def _dataset(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
     row = find_dataset(session, named)
     return None if row is None else Ownership(int(row.id))
 
 
-def _job(session: Session, named: str | int, _sight: Sight) -> Ownership | None:
+def _job(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
     number = _number(named)
     row = None if number is None else owner_of_job(session, number)
     return None if row is None else Ownership(row.dataset_id, frozenset({row.actor}))
 
 
-def _version(session: Session, named: str | int, sight: Sight) -> Ownership | None:
+def _version(session: Session, named: str | int, visibility: Visibility) -> Ownership | None:
     """By id, name or hash, among the datasets that somebody sees."""
     rows = versions_like(session, str(named))
-    every = versions_called(rows, str(named))
-    seen = versions_called([row for row in rows if sight.sees(row.dataset_id)], str(named))
+    every = find_versions(rows, str(named))
+    seen = find_versions([row for row in rows if visibility.sees(row.dataset_id)], str(named))
     if len(seen) == 1:
         return Ownership(seen[0].dataset_id, called=str(seen[0].id))
     # Several: the route says so, and which datasets they are of.
     return Ownership(seen[0].dataset_id) if seen and len(seen) == len(every) else None
 
 
-def versions_called(rows: Sequence[Any], text: str) -> list[Any]:
+def find_versions(rows: Sequence[Any], text: str) -> list[Any]:
     """The versions that a text names: by id, else by name, else by the first digits of the hash."""
     fitting = [row for row in rows if text == str(row.id)]
     fitting = fitting or [row for row in rows if text == row.name]
@@ -172,7 +174,7 @@ def _number(named: str | int) -> int | None:
     return int(named) if named.isascii() and named.isdigit() and len(named) < 19 else None
 
 
-_FIND: Mapping[OwnedKind, Callable[[Session, Any, Sight], Ownership | None]] = {
+_FIND: Mapping[OwnedKind, Callable[[Session, Any, Visibility], Ownership | None]] = {
     OwnedKind.DATASET: _dataset,
     OwnedKind.NEW_DATASET: _dataset,
     OwnedKind.JOB: _job,

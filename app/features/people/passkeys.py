@@ -30,7 +30,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
 from app.features.people.devices import Challenges, waiting
-from app.features.people.links import hash_of
+from app.features.people.links import token_hash
 from app.features.people.login_queries import (
     delete_logins,
     delete_passkey,
@@ -39,13 +39,13 @@ from app.features.people.login_queries import (
     passkeys_of,
     use_passkey,
 )
-from app.features.people.logins import Login, Logins, Way
+from app.features.people.logins import Login, LoginMethod, Logins
 from app.features.people.queries import count_recovery_codes, person_by_id, put_recovery_codes
 from app.features.people.roles import note
 from app.features.people.second_factor import (
     ISSUER,
+    code_hashes,
     end_factor,
-    hashes_of,
     new_codes,
     require_password,
 )
@@ -172,7 +172,7 @@ class Passkeys:
             number = insert_passkey(session, values)
             codes = [] if count_recovery_codes(session, login.person_id) else new_codes()
             if codes:
-                put_recovery_codes(session, login.person_id, hashes_of(codes))
+                put_recovery_codes(session, login.person_id, code_hashes(codes))
             delete_logins(session, login.person_id, but=login.id)
             note(session, login.name, login.name, "passkey", login.role, passkey=name)
         return Passkey(number, name, at, None), codes
@@ -241,7 +241,7 @@ class Passkeys:
             use_passkey(session, found.id, count, text_of(self._clock()))
 
         return self._logins.begin(
-            row.person_id, person.password, browser, address, before, require, Way.PASSKEY
+            row.person_id, person.password, browser, address, before, require, LoginMethod.PASSKEY
         )
 
     def _read_new(self, login: Login, credential: dict[str, Any], site: PasskeySite) -> Any:
@@ -297,4 +297,4 @@ def _of_session(login: Login) -> str:
 
 
 def _of_browser(asker: str) -> str:
-    return f"browser {hash_of(asker)}"
+    return f"browser {token_hash(asker)}"

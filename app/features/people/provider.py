@@ -33,7 +33,7 @@ LARGEST = 2**18
 """Bytes of an answer."""
 
 
-class Answers:
+class ProviderClient:
     """Asks the provider, and nobody else.
 
     Args:
@@ -143,7 +143,7 @@ _FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 
 
 @dataclass(frozen=True)
-class LoginAsked:
+class LoginRequest:
     """What was asked of the provider for one login.
 
     Attributes:
@@ -160,7 +160,7 @@ class LoginAsked:
 
 
 @dataclass(frozen=True)
-class _Kept:
+class _CachedAnswer:
     """Something that the provider said, and when."""
 
     value: Any
@@ -179,33 +179,33 @@ class Provider:
         self, rules: SignOnRules, clock: Callable[[], datetime] = lambda: datetime.now(UTC)
     ):
         self._rules, self._clock = rules, clock
-        self._answers = Answers(rules)
-        self._description: _Kept | None = None
-        self._keys: _Kept | None = None
+        self._answers = ProviderClient(rules)
+        self._description: _CachedAnswer | None = None
+        self._keys: _CachedAnswer | None = None
 
-    def address(self, asked: LoginAsked) -> str:
+    def address(self, request: LoginRequest) -> str:
         """Where a browser goes to log in.
 
         Raises:
             ConflictError: The provider does not answer as it should.
         """
         there = self._describe()
-        address, _ = self._client(asked).create_authorization_url(
+        address, _ = self._client(request).create_authorization_url(
             there["authorization_endpoint"],
-            state=asked.state,
-            nonce=asked.nonce,
-            code_verifier=asked.verifier,
+            state=request.state,
+            nonce=request.nonce,
+            code_verifier=request.verifier,
         )
         return str(address)
 
-    def claims(self, asked: LoginAsked, code: str) -> Mapping[str, Any]:
+    def claims(self, request: LoginRequest, code: str) -> Mapping[str, Any]:
         """What the provider says of who has logged in; ``code`` is what their browser brought back.
 
         Raises:
             NotLoggedInError: The code, or what it is good for, is refused.
             ConflictError: The provider does not answer as it should.
         """
-        return self._verified(self._exchange(asked, code), asked)
+        return self._verified(self._exchange(request, code), request)
 
     def examine(self) -> str:
         """A sentence on where it is, having asked it anew.
@@ -217,18 +217,18 @@ class Provider:
         self._describe()
         return f"{self._rules.issuer} answers, with {len(self._fetch_keys().keys)} keys"
 
-    def _exchange(self, asked: LoginAsked, code: str) -> str:
+    def _exchange(self, request: LoginRequest, code: str) -> str:
         there = self._describe()
         body = prepare_token_request(
             "authorization_code",
             code=code,
-            redirect_uri=asked.redirect,
-            code_verifier=asked.verifier,
+            redirect_uri=request.redirect,
+            code_verifier=request.verifier,
         )
         known = there.get("token_endpoint_auth_methods_supported") or _HIDDEN[:1]
         way = next((one for one in _HIDDEN if one in known), _HIDDEN[0])
         address, headers, body = (
-            self._client(asked)
+            self._client(request)
             .client_auth(way)
             .prepare("POST", there["token_endpoint"], dict(_FORM), body)
         )
@@ -239,7 +239,7 @@ class Provider:
             raise self._refusal()
         return token
 
-    def _verified(self, token: str, asked: LoginAsked) -> Mapping[str, Any]:
+    def _verified(self, token: str, request: LoginRequest) -> Mapping[str, Any]:
         """The claims of an ID token that is good."""
         try:
             try:
@@ -254,7 +254,7 @@ class Provider:
                     "aud": {"essential": True, "value": self._rules.client_id},
                     "sub": {"essential": True},
                 },
-                {"client_id": self._rules.client_id, "nonce": asked.nonce},
+                {"client_id": self._rules.client_id, "nonce": request.nonce},
             )
             claims.validate(int(self._clock().timestamp()), LEEWAY_SECONDS)
             if not isinstance(claims["sub"], str) or not 0 < len(claims["sub"]) <= 255:
@@ -268,13 +268,13 @@ class Provider:
             raise self._refusal() from error
         return dict(claims)
 
-    def _client(self, asked: LoginAsked) -> OAuth2Client:
+    def _client(self, request: LoginRequest) -> OAuth2Client:
         return OAuth2Client(
             None,
             client_id=self._rules.client_id,
             client_secret=self._rules.client_secret,
             scope=self._rules.scope,
-            redirect_uri=asked.redirect,
+            redirect_uri=request.redirect,
             code_challenge_method="S256",
         )
 
@@ -288,10 +288,12 @@ class Provider:
                 log.warning(
                     "the provider is another one", status=status, it=repr(found.get("issuer"))
                 )
-                raise self._other("does not answer as the provider in this server's settings")
+                raise self._changed_error(
+                    "does not answer as the provider in this server's settings"
+                )
             for name in ("authorization_endpoint", "token_endpoint", "jwks_uri"):
                 self._answers.require_own(found.get(name))
-            kept = self._description = _Kept(found, self._clock())
+            kept = self._description = _CachedAnswer(found, self._clock())
         described: Mapping[str, Any] = kept.value
         return described
 
@@ -317,8 +319,8 @@ class Provider:
         usable = [one for one in keys if one is not None]
         if status != 200 or not usable:
             log.warning("the provider has no keys", status=status)
-            raise self._other("shows no keys by which its logins can be checked")
-        self._keys = _Kept(jwk.KeySet(usable), self._clock())
+            raise self._changed_error("shows no keys by which its logins can be checked")
+        self._keys = _CachedAnswer(jwk.KeySet(usable), self._clock())
         return jwk.KeySet(usable)
 
     def _refusal(self) -> NotLoggedInError:
@@ -326,7 +328,7 @@ class Provider:
             f"{self._rules.label} does not vouch for this login", hint=REFUSED_HINT
         )
 
-    def _other(self, what: str) -> ConflictError:
+    def _changed_error(self, what: str) -> ConflictError:
         return ConflictError(
             f"{self._rules.label} {what}",
             hint="The operator of this server can run touchline doctor.",

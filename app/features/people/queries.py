@@ -30,7 +30,7 @@ from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel
 from app.features.datasets.tables import DatasetModel
 from app.features.independent_annotations.queries import GOLD, INDEPENDENT
-from app.features.independent_annotations.tables import CopyDatasetModel, TakeModel
+from app.features.independent_annotations.tables import CopyDatasetModel, IndependentAnnotationModel
 from app.features.people.tables import (
     DatasetRoleModel,
     IdentityModel,
@@ -197,30 +197,35 @@ def _copies(leading: Collection[str]) -> ColumnElement[Any]:
 
 def _blind() -> ColumnElement[Any]:
     """The batches that name them, those in which they have begun a copy, and what is left there."""
-    batch, take, group, part = BatchModel, TakeModel, BatchGroupModel, BatchPersonModel
-    here, mine = take.batch_id == batch.id, take.person == PersonModel.name
-    gold = batch.gold_every.is_not(None) | _there(here, take.kind == GOLD)
+    batch, annotation, group, part = (
+        BatchModel,
+        IndependentAnnotationModel,
+        BatchGroupModel,
+        BatchPersonModel,
+    )
+    here, mine = annotation.batch_id == batch.id, annotation.person == PersonModel.name
+    gold = batch.gold_every.is_not(None) | _exists(here, annotation.kind == GOLD)
     copies = batch.gold_every.is_not(None) | ((batch.verdicts > 1) & (batch.blind | gold))
     named = (part.batch_id == batch.id, part.person_id == PersonModel.id)
-    annotators = _there(part.batch_id == batch.id, part.part == "annotator")
-    annotates = _there(*named, part.part == "annotator") | (_there(*named) & ~annotators)
-    asked = select(func.count()).where(
-        here, take.group_id == group.group_id, take.kind == INDEPENDENT
+    annotators = _exists(part.batch_id == batch.id, part.part == "annotator")
+    annotates = _exists(*named, part.part == "annotator") | (_exists(*named) & ~annotators)
+    own_count = select(func.count()).where(
+        here, annotation.group_id == group.group_id, annotation.kind == INDEPENDENT
     )
-    free = _there(
+    free = _exists(
         group.batch_id == batch.id,
         group.settled.is_(None),
         group.handed_in.is_(None),
-        ~_there(here, mine, take.group_id == group.group_id),
-        asked.correlate(BatchModel, BatchGroupModel).scalar_subquery() < batch.verdicts,
+        ~_exists(here, mine, annotation.group_id == group.group_id),
+        own_count.correlate(BatchModel, BatchGroupModel).scalar_subquery() < batch.verdicts,
     )
-    begun = _there(here, mine, take.handed_in.is_(None), take.settled.is_(None))
+    begun = _exists(here, mine, annotation.handed_in.is_(None), annotation.settled.is_(None))
     waits = case((free | begun, 1), else_=0)
     found = select(pairs_of(batch.id, batch.dataset_id, waits))
-    return _list(found.where(batch.state == OPEN, copies, annotates | _there(here, mine)))
+    return _list(found.where(batch.state == OPEN, copies, annotates | _exists(here, mine)))
 
 
-def _there(*where: ColumnElement[bool]) -> Exists:
+def _exists(*where: ColumnElement[bool]) -> Exists:
     return exists().where(*where).correlate(BatchModel, BatchGroupModel, PersonModel)
 
 
@@ -356,10 +361,10 @@ def set_required(session: Session, on: bool) -> None:
 
 def has_second_factor(session: Session, person_id: int) -> bool:
     """Whether somebody has an authenticator that is confirmed, or a passkey."""
-    return bool(session.scalar(select(_theirs(person_id))))
+    return bool(session.scalar(select(_is_own(person_id))))
 
 
-def _theirs(person_id: int | ColumnElement[int]) -> ColumnElement[bool]:
+def _is_own(person_id: int | ColumnElement[int]) -> ColumnElement[bool]:
     confirmed = SecondFactorModel.confirmed.is_(True)
     return or_(
         exists().where(SecondFactorModel.person_id == person_id, confirmed),
@@ -376,5 +381,5 @@ def people_with_second_factor(session: Session) -> set[int]:
 
 MUST_ENROL: ColumnElement[bool] = exists().where(
     TeamSettingModel.name == REQUIRED, TeamSettingModel.value == "on"
-) & ~_theirs(PersonModel.__table__.c.id)
+) & ~_is_own(PersonModel.__table__.c.id)
 """Of a row of people: whether everybody needs a second factor, and they have none yet."""

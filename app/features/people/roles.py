@@ -13,7 +13,7 @@ from app.errors import ForbiddenError, InputError
 from app.features.people.visibility_queries import COPIES
 from app.features.people.visibility_queries import EVERYTHING as EVERYTHING
 from app.features.people.visibility_queries import READER as READER
-from app.features.people.visibility_queries import Sight as Sight
+from app.features.people.visibility_queries import Visibility as Visibility
 from app.features.people.visibility_queries import reads_blind as reads_blind
 from app.finite import quoted
 from app.soccer.actors import LOCAL_USER, person_of
@@ -108,11 +108,11 @@ def require_scope(scopes: Collection[Scope], action: Action) -> None:
     """Raise ForbiddenError unless one of a token's scopes lets a script do that."""
     if any(action in SCOPES[scope] for scope in scopes):
         return
-    lacks = next((scope for scope, allowed in SCOPES.items() if action in allowed), None)
-    if lacks is None:
+    missing = next((scope for scope, allowed in SCOPES.items() if action in allowed), None)
+    if missing is None:
         raise ForbiddenError("no token may do this", hint="Log in and do it in the browser.")
     raise ForbiddenError(
-        f"this token lacks the scope {lacks}; it has {' and '.join(scopes)}",
+        f"this token lacks the scope {missing}; it has {' and '.join(scopes)}",
         hint="Make another one under Account, with that scope.",
     )
 
@@ -159,15 +159,15 @@ class DatasetRoles:
         role = self.role_in(dataset_id)
         return DatasetRoles(Role.NONE, {dataset_id: role}, limited=True, blind=self.blind)
 
-    def led(self) -> Sight:
+    def led_datasets(self) -> Visibility:
         """The datasets of which they are a lead, and nothing that is of none."""
         if self.is_admin:
             return EVERYTHING
         all_but = lets(self.everywhere, Action.LEAD)
         named = {key for key, role in self.single.items() if lets(role, Action.LEAD) != all_but}
-        return Sight(all_but, frozenset(named), "")
+        return Visibility(all_but, frozenset(named), "")
 
-    def sight(self, name: str) -> Sight:
+    def visibility(self, name: str) -> Visibility:
         """What somebody of that name sees."""
         if self.is_admin:
             return EVERYTHING
@@ -176,16 +176,16 @@ class DatasetRoles:
         copies = {
             key for key, role in self.single.items() if key > COPIES and role is not Role.NONE
         }
-        return Sight(all_but, frozenset(named), name, frozenset(copies))
+        return Visibility(all_but, frozenset(named), name, frozenset(copies))
 
-    def sight_of_whole(self, name: str) -> Sight:
+    def whole_visibility(self, name: str) -> Visibility:
         """The same without the datasets of which some groups are hidden from them."""
-        sight = self.sight(name)
+        visibility = self.visibility(name)
         if self.is_admin or not self.blind:
-            return sight
+            return visibility
         hidden = frozenset(self.blind)
-        named = sight.datasets | hidden if sight.all_but else sight.datasets - hidden
-        return replace(sight, datasets=named)
+        named = visibility.datasets | hidden if visibility.all_but else visibility.datasets - hidden
+        return replace(visibility, datasets=named)
 
 
 PERSON = "person"
@@ -194,13 +194,13 @@ _NAME = re.compile(r"[a-z0-9](?:[a-z0-9._-]{0,38}[a-z0-9])?")
 _TAKEN = frozenset({LOCAL_USER, "script", "everybody", "nobody"})
 
 
-def checked_name(said: str) -> str:
+def checked_name(text: str) -> str:
     """The name of a person, as the log will remember them.
 
     Raises:
         InputError: It cannot be one.
     """
-    name = said.strip().lower()
+    name = text.strip().lower()
     if not _NAME.fullmatch(name) or name in _TAKEN:
         raise InputError(
             f"{quoted(name)} cannot be the name of a person",

@@ -10,8 +10,8 @@ from app.features.people import members
 from app.features.people import service as people
 from app.features.people.invitations import (
     Invitation,
-    Post,
-    Wanted,
+    InvitationRow,
+    LinkMailer,
     invite_many,
     invite_one,
     renew_one,
@@ -103,7 +103,9 @@ def invite_users(
     A row that is refused keeps no other from being invited. Links go by mail or are shown, as by
     `POST /users`.
     """
-    rows = [Wanted(number, **one.model_dump()) for number, one in enumerate(wanted.people, 1)]
+    rows = [
+        InvitationRow(number, **one.model_dump()) for number, one in enumerate(wanted.people, 1)
+    ]
     items = invite_many(store, rows, _post(team, request), actor=me.actor, dry_run=dry_run)
     refused = sum(item.state == "refused" for item in items)
     return InvitationReport(
@@ -115,8 +117,8 @@ def invite_users(
     )
 
 
-def _post(team: Team, request: Request) -> Post:
-    return Post(team.mail, team.url, team.base(request))
+def _post(team: Team, request: Request) -> LinkMailer:
+    return LinkMailer(team.mail, team.url, team.base(request))
 
 
 @users_router.patch(

@@ -10,7 +10,7 @@ from pydantic.config import JsonDict
 
 from app.features.maintenance.service import Banner
 from app.features.people.invitations import MOST, Invitation
-from app.features.people.logins import Way
+from app.features.people.logins import LoginMethod
 from app.features.people.members import SingleRole
 from app.features.people.roles import Action, Role
 from app.features.people.service import Person
@@ -93,7 +93,7 @@ class PasswordEdit(BaseModel):
     new: Password
 
 
-class LinkLook(BaseModel):
+class LinkToken(BaseModel):
     """The part of a link that follows its #."""
 
     model_config = ConfigDict(
@@ -103,7 +103,7 @@ class LinkLook(BaseModel):
     token: Token
 
 
-class LinkUse(LinkLook):
+class LinkUse(LinkToken):
     """The password that somebody chooses; the first admin chooses a name, too."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [EXAMPLE]})
@@ -112,7 +112,7 @@ class LinkUse(LinkLook):
     name: Name | None = None
 
 
-class WaysIn(Document):
+class LoginMethods(Document):
     """How people log in here."""
 
     password: bool = Field(description="By name and password, or by a passkey.")
@@ -130,10 +130,10 @@ class SessionDocument(Document):
     enrol: bool = Field(
         default=False, description="They must make a second factor before anything else."
     )
-    way: Way | None = Field(
+    way: LoginMethod | None = Field(
         default=None, description="How this session began; null: there is none."
     )
-    ways: WaysIn | None = Field(
+    ways: LoginMethods | None = Field(
         default=None, description="How people log in; only for requests without a login."
     )
     moment: str | None = Field(

@@ -15,10 +15,10 @@ import segno
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
-from app.features.people.devices import new_code, plain, take_totp, totp_of
-from app.features.people.links import hash_of, is_password
+from app.features.people.devices import new_code, plain, totp_of, use_totp
+from app.features.people.links import is_password, token_hash
 from app.features.people.login_queries import delete_logins, delete_passkeys
-from app.features.people.logins import Login, Way
+from app.features.people.logins import Login, LoginMethod
 from app.features.people.queries import (
     confirm_second_factor,
     count_recovery_codes,
@@ -128,13 +128,13 @@ class SecondFactors:
             found = find_second_factor(session, login.person_id)
             if found is None or found.confirmed:
                 raise NotFoundError("no second factor waits to be confirmed")
-            if not take_totp(session, self._store, login.person_id, code, self._clock()):
+            if not use_totp(session, self._store, login.person_id, code, self._clock()):
                 raise InputError(
                     "that is not the code of this moment",
                     hint="Is the clock of the device right?",
                     pointer="/code",
                 )
-            confirm_second_factor(session, login.person_id, hashes_of(codes))
+            confirm_second_factor(session, login.person_id, code_hashes(codes))
             delete_logins(session, login.person_id, but=login.id)
             note(session, login.name, login.name, "second factor", login.role)
         return codes
@@ -197,9 +197,9 @@ def new_codes() -> list[str]:
     return [new_code() for _ in range(CODES)]
 
 
-def hashes_of(codes: list[str]) -> list[str]:
+def code_hashes(codes: list[str]) -> list[str]:
     """What is kept of recovery codes."""
-    return [hash_of(plain(one)) for one in codes]
+    return [token_hash(plain(one)) for one in codes]
 
 
 def end_factor(session: Session, login: Login) -> None:
@@ -221,7 +221,7 @@ def require_password(store: Store, login: Login, password: str | None, at: datet
     Without one they must have come by single sign-on just now.
     """
     if password is None:
-        if login.way is Way.SIGN_ON and login.created and at - login.created < FRESH:
+        if login.way is LoginMethod.SIGN_ON and login.created and at - login.created < FRESH:
             return
         raise InputError(
             "that takes your password, or a login by single sign-on within the last ten minutes",

@@ -42,7 +42,7 @@ class Person:
     Attributes:
         joined: Whether they have chosen a password or use single sign-on.
         invited: A link waits for them with which they can.
-        seen: When a session of theirs was used last, in UTC; None: none is open.
+        seen: When one of their sessions was used last, in UTC; None: none is open.
         second_factor: Whether they log in with a second factor.
         tokens: How many tokens of scripts they have.
         sign_on: What their account of the provider is known by; None: none is linked.

@@ -11,19 +11,19 @@ from app.db.store import Store
 from app.errors import NotLoggedInError
 from app.features.maintenance.service import read_banner
 from app.features.people import links
-from app.features.people.links import Meant
+from app.features.people.links import LinkHolder
 from app.features.people.logins import Login
 from app.features.people.members import read_single_roles
 from app.features.people.roles import SCOPES, Role, lets
 from app.features.people.schemas import (
-    LinkLook,
+    LinkToken,
     LinkUse,
+    LoginMethods,
     NewSession,
     OpenSessionDocument,
     OpenSessionList,
     PasswordEdit,
     SessionDocument,
-    WaysIn,
 )
 from app.http.access import login_of
 from app.http.cursor import paged
@@ -99,7 +99,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     login = team.login(request) if bearer is None else team.login_with(bearer, request)
     found = session_of(login, services.store)
     rules = team.sign_on and team.sign_on.rules
-    ways = WaysIn(password=not (rules and rules.only), sign_on=rules.label if rules else None)
+    ways = LoginMethods(password=not (rules and rules.only), sign_on=rules.label if rules else None)
     moment = None if login is None or login.roles.blind else services.events.moment()
     more = {"ways": ways, "moment": moment, "maintenance": read_banner(services.store)}
     return found.model_copy(update=more)
@@ -224,12 +224,12 @@ def end_session(session: Id, team: AppTeam, me: Me) -> None:
     team.logins.end(me, session)
 
 
-@router.post("/links/look", operation_id="lookAtLink", responses=responses(404, 409, 413, 415, 429))
+@router.post("/links/look", operation_id="readLink", responses=responses(404, 409, 413, 415, 429))
 @open_to_all
-def look_at_link(asked: LinkLook, request: Request, store: AppStore, team: AppTeam) -> Meant:
+def look_at_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam) -> LinkHolder:
     """Whom a link is for; 404 when it is not good any more."""
     team.count_try(request)
-    return Meant(**vars(links.look(store, asked.token)))
+    return LinkHolder(**vars(links.look(store, asked.token)))
 
 
 @router.post(

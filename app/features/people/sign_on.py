@@ -18,16 +18,16 @@ from typing import Any
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotLoggedInError
-from app.features.people.devices import take_code, waiting
-from app.features.people.links import hash_of, look, new_token, take
+from app.features.people.devices import use_code, waiting
+from app.features.people.links import look, new_token, take, token_hash
 from app.features.people.login_queries import (
     delete_logins,
     find_identity,
     put_identity,
     use_identity,
 )
-from app.features.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, Logins, Way
-from app.features.people.provider import LoginAsked, Provider
+from app.features.people.logins import ASK_CODE, LOST, WRONG_CODE, Login, LoginMethod, Logins
+from app.features.people.provider import LoginRequest, Provider
 from app.features.people.queries import (
     has_second_factor,
     insert_person,
@@ -49,7 +49,7 @@ _LONGEST = 2000
 
 
 @dataclass(frozen=True)
-class _Begun:
+class _PendingLogin:
     """A login that somebody has begun.
 
     Attributes:
@@ -62,7 +62,7 @@ class _Begun:
     """
 
     browser: str
-    asked: LoginAsked
+    asked: LoginRequest
     to: str
     link: str | None = None
     name: str | None = None
@@ -74,14 +74,14 @@ class _Begun:
         return json_text(asdict(self)).encode()
 
     @staticmethod
-    def read(text: bytes) -> _Begun:
+    def read(text: bytes) -> _PendingLogin:
         """What ``text`` made."""
         values = json.loads(text)
-        return _Begun(**{**values, "asked": LoginAsked(**values["asked"])})
+        return _PendingLogin(**{**values, "asked": LoginRequest(**values["asked"])})
 
 
 @dataclass(frozen=True)
-class Entered:
+class SignOnResult:
     """How it ended: the token of a new session, None where an account was linked; and the page to show."""
 
     token: str | None
@@ -164,7 +164,7 @@ class SignOn:
         address: str = "",
         before: str | None = None,
         on_code: Callable[[str], None] = lambda _name: None,
-    ) -> Entered:
+    ) -> SignOnResult:
         """What follows once somebody comes back from the provider.
 
         Args:
@@ -187,9 +187,9 @@ class SignOn:
             NotFoundError: The link is not good any more.
             ConflictError: The account is another person's, a name is taken, or the provider does not answer.
         """
-        found = self._begun.take(hash_of(state))
-        begun = None if found is None else _Begun.read(found)
-        if begun is None or not compare_digest(begun.browser, hash_of(asker)):
+        found = self._begun.take(token_hash(state))
+        begun = None if found is None else _PendingLogin.read(found)
+        if begun is None or not compare_digest(begun.browser, token_hash(asker)):
             raise NotLoggedInError(LATE, hint="Begin again.")
         if issuer is not None and issuer != self.rules.issuer:
             raise NotLoggedInError("another provider has answered", hint="Begin again.")
@@ -197,7 +197,7 @@ class SignOn:
             return self._link(begun, code, login)
         claims = begun.claims or self._claims(begun, code)
         person_id, password = self._person(begun, claims)
-        vouched = self.rules.is_vouched(claims)
+        vouched = self.rules.has_trusted_factor(claims)
         if factor is not None and not vouched:
             # In a transaction of its own, which another that writes would wait for.
             on_code(self._name(person_id))
@@ -212,28 +212,37 @@ class SignOn:
 
         try:
             token = self._logins.begin(
-                person_id, password, browser, address, before, require, Way.SIGN_ON, vouched=vouched
+                person_id,
+                password,
+                browser,
+                address,
+                before,
+                require,
+                LoginMethod.SIGN_ON,
+                vouched=vouched,
             )
         except NotLoggedInError as error:
             if error.pointer == FACTOR:
                 # Whoever followed a link has come by it; what is missing is asked for again.
                 waits = replace(begun, claims=claims, link=None)
-                self._begun.put(hash_of(state), waits.text())
+                self._begun.put(token_hash(state), waits.text())
             raise
-        return Entered(token, begun.to)
+        return SignOnResult(token, begun.to)
 
     def _begin(self, asker: str, redirect: str, to: str, **more: Any) -> str:
-        asked = LoginAsked(redirect, new_token(), new_token(), secrets.token_urlsafe(48))
-        address = self._provider.address(asked)
-        self._begun.put(hash_of(asked.state), _Begun(hash_of(asker), asked, to, **more).text())
+        request = LoginRequest(redirect, new_token(), new_token(), secrets.token_urlsafe(48))
+        address = self._provider.address(request)
+        self._begun.put(
+            token_hash(request.state), _PendingLogin(token_hash(asker), request, to, **more).text()
+        )
         return address
 
-    def _claims(self, begun: _Begun, code: str) -> Mapping[str, Any]:
+    def _claims(self, begun: _PendingLogin, code: str) -> Mapping[str, Any]:
         claims = self._provider.claims(begun.asked, code)
         self.rules.require_admitted(claims)
         return claims
 
-    def _person(self, begun: _Begun, claims: Mapping[str, Any]) -> tuple[int, str | None]:
+    def _person(self, begun: _PendingLogin, claims: Mapping[str, Any]) -> tuple[int, str | None]:
         """Id of who that is, and the hash of the password that they have.
 
         Raises:
@@ -265,7 +274,7 @@ class SignOn:
         """Whose a link is; the account is theirs from now on, and the password that they had is none."""
         person_id = take(session, link, name, password=None)
         if found is not None and found.person_id != person_id:
-            raise self._taken()
+            raise self._already_linked_error()
         self._put(session, person_id, claims)
         return person_id
 
@@ -293,7 +302,7 @@ class SignOn:
         self._put(session, person_id, claims)
         return person_id
 
-    def _link(self, begun: _Begun, code: str, login: Login | None) -> Entered:
+    def _link(self, begun: _PendingLogin, code: str, login: Login | None) -> SignOnResult:
         if login is None or login.id != begun.session or login.token is not None:
             raise InputError(
                 "the session that wanted to link an account has ended", hint="Begin again."
@@ -305,10 +314,10 @@ class SignOn:
         with self._store.write() as session:
             require_none(session, login.person_id, self.rules)
             if find_identity(session, self.rules.issuer, claims["sub"]) is not None:
-                raise self._taken()
+                raise self._already_linked_error()
             self._put(session, login.person_id, claims)
             delete_logins(session, login.person_id, but=login.id)
-        return Entered(None, begun.to)
+        return SignOnResult(None, begun.to)
 
     def _put(self, session: Session, person_id: int, claims: Mapping[str, Any]) -> None:
         shown, person = shown_of(claims), person_by_id(session, person_id)
@@ -326,7 +335,7 @@ class SignOn:
     def _require_factor(self, session: Session, person_id: int, factor: str | None) -> None:
         if factor is None:
             raise NotLoggedInError(ASK_CODE, hint=LOST, pointer=FACTOR)
-        if not take_code(session, self._store, person_id, factor, self._clock()):
+        if not use_code(session, self._store, person_id, factor, self._clock()):
             raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer=FACTOR)
 
     def _unknown(self) -> str:
@@ -335,7 +344,7 @@ class SignOn:
     def _ask(self) -> str:
         return "An admin can send you a link; if you have an account, link it under Account."
 
-    def _taken(self) -> ConflictError:
+    def _already_linked_error(self) -> ConflictError:
         return ConflictError(
             f"the account that {self.rules.label} names is linked with another person here",
             hint="Log out at the provider, and come with your own.",

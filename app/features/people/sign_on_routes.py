@@ -10,11 +10,11 @@ from fastapi import APIRouter, Request, Response
 
 from app.errors import AccessError
 from app.features.people.login_schemas import (
-    OwnWaysDocument,
+    OwnLoginMethods,
     SignOnAnswer,
     SignOnBegin,
-    SignOnBegun,
     SignOnEnd,
+    SignOnStarted,
 )
 from app.features.people.schemas import PasswordOnly
 from app.features.people.session_routes import Me, session_of
@@ -37,16 +37,16 @@ log = structlog.get_logger("touchline.access")
 )
 @open_to_all
 @limit(SIGN_ONS)
-def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnBegun:
+def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnStarted:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
     team.tries.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
     address = sign_on.begin(
-        asker, redirect=team.landing(request), to=said.to, link=said.link, name=said.name
+        asker, redirect=team.landing(request), to=body.to, link=body.link, name=body.name
     )
     response.set_cookie(**team.begun_values(asker))
-    return SignOnBegun(address=address)
+    return SignOnStarted(address=address)
 
 
 @router.post(
@@ -57,7 +57,7 @@ def begin(said: SignOnBegin, request: Request, response: Response, team: AppTeam
 @open_to_all
 @limit(SIGN_ONS)
 def finish(
-    said: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
+    body: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnEnd:
     """Log in with what the provider has answered, or link the account where that was begun.
 
@@ -69,10 +69,10 @@ def finish(
     try:
         entered = sign_on.finish(
             team.begun(request),
-            said.state,
-            said.code,
-            factor=said.factor,
-            issuer=said.iss,
+            body.state,
+            body.code,
+            factor=body.factor,
+            issuer=body.iss,
             login=team.login(request),
             browser=request.headers.get("user-agent", ""),
             address=address,
@@ -91,10 +91,10 @@ def finish(
 
 @router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))
 @may(Action.ACCOUNT)
-def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
+def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
     ways, rules = ways_of(store, me.person_id), team.sign_on and team.sign_on.rules
-    return OwnWaysDocument(
+    return OwnLoginMethods(
         password=ways.password,
         provider=rules.label if rules else None,
         only=bool(rules and rules.only),
@@ -110,15 +110,15 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnWaysDocument:
 @may(Action.ACCOUNT)
 @limit(SIGN_ONS)
 def begin_link(
-    said: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
-) -> SignOnBegun:
+    body: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
+) -> SignOnStarted:
     """Where to go to link an account of the provider with one's own; takes the password."""
     sign_on = team.require_sign_on()
     team.count_try(request, me.name)
     asker = secrets.token_urlsafe()
-    address = sign_on.begin_link(asker, me, said.password, redirect=team.landing(request))
+    address = sign_on.begin_link(asker, me, body.password, redirect=team.landing(request))
     response.set_cookie(**team.begun_values(asker))
-    return SignOnBegun(address=address)
+    return SignOnStarted(address=address)
 
 
 @router.delete(
@@ -128,10 +128,10 @@ def begin_link(
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT)
-def remove(said: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
+def remove(body: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
     team.count_try(request, me.name)
-    unlink(store, me, said.password, datetime.now(UTC))
+    unlink(store, me, body.password, datetime.now(UTC))
 
 
 @router.delete(

@@ -20,7 +20,7 @@ from app.features.people.login_queries import (
     delete_logins,
     identity_of,
 )
-from app.features.people.logins import Login, Way
+from app.features.people.logins import Login, LoginMethod
 from app.features.people.queries import all_people, count_able, person_by_id
 from app.features.people.roles import Role, note, require_no_token
 from app.features.people.second_factor import require_password
@@ -79,19 +79,19 @@ class SignOnRules:
 
     def name_for(self, claims: Mapping[str, Any]) -> str:
         """What somebody new would be called here: small letters, digits, dots and dashes."""
-        said = str(claims.get(self.name_claim) or "").strip().lower().partition("@")[0]
-        return re.sub(r"[^a-z0-9._-]+", "-", said)[:40].strip("._-")
+        claimed = str(claims.get(self.name_claim) or "").strip().lower().partition("@")[0]
+        return re.sub(r"[^a-z0-9._-]+", "-", claimed)[:40].strip("._-")
 
-    def is_vouched(self, claims: Mapping[str, Any]) -> bool:
+    def has_trusted_factor(self, claims: Mapping[str, Any]) -> bool:
         """Whether the provider says that it has asked for a second factor, as the operator wants it."""
-        said = {*_texts(claims.get("amr")), *_texts(claims.get("acr"))}
-        return not self.trusted.isdisjoint(said)
+        methods = {*_texts(claims.get("amr")), *_texts(claims.get("acr"))}
+        return not self.trusted.isdisjoint(methods)
 
 
 def shown_of(claims: Mapping[str, Any]) -> str:
     """By what people know an account of the provider."""
-    said = (claims.get(name) for name in ("email", "preferred_username", "name", "sub"))
-    return next(str(one) for one in said if one)[:100]
+    names = (claims.get(name) for name in ("email", "preferred_username", "name", "sub"))
+    return next(str(one) for one in names if one)[:100]
 
 
 def origin_of(address: str) -> str:
@@ -132,13 +132,13 @@ def read_rules(settings: Settings) -> SignOnRules | None:
             )
             if not value
         ]
-        raise _half(f"single sign-on lacks {' and '.join(absent)}")
+        raise _incomplete_error(f"single sign-on lacks {' and '.join(absent)}")
     if not settings.team:
         raise InputError(
             "single sign-on is for the server of a team", hint="Serve with --team, or unset it."
         )
     if not (client + secret).isascii():
-        raise _half("the client's id and secret have letters that no provider gives")
+        raise _incomplete_error("the client's id and secret have letters that no provider gives")
     _require_whole(settings)
     return SignOnRules(
         issuer,
@@ -159,11 +159,13 @@ def read_rules(settings: Settings) -> SignOnRules | None:
 
 def _require_whole(settings: Settings) -> None:
     if bool(settings.sso_group_claim) != bool(settings.sso_groups):
-        raise _half("TOUCHLINE_SSO_GROUP_CLAIM and TOUCHLINE_SSO_GROUPS belong together")
+        raise _incomplete_error(
+            "TOUCHLINE_SSO_GROUP_CLAIM and TOUCHLINE_SSO_GROUPS belong together"
+        )
     if "openid" not in settings.sso_scope.split():
-        raise _half("TOUCHLINE_SSO_SCOPE needs the word openid")
+        raise _incomplete_error("TOUCHLINE_SSO_SCOPE needs the word openid")
     if settings.sso_new_role and not (settings.sso_domains or settings.sso_groups):
-        raise _half(
+        raise _incomplete_error(
             "TOUCHLINE_SSO_NEW_ROLE lets in whom nobody here knows: say of which TOUCHLINE_SSO_DOMAINS"
             f' or TOUCHLINE_SSO_GROUPS (["{ALL}"] as domains: whoever the provider knows)'
         )
@@ -174,7 +176,7 @@ def _new_role(settings: Settings) -> Role | None:
         return None
     known = [role.value for role in Role if role is not Role.ADMIN]
     if settings.sso_new_role not in known:
-        raise _half(f"TOUCHLINE_SSO_NEW_ROLE is one of {', '.join(known)}")
+        raise _incomplete_error(f"TOUCHLINE_SSO_NEW_ROLE is one of {', '.join(known)}")
     return Role(settings.sso_new_role)
 
 
@@ -182,9 +184,11 @@ def _hosts(addresses: Sequence[str]) -> frozenset[str]:
     try:
         found = [(urlsplit(one), origin_of(one)) for one in addresses]
     except ValueError as error:
-        raise _half(f"{error}, as TOUCHLINE_SSO_ISSUER and TOUCHLINE_SSO_HOSTS need") from None
+        raise _incomplete_error(
+            f"{error}, as TOUCHLINE_SSO_ISSUER and TOUCHLINE_SSO_HOSTS need"
+        ) from None
     if any(parts.query or parts.fragment for parts, _ in found):
-        raise _half("an address of the provider has neither ? nor #")
+        raise _incomplete_error("an address of the provider has neither ? nor #")
     return frozenset(origin for _, origin in found)
 
 
@@ -193,7 +197,7 @@ def _secret(settings: Settings) -> str:
     if path is None:
         return given.get_secret_value().strip() if given else ""
     if given:
-        raise _half("the client's secret is given twice, by a file and without")
+        raise _incomplete_error("the client's secret is given twice, by a file and without")
     return read_private(path, _variable("client_secret_file"))
 
 
@@ -214,7 +218,7 @@ def _variable(name: str) -> str:
     return f"TOUCHLINE_{_PREFIX}{name}".upper()
 
 
-def _half(sentence: str) -> InputError:
+def _incomplete_error(sentence: str) -> InputError:
     return InputError(sentence, hint=_HINT)
 
 
@@ -277,7 +281,7 @@ def unlink(store: Store, login: Login, password: str | None, at: datetime) -> No
             )
         if delete_identity(session, login.person_id) is None:
             raise NotFoundError("no account of a provider is linked with yours")
-        delete_logins(session, login.person_id, but=login.id, way=Way.SIGN_ON)
+        delete_logins(session, login.person_id, but=login.id, way=LoginMethod.SIGN_ON)
         note(session, login.name, login.name, "single sign-on unlinked", login.role)
 
 
@@ -302,7 +306,7 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
             raise ConflictError(
                 f"{person.name} is the last admin who can log in", hint="Make another one first."
             )
-        delete_logins(session, person_id, way=Way.SIGN_ON)
+        delete_logins(session, person_id, way=LoginMethod.SIGN_ON)
         note(session, actor, person.name, "single sign-on unlinked", person.role)
 
 

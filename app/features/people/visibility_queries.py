@@ -12,12 +12,12 @@ from sqlalchemy import ColumnElement, and_, not_, or_, select, true
 from app.db.session import Session
 from app.features.batches.tables import BatchGroupModel
 from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
-from app.features.independent_annotations.tables import GoldModel, TakeModel
+from app.features.independent_annotations.tables import GoldModel, IndependentAnnotationModel
 from app.soccer.actors import TOKEN, is_of
 
 
 @dataclass(frozen=True)
-class Reader:
+class RestrictedReader:
     """Somebody who asks, and is no admin.
 
     Attributes:
@@ -34,7 +34,10 @@ class Reader:
     def hides(self, dataset_id: int, group: Any) -> ColumnElement[bool]:
         """Whether a group of a dataset is hidden from them, by the column of its id."""
         ids = sorted(self.batches[dataset_id])
-        own = (TakeModel.batch_id.in_(ids), TakeModel.person == self.person)
+        own = (
+            IndependentAnnotationModel.batch_id.in_(ids),
+            IndependentAnnotationModel.person == self.person,
+        )
         returned = (
             BatchGroupModel.batch_id.in_(ids),
             BatchGroupModel.handed_in_by == self.person,
@@ -43,12 +46,12 @@ class Reader:
         )
         inside = select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id.in_(ids))
         gold = select(GoldModel.group_id).where(GoldModel.dataset_id == dataset_id)
-        copied = select(TakeModel.group_id).where(*own)
+        copied = select(IndependentAnnotationModel.group_id).where(*own)
         back = select(BatchGroupModel.group_id).where(*returned)
         return and_(or_(group.in_(inside), group.in_(gold), group.in_(copied)), group.not_in(back))
 
 
-READER: ContextVar[Reader | None] = ContextVar("reader", default=None)
+READER: ContextVar[RestrictedReader | None] = ContextVar("reader", default=None)
 """Who asks; None: an admin, the server itself or a command, from whom nothing is hidden."""
 
 
@@ -93,7 +96,9 @@ def seen_anywhere(dataset: Any, group: Any) -> list[ColumnElement[bool]]:
     ]
 
 
-def is_hidden_group(session: Session, reader: Reader, dataset_id: int, **named: int) -> bool:
+def is_hidden_group(
+    session: Session, reader: RestrictedReader, dataset_id: int, **named: int
+) -> bool:
     """Whether a group is hidden from somebody, or that of a view, or every one of a static camera.
 
     Args:
@@ -125,7 +130,7 @@ somebody listens is hidden from them from its first entry on."""
 
 
 @dataclass(frozen=True)
-class Sight:
+class Visibility:
     """Which datasets somebody sees: all but some, or some alone; and what else is theirs.
 
     Attributes:
@@ -167,5 +172,5 @@ class Sight:
         return self.all_but != (dataset_id in self.datasets)
 
 
-EVERYTHING = Sight()
+EVERYTHING = Visibility()
 """Of an admin, and of whoever runs a server alone."""

@@ -35,7 +35,7 @@ from app.features.pitches.queries import (
     save_estimate,
 )
 from app.features.queue.queries import refresh_queue
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION
@@ -127,7 +127,7 @@ def estimate_pitches(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> DatasetPitches:
     """Estimate the pitch of every match whose lines are others than when it was estimated last.
@@ -216,10 +216,10 @@ def sizes_asked(
     chosen = need_match(found.items, match, found.dataset)
     if size is None:
         return {item.match: item.proposed for item in chosen if accept and item.proposed}
-    return {item.match: _size_asked(item, size) for item in chosen}
+    return {item.match: _requested_size(item, size) for item in chosen}
 
 
-def _size_asked(state: PitchState, text: str) -> Pitch:
+def _requested_size(state: PitchState, text: str) -> Pitch:
     if text != "previous":
         return parse_pitch(text)
     if state.previous is None:

@@ -129,25 +129,25 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     """
     state = read_policy(store, dataset)
     ids = _solved(store, state.dataset_id)
-    groups, sources, told = _estimated(store, ids, state.policy)
-    misses = zip(told.misses, sources, strict=True)
+    groups, sources, noise = _estimated(store, ids, state.policy)
+    misses = zip(noise.misses, sources, strict=True)
     found = _sources(
-        [(miss, own) for some, own in misses for miss in some], told.ball, state.policy
+        [(miss, own) for some, own in misses for miss in some], noise.ball, state.policy
     )
     with store.read() as session:
         used = read_factors(session, state.dataset_id)
-    advice = _advised_by(told, state.policy)
+    advice = _advice_of(noise, state.policy)
     return Noise(
         dataset_id=state.dataset_id,
         dataset=state.dataset,
         groups=groups,
         solved=len(ids),
-        ball=told.ball,
+        ball=noise.ball,
         stations=found.of("camera"),
         people=found.of("person"),
         factors=_factors(found),
         used=used,
-        line_estimate=told.lines,
+        line_estimate=noise.lines,
         follows=state.policy.noise == ESTIMATED,
         advice=advice,
         notices=tuple(_notices(advice, state.policy)),
@@ -178,8 +178,8 @@ def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:
         Whether the policy changed, and everything is stale.
     """
     state = read_policy(store, dataset)
-    told = _estimated(store, _solved(store, state.dataset_id), state.policy)[2]
-    advice = _advised_by(told, state.policy)
+    noise = _estimated(store, _solved(store, state.dataset_id), state.policy)[2]
+    advice = _advice_of(noise, state.policy)
     if not any(item.moved for item in advice):
         return False
     values = {item.name: item.estimate for item in advice}
@@ -301,31 +301,31 @@ def _estimated(
     return len(seen), sources, estimate_noise(seen, policy)
 
 
-def _advised_by(told: DatasetNoise, policy: Policy) -> tuple[Advice, ...]:
-    return (*_advice(told.ball, policy), *_line_advice(told.lines, policy))
+def _advice_of(noise: DatasetNoise, policy: Policy) -> tuple[Advice, ...]:
+    return (*_advice(noise.ball, policy), *_line_advice(noise.lines, policy))
 
 
 def _advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
     if ball.click is not None:
-        yield _advised("click_sigma_px", _ends(ball.click), policy)
+        yield _threshold_advice("click_sigma_px", _ends(ball.click), policy)
     if ball.share is not None and ball.share_interval is not None:
-        yield _advised("box_sigma_share", (ball.share, *ball.share_interval), policy)
+        yield _threshold_advice("box_sigma_share", (ball.share, *ball.share_interval), policy)
     if ball.given is not None:
-        yield _advised("given_sigma_px", _ends(ball.given), policy)
+        yield _threshold_advice("given_sigma_px", _ends(ball.given), policy)
 
 
 def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]:
     if found is not None:
         for name, item in (("line_sigma_px", found.sigma), ("line_share", found.share)):
             ends = item.value, item.low, item.high
-            yield _advised(f"{CALIBRATION}.{name}", ends, policy)
+            yield _threshold_advice(f"{CALIBRATION}.{name}", ends, policy)
 
 
 def _ends(sigma: Sigma) -> tuple[float, float, float]:
     return sigma.value, sigma.low, sigma.high
 
 
-def _advised(name: str, found: tuple[float, float, float], policy: Policy) -> Advice:
+def _threshold_advice(name: str, found: tuple[float, float, float], policy: Policy) -> Advice:
     """Advice on a threshold from an estimate and the ends of its interval."""
     threshold = next(item for item in THRESHOLDS if item.name == name)
     least, most = threshold.minimum or 0.0, threshold.maximum or np.inf

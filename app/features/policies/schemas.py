@@ -131,7 +131,7 @@ class PolicyFieldDocument(Document):
         "no others."
     )
     gate: str | None = Field(description="The gate that asks for it.")
-    asks: Asks | None = Field(
+    comparison: Asks | None = Field(
         description="How a value compares with it to pass. What equals a threshold passes, but for "
         "`more than`: JaC must exceed it, as in the paper."
     )

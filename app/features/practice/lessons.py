@@ -138,9 +138,9 @@ def judge(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feedback:
         group: As it was edited.
         verdict: The newest one; a stale one counts as none.
     """
-    words = _Told(truth, group)
+    words = _LessonTexts(truth, group)
     if verdict.state == "unreviewed" or verdict.stale:
-        return _before(truth, group, words)
+        return _first_feedback(truth, group, words)
     if verdict.state == "deferred":
         return words.say(ALMOST, "You put this group off. That is fine when you are not sure.")
     if verdict.state == "accepted":
@@ -148,14 +148,14 @@ def judge(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feedback:
     return _rejected(truth, verdict.reason, words)
 
 
-def _before(truth: SceneTruth, group: Group, words: _Told) -> Feedback:
+def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
     kind = kind_of(truth)
     if kind == CLEAN:
         return Feedback(OPEN)
-    if _is_mended(truth, group):
+    if _is_corrected(truth, group):
         return Feedback(MENDED, f"Right: {words.done} Press A to accept the group.")
-    if _turned_away(truth, group):
-        letter = view_letter(_place(group, _turned_away(truth, group)[0]))
+    if _views_turned(truth, group):
+        letter = view_letter(_place(group, _views_turned(truth, group)[0]))
         return Feedback(
             OPEN,
             f"Look again: view {letter} was labelled rightly, and now its sides are exchanged. "
@@ -164,13 +164,13 @@ def _before(truth: SceneTruth, group: Group, words: _Told) -> Feedback:
     return Feedback(OPEN)
 
 
-def _accepted(truth: SceneTruth, group: Group, words: _Told) -> Feedback:
+def _accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
     kind = kind_of(truth)
     if kind == CLEAN:
         if _is_sound(truth, group):
             return words.say(RIGHT, "")
         return words.say(WRONG, "The group was sound, and an edit has spoilt it.")
-    if kind not in _REASONS and _is_mended(truth, group):
+    if kind not in _REASONS and _is_corrected(truth, group):
         return words.say(RIGHT, "You fixed it.")
     if kind != "tiny_baseline" and _is_left_out(truth, group):
         if kind == "not_synchronous":
@@ -181,7 +181,7 @@ def _accepted(truth: SceneTruth, group: Group, words: _Told) -> Feedback:
     return words.say(WRONG, "The group was accepted with its fault.")
 
 
-def _rejected(truth: SceneTruth, reason: str | None, words: _Told) -> Feedback:
+def _rejected(truth: SceneTruth, reason: str | None, words: _LessonTexts) -> Feedback:
     kind = kind_of(truth)
     if kind == CLEAN:
         return words.say(WRONG, "A good group was lost.")
@@ -192,7 +192,7 @@ def _rejected(truth: SceneTruth, reason: str | None, words: _Told) -> Feedback:
     return words.say(ALMOST, "It is right to reject this group, but another reason fits better.")
 
 
-class _Told:
+class _LessonTexts:
     """The sentences of a lesson, with letters and numbers put in."""
 
     def __init__(self, truth: SceneTruth, group: Group):
@@ -239,7 +239,7 @@ def _place(group: Group, view: str) -> int:
     return [item.key for item in group.views].index(view)
 
 
-def _is_mended(truth: SceneTruth, group: Group) -> bool:
+def _is_corrected(truth: SceneTruth, group: Group) -> bool:
     """Whether the fault is gone and nothing else was spoilt."""
     if kind_of(truth) in _REASONS or not _is_sound(truth, group):
         return False
@@ -289,7 +289,7 @@ def lines_off(truth: ViewTruth, view: View, group: Group) -> tuple[str, ...]:
     return tuple(off)
 
 
-def _turned_away(truth: SceneTruth, group: Group) -> list[str]:
+def _views_turned(truth: SceneTruth, group: Group) -> list[str]:
     """Views without a fault of their own in which nearly no line is where it is named."""
     faulty = {fault.view for fault in truth.faults}
     turned = []

@@ -44,12 +44,12 @@ Person = Annotated[str | None, Depends(_person)]
     responses=responses(),
 )
 @may(Action.READ, where=Where.SOMEWHERE)
-def get_practice(services: AppServices, sight: Sees, person: Person) -> Practice:
+def get_practice(services: AppServices, visibility: Sees, person: Person) -> Practice:
     """Every lesson and what has come of it; none until the practice is made.
 
     Where people log in, each has lessons of their own.
     """
-    return read_practice(services.store, services.settings, sight, person)
+    return read_practice(services.store, services.settings, visibility, person)
 
 
 @router.post(

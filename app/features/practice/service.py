@@ -23,11 +23,11 @@ from app.features.jobs.run import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs, Pool
 from app.features.people.queries import person_by_name, set_dataset_role
 from app.features.people.roles import Role, note
-from app.features.people.visibility_queries import COPIES, EVERYTHING, Sight
+from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
 from app.features.practice.lessons import WORDS, Feedback, judge, kind_of
 from app.features.solutions.service import solve_dataset
 from app.formats.match_frames import ARCHIVE
-from app.progress import TellProgress, telling
+from app.progress import ReportProgress, partial_progress
 from app.sample.order import SampleOrder
 from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import SceneTruth
@@ -108,7 +108,7 @@ def request_practice(
 def resume_practice(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on."""
 
-    jobs.resumes(KIND, partial(practice_work, store))
+    jobs.register_resume(KIND, partial(practice_work, store))
 
 
 def practice_work(store: Store, progress: JobProgress) -> Json:
@@ -128,7 +128,7 @@ def practice_work(store: Store, progress: JobProgress) -> Json:
 
 
 def _make_dataset(
-    store: Store, again: bool, actor: str, person: str | None, progress: TellProgress
+    store: Store, again: bool, actor: str, person: str | None, progress: ReportProgress
 ) -> Json:
     return make_practice_dataset(
         store, store.settings, progress, again=again, actor=actor, person=person
@@ -138,7 +138,7 @@ def _make_dataset(
 def make_practice_dataset(
     store: Store,
     settings: Settings,
-    progress: TellProgress,
+    progress: ReportProgress,
     *,
     again: bool = False,
     actor: str,
@@ -168,7 +168,7 @@ def make_practice_dataset(
 def _made(
     store: Store,
     settings: Settings,
-    progress: TellProgress,
+    progress: ReportProgress,
     again: bool,
     actor: str,
     person: str | None,
@@ -176,7 +176,7 @@ def _made(
     """Ids of the lessons, once they are drawn, imported and solved."""
     folder, name = settings.home / DATASET, practice_name(person)
     if not _is_drawn(settings):
-        write_practice(folder, telling(progress, "Drawing the pictures."))
+        write_practice(folder, partial_progress(progress, "Drawing the pictures."))
     if again:
         afresh = PAPER if person is None else None
         delete_dataset(store, name, confirm=name, actor=actor, afresh=afresh)
@@ -185,7 +185,7 @@ def _made(
     progress(0, 1, "Reading the groups.")
     source = Source("soccernet-v3", folder.resolve(), name="the practice groups")
     import_source(store, name, source, settings, None, actor=actor)
-    solve_dataset(store, name, None, telling(progress, "Solving the groups."))
+    solve_dataset(store, name, None, partial_progress(progress, "Solving the groups."))
     return _group_ids(store, name)
 
 
@@ -202,14 +202,14 @@ def _open_for(store: Store, person: str, actor: str) -> None:
 
 
 def read_practice(
-    store: Store, settings: Settings, sight: Sight = EVERYTHING, person: str | None = None
+    store: Store, settings: Settings, visibility: Visibility = EVERYTHING, person: str | None = None
 ) -> Practice:
     """Every lesson with what has come of it; none where the dataset is not made yet, or not seen."""
     truths, name = _truths(settings), practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
         # An ordinary dataset that is called so is nobody's practice.
-        if row is not None and (not sight.sees(row.id) or _is_ordinary(row, person)):
+        if row is not None and (not visibility.sees(row.id) or _is_ordinary(row, person)):
             return Practice(name, ())
         states = read_states(session, _group_ids(store, name))
     lessons = [
@@ -335,7 +335,7 @@ def make_sample_dataset(
     folder: Path,
     order: SampleOrder,
     pool: Pool,
-    progress: TellProgress,
+    progress: ReportProgress,
     *,
     workers: int | None = None,
     actor: str,
@@ -358,13 +358,13 @@ def make_sample_dataset(
     found = _present(store, name)
     if found.is_complete:
         return found
-    drawing = telling(progress, "Drawing the pictures.")
+    drawing = partial_progress(progress, "Drawing the pictures.")
     written = write_sample(folder, **vars(order), progress=drawing, workers=workers)
     source = Source("soccernet-v3", folder.resolve())
-    reading = telling(progress, "Reading the groups.")
+    reading = partial_progress(progress, "Reading the groups.")
     import_source(store, name, source, store.settings, reading, actor=actor)
     with pool() as executor:
-        solve_dataset(store, name, executor, telling(progress, "Solving the groups."))
+        solve_dataset(store, name, executor, partial_progress(progress, "Solving the groups."))
     found = _present(store, name)
     return SampleDataset(found.dataset, found.groups, found.solved, written)
 

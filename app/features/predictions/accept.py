@@ -16,13 +16,13 @@ from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionEr
 from app.evaluation.prediction_run import box_problem
 from app.features.datasets.service import read_dataset_head
 from app.features.groups.edit import SetBall, need_view
-from app.features.groups.state import GroupState, require_unchanged, said_of
+from app.features.groups.state import GroupState, content_tag_of, require_unchanged
 from app.features.groups.submit import load, submit
 from app.features.groups.view_queries import StoredView, dataset_views, find_view
 from app.features.predictions.queries import PredictedBox, PredictionSet, read_box, read_boxes
 from app.features.predictions.service import read_set
 from app.features.queue.query import parse_query
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
@@ -124,7 +124,7 @@ def accept(
     request: AcceptRequest,
     *,
     actor: str,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> AcceptReport:
     """Make an edit of every prediction that a person accepts; done again it changes nothing.
 
@@ -211,7 +211,7 @@ def accept_box(
 def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
     """Refuse where the person saw a ball; of a state that they did not see ``submit`` judges."""
     balls = need_view(state.group, edit.view).balls
-    if not balls or balls == (edit.ball,) or said_of(state.etag) != said_of(if_match):
+    if not balls or balls == (edit.ball,) or content_tag_of(state.etag) != content_tag_of(if_match):
         return
     raise ConflictError(
         f"view {edit.view} has a ball already",

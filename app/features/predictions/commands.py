@@ -11,7 +11,14 @@ import typer
 from app.plural import plural
 from app.terminal.opened import opened_store
 from app.terminal.options import Dataset, Json, Workers, acting, read_settings
-from app.terminal.terminal import complain, print_json, print_rows, print_values, say, show_progress
+from app.terminal.terminal import (
+    print_error,
+    print_json,
+    print_rows,
+    print_values,
+    say,
+    show_progress,
+)
 
 commands = typer.Typer()
 
@@ -132,7 +139,7 @@ def print_set(found: Mapping[str, Any]) -> None:
     if report.get("without_score"):
         say(f"  {report['without_score']} boxes have no score and count as sure")
     for item in report.get("unknown_frames", [])[:5]:
-        complain(f"  {item['frame']} {item['problem']}")
+        print_error(f"  {item['frame']} {item['problem']}")
     _print_problems(report)
 
 
@@ -140,7 +147,7 @@ def _print_problems(report: Mapping[str, Any]) -> None:
     problems = report["problems"]
     for item in problems[:5]:
         place = ", ".join(str(item[part]) for part in ("file", "record", "field") if item[part])
-        complain(f"  {place}: {item['problem']}")
+        print_error(f"  {place}: {item['problem']}")
     rest = len(problems) - 5 + report["more_problems"]
     if rest > 0:
-        complain(f"  and {rest} more problems")
+        print_error(f"  and {rest} more problems")

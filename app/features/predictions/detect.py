@@ -23,7 +23,7 @@ from app.features.predictions.service import LISTED, frame_names, require_free, 
 from app.features.queue.query import parse_query
 from app.formats.corner_origin import box_from_corner
 from app.media.files import decode_frame
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.frames import Box, ImageSize
 
 DEFAULT_SIDE = 640
@@ -146,13 +146,13 @@ def _names(text: str) -> tuple[str, ...]:
     return tuple(str(value.get(place, "")) for place in range(len(value)))
 
 
-def _input_size(path: Path, shape: list[Any], said: str, side: int | None) -> ImageSize:
+def _input_size(path: Path, shape: list[Any], text: str, side: int | None) -> ImageSize:
     """Height and width of the input: the model's, else what it says, else the caller's."""
     if len(shape) != 4:
         raise InputError(f"{path.name} takes no picture: its input has the shape {shape}")
     height, width = (item if isinstance(item, int) and item > 0 else None for item in shape[2:])
     if height is None or width is None:
-        sides = [int(part) for part in said.strip("[]() ").split(",") if part.strip().isdigit()]
+        sides = [int(part) for part in text.strip("[]() ").split(",") if part.strip().isdigit()]
         chosen = [side, side] if side else (sides * 2)[:2] or [DEFAULT_SIDE, DEFAULT_SIDE]
         height, width = height or chosen[0], width or chosen[1]
     if not (1 <= height <= MAX_SIDE and 1 <= width <= MAX_SIDE):
@@ -189,7 +189,7 @@ def detect(
     request: DetectRequest,
     *,
     actor: str,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> PredictionSet:
     """Run a detector over frames; the set appears whole, when all of them were looked at.
 

@@ -20,7 +20,7 @@ from app.evaluation.comparison import (
 from app.evaluation.figure import Figure
 from app.evaluation.result import NUMBERS, FrameResult
 from app.evaluation.table import Table
-from app.features.audit.audit_events import note_deed
+from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.service import read_dataset_head
 from app.features.predictions import evaluation_queries as frame_rows
 from app.features.predictions.evaluation_queries import (
@@ -107,7 +107,9 @@ def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
     with store.write() as session:
         found = read_evaluation(session, evaluation_id)
         delete_evaluation(session, evaluation_id)
-        note_deed(session, actor, "evaluation deleted", found.dataset_id, evaluation=evaluation_id)
+        add_audit_event(
+            session, actor, "evaluation deleted", found.dataset_id, evaluation=evaluation_id
+        )
         session.respond(None)
 
 
@@ -150,7 +152,7 @@ def list_frames(
     if not 1 <= limit <= MAX_PAGE:
         raise InputError(f"a page has 1 to {MAX_PAGE} frames", pointer="/limit")
     where = _conditions(query)
-    sort = _known(query.sort.removesuffix("-desc"), "/sort") if query.sort else None
+    sort = _checked_field(query.sort.removesuffix("-desc"), "/sort") if query.sort else None
     descending = query.sort.endswith("-desc")
     with store.read() as session:
         read_evaluation(session, evaluation_id)
@@ -208,7 +210,7 @@ def read_evaluation(session: Session, evaluation_id: int) -> StoredEvaluation:
 def _conditions(query: FrameQuery) -> list[FrameCondition]:
     where = [] if query.match is None else [frame_rows.is_of_match(query.match)]
     if query.field is not None:
-        field = _known(query.field, "/field")
+        field = _checked_field(query.field, "/field")
         where.append(
             frame_rows.lacks(field)
             if query.missing
@@ -217,7 +219,7 @@ def _conditions(query: FrameQuery) -> list[FrameCondition]:
     return where
 
 
-def _known(field: str, pointer: str) -> str:
+def _checked_field(field: str, pointer: str) -> str:
     """A field of frames; raises InputError where they have none of that name."""
     if field not in NUMBERS:
         known = ", ".join(NUMBERS)

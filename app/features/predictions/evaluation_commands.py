@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.predictions.commands import print_set
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
 from app.soccer.frames import ImageSize
 from app.terminal.opened import opened_store
@@ -177,7 +177,7 @@ _Values = dict[str, Any]
 
 
 def _evaluate(
-    dataset: str, request: SourcesRequest, out: Path | None, progress: TellProgress
+    dataset: str, request: SourcesRequest, out: Path | None, progress: ReportProgress
 ) -> tuple[_Values, list[_Values]]:
     """The evaluation and the sets that were made or found for it, as plain values."""
     from app.features.predictions.folder import evaluation_values, write_evaluation
@@ -195,7 +195,7 @@ def _evaluate_at(
     dataset: str,
     request: SourcesRequest,
     out: Path | None,
-    progress: TellProgress,
+    progress: ReportProgress,
 ) -> tuple[_Values, list[_Values]]:
     """As ``_evaluate``, by a server."""
     from app.terminal import remote_files

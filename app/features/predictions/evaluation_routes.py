@@ -23,7 +23,7 @@ from app.features.predictions.evaluation_schemas import (
     FrameList,
 )
 from app.features.predictions.jobs import request_evaluation
-from app.features.versions.service import version_called
+from app.features.versions.service import find_version_id
 from app.finite import MAX_ID
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
@@ -95,7 +95,7 @@ def start_evaluation(
     The job's result names the evaluation.
     """
     store, named = services.store, request.version
-    version = None if named is None else version_called(store, str(named), dataset)
+    version = None if named is None else find_version_id(store, str(named), dataset)
     wanted = request.value(version)
     return request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
 

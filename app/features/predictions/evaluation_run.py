@@ -30,7 +30,7 @@ from app.features.predictions.service import read_set
 from app.features.solutions.codec import to_json
 from app.features.versions.service import Version, read_version
 from app.finite import quoted
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.ball_boxes import BOX_KINDS
 from app.soccer.frames import Box
 
@@ -178,7 +178,7 @@ def run_evaluation(
     request: EvaluationRequest,
     *,
     actor: str,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> StoredEvaluation:
     """Evaluate and keep the result; what it pins makes it repeatable.
 

@@ -83,10 +83,10 @@ def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | N
     require_solved(candidates, dataset.name)
     ids = [item.id for item in candidates if item.why is None or rule == "all"]
     frames: list[Frame] = []
-    said: list[list[str]] = []
+    hashes: list[list[str]] = []
     for start in range(0, len(ids), BATCH):
         for state in read_states(session, ids[start : start + BATCH]):
-            said.append([state.key, state.stored.inputs_hash])
+            hashes.append([state.key, state.stored.inputs_hash])
             if state.solution is None:
                 raise ConflictError(
                     f"group {state.key} has no solution", hint="Solve the dataset first."
@@ -101,7 +101,7 @@ def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | N
         "version_name": None,
         "version_hash": None,
         "groups": rule,
-        "state": digest(sorted(said)),
+        "state": digest(sorted(hashes)),
         **_pins(dataset.policy, SOLVER_VERSION),
     }
     return Truth(tuple(frames), dataset.policy, 0, pins)

@@ -66,10 +66,10 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
             raise NotFoundError.group(group_id)
         boxes = _with_sets(session, read_group_boxes(session, group_id))
         taken = list(_taken(session, group_id))
-        said = group_entries(session, group_id) if taken else []
+        entries = group_entries(session, group_id) if taken else []
         count = count_prediction_sets(session, dataset)
     return GroupPredictions(
-        count, boxes, tuple(_accepted(row, ball, boxes, said) for row, ball in taken)
+        count, boxes, tuple(_accepted(row, ball, boxes, entries) for row, ball in taken)
     )
 
 
@@ -90,7 +90,7 @@ def _accepted(
     row: StoredView,
     ball: BallAnnotation,
     boxes: Iterable[tuple[PredictionSet, PredictedBox]],
-    said: Sequence[LogEntry],
+    entries: Sequence[LogEntry],
 ) -> AcceptedBall:
     scores = [
         box.score
@@ -100,7 +100,7 @@ def _accepted(
         and (box.x, box.y, box.width, box.height)
         == (ball.box.x, ball.box.y, ball.box.width, ball.box.height)
     ]
-    entry = next((one for one in reversed(said) if _says(one, row.key, ball)), None)
+    entry = next((one for one in reversed(entries) if _places_ball(one, row.key, ball)), None)
     return AcceptedBall(
         view_id=row.id,
         view=row.key,
@@ -111,7 +111,7 @@ def _accepted(
     )
 
 
-def _says(entry: LogEntry, view: str, ball: BallAnnotation) -> bool:
+def _places_ball(entry: LogEntry, view: str, ball: BallAnnotation) -> bool:
     """Whether an edit put that ball there; undo and redo only bring back what one said."""
     if entry.kind != "edit":
         return False

@@ -21,7 +21,7 @@ from app.features.predictions.evaluation_run import (
     check_evaluation,
     run_evaluation,
 )
-from app.progress import TellProgress
+from app.progress import ReportProgress
 
 EVALUATE, ACCEPT = "evaluate", "bulk"
 
@@ -75,8 +75,8 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
         done = _evaluated_since(store, progress.job)
         return evaluation_work(store, progress) if done is None else evaluation_result(done)
 
-    jobs.resumes(EVALUATE, evaluating)
-    jobs.makes(ACCEPT, partial(accept_work, store))
+    jobs.register_resume(EVALUATE, evaluating)
+    jobs.register_work(ACCEPT, partial(accept_work, store))
 
 
 def evaluation_work(store: Store, progress: JobProgress) -> Json:
@@ -108,7 +108,7 @@ def _in_worker(
 
 
 def _evaluate(
-    store: Store, dataset_id: int, request: EvaluationRequest, actor: str, progress: TellProgress
+    store: Store, dataset_id: int, request: EvaluationRequest, actor: str, progress: ReportProgress
 ) -> Json:
     return evaluation_result(
         run_evaluation(store, dataset_id, request, actor=actor, progress=progress)
@@ -116,7 +116,7 @@ def _evaluate(
 
 
 def _accept(
-    store: Store, dataset_id: int, request: AcceptRequest, actor: str, progress: TellProgress
+    store: Store, dataset_id: int, request: AcceptRequest, actor: str, progress: ReportProgress
 ) -> Json:
     return accept_result(accept(store, dataset_id, request, actor=actor, progress=progress))
 
@@ -133,11 +133,11 @@ def accept_result(report: AcceptReport) -> dict[str, Any]:
 
 def _evaluated_since(store: Store, job: Job) -> StoredEvaluation | None:
     request = EvaluationRequest(**job.request)
-    asked = (request.predictions, request.careful, request.version, request.split, request.boxes)
+    wanted = (request.predictions, request.careful, request.version, request.split, request.boxes)
     for item in list_evaluations(store, job.dataset_id or 0):
         pins = item.pins
         sets = (item.prediction_set_id, item.careful_set_id, item.version_id)
-        same = (*sets, pins.get("split"), pins.get("boxes")) == asked
+        same = (*sets, pins.get("split"), pins.get("boxes")) == wanted
         if item.created >= job.created and same:
             return item
     return None

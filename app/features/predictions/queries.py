@@ -79,9 +79,11 @@ def predictions_digest(keys: Mapping[int, str], boxes: Boxes, cameras: Mapping[i
         boxes: By id of the view.
         cameras: By id of the view.
     """
-    said = sorted((keys[view], [list(map(float, box)) for box in boxes[view]]) for view in boxes)
+    predicted = sorted(
+        (keys[view], [list(map(float, box)) for box in boxes[view]]) for view in boxes
+    )
     seen = sorted((keys[view], camera_to_json(cameras[view])) for view in cameras)
-    return digest([[list(item) for item in said], [list(item) for item in seen]])
+    return digest([[list(item) for item in predicted], [list(item) for item in seen]])
 
 
 def insert_prediction_set(

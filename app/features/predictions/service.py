@@ -21,7 +21,7 @@ from app.evaluation.frame import Detection
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, listed
-from app.features.audit.audit_events import note_deed
+from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.service import read_dataset_head, require_name
 from app.features.groups.view_queries import dataset_views
 from app.features.predictions.queries import PredictedBox as PredictedBox
@@ -221,7 +221,7 @@ def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
     with store.write() as session:
         found = read_set(session, set_id)
         delete_prediction_set(session, set_id)
-        note_deed(session, actor, "predictions deleted", found.dataset_id, name=found.name)
+        add_audit_event(session, actor, "predictions deleted", found.dataset_id, name=found.name)
         session.respond(None)
 
 

@@ -12,7 +12,7 @@ from app.features.predictions.queries import PredictionSet
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, find_predictions
 from app.features.versions.service import find_version
-from app.progress import TellProgress
+from app.progress import ReportProgress
 
 
 @dataclass(frozen=True)
@@ -53,17 +53,17 @@ class EvaluatedSources:
 def evaluate_sources(
     store: Store,
     dataset: str | int,
-    asked: SourcesRequest,
+    wanted: SourcesRequest,
     *,
     actor: str,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> EvaluatedSources:
     """Read predictions and reference boxes into sets, and evaluate them.
 
     Args:
         store: The database.
         dataset: Name or id.
-        asked: What to evaluate.
+        wanted: What to evaluate.
         actor: Who asks.
         progress: Called as the evaluation goes on.
 
@@ -71,14 +71,14 @@ def evaluate_sources(
         NotFoundError: There is no such dataset, version, file or set.
         InputError: A file cannot be used, or nothing is left to evaluate.
     """
-    asked.check()
-    pinned = None if asked.version is None else find_version(store, dataset, asked.version).id
+    wanted.check()
+    pinned = None if wanted.version is None else find_version(store, dataset, wanted.version).id
     found, drawn = (
         None if source.is_empty else prediction_set(store, dataset, source, actor=actor)
-        for source in (asked.predictions, asked.careful)
+        for source in (wanted.predictions, wanted.careful)
     )
     request = replace(
-        asked.request,
+        wanted.request,
         predictions=None if found is None else found.id,
         careful=None if drawn is None else drawn.id,
         version=pinned,

@@ -93,8 +93,8 @@ def read_news(store: Store, places: Collection[int], solution: int | None) -> Ne
         changes = {place: read_changes(session, place) for place in places if place < entry}
         solved: list[Change] = []
         if solution is not None and newest > solution:
-            told = {item.group_id for items in changes.values() for item in items}
-            solved = read_solved(session, solution, told)
+            changed = {item.group_id for items in changes.values() for item in items}
+            solved = read_solved(session, solution, changed)
     return News(entry, newest, changes, solved)
 
 
@@ -104,21 +104,21 @@ def read_changes(session: Session, after: int) -> list[Change]:
     if newest - after > FAR:
         names = dataset_names(session)
         return [Change(newest, key, name, EVERYTHING, None) for key, name in names.items()]
-    return _told(session, logged_changes(session, after))
+    return _with_names(session, logged_changes(session, after))
 
 
 def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) -> list[Change]:
     """Groups that got a solution after another one; ``known`` are told of already."""
-    told = set(known)
+    skipped = set(known)
     found = [
         StoredChange(None, dataset_id, SOLVED, None, group_id)
         for dataset_id, group_id in solved_groups(session, after)
-        if group_id not in told
+        if group_id not in skipped
     ]
-    return _told(session, found)
+    return _with_names(session, found)
 
 
-def _told(session: Session, found: Iterable[StoredChange]) -> list[Change]:
+def _with_names(session: Session, found: Iterable[StoredChange]) -> list[Change]:
     """Changes with names and ETags; a dataset with too many of them is told as a whole."""
     items = _merged(found)
     sizes = Counter(item.dataset_id for item in items if item.group_id is not None)
@@ -151,9 +151,9 @@ def _merged(found: Iterable[StoredChange]) -> list[StoredChange]:
 
     A comment stands beside the change of its group, which it does not hide.
     """
-    last = {(item.dataset_id, item.group_id, _beside(item)): item for item in found}
+    last = {(item.dataset_id, item.group_id, _channel(item)): item for item in found}
     return sorted(last.values(), key=lambda item: item.id or 0)
 
 
-def _beside(item: StoredChange) -> str:
+def _channel(item: StoredChange) -> str:
     return item.kind if item.group_id is None or item.kind == COMMENT else ""

@@ -76,7 +76,7 @@ def _flag(name: str, meaning: str) -> QueryField:
     return QueryField(name, "flag", meaning, values=YES_NO)
 
 
-_ASKED = (
+_HIDDEN_FIELDS = (
     QueryField("status", "choice", "verdict", values=STATUSES, also=("state",)),
     QueryField(
         "finding", "choice", "kind of finding, unless dismissed", values=(*WHETHER, *FINDING_KINDS)
@@ -175,7 +175,7 @@ ORDERS = (
 """Equal groups stand as in the dataset."""
 
 FIELDS = (
-    *_ASKED,
+    *_HIDDEN_FIELDS,
     QueryField(
         "sort", "order", "order of the list",
         values=tuple(text for order in ORDERS for text in (order.name, f"{order.name}-desc")),
@@ -188,7 +188,7 @@ BY_NAME = {name: field for field in FIELDS for name in (field.name, *field.also)
 """Fields by every name that is understood."""
 
 
-def asks_blind(query: str) -> bool:
+def reads_hidden_work(query: str) -> bool:
     """Whether a query asks what others made of groups; also within quotes: rather once too often.
 
     Example:

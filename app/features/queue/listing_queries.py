@@ -28,7 +28,7 @@ from app.db.session import Session
 from app.features.agreement.queries import groups_that_came_to
 from app.features.batches.queries import groups_in_batches
 from app.features.comments.queries import groups_that_mention, groups_with_threads
-from app.features.independent_annotations.queries import groups_with_takes
+from app.features.independent_annotations.queries import groups_with_annotations
 from app.features.paint.proposal_queries import groups_with_open
 from app.features.people.visibility_queries import seen_anywhere, seen_in
 from app.features.policies.queries import judged_since
@@ -121,15 +121,15 @@ def mentions(name: str | None = None) -> Condition:
     return QueueModel.group_id.in_(groups_that_mention(name))
 
 
-def has_takes(op: str, number: float) -> Condition:
+def has_annotations(op: str, number: float) -> Condition:
     """So many people have handed in an annotation of their own; most groups have none."""
     if not _COMPARED[op](0, number):
-        return QueueModel.group_id.in_(groups_with_takes(_COMPARED[op], number))
+        return QueueModel.group_id.in_(groups_with_annotations(_COMPARED[op], number))
     # The few that are not meant are looked up, instead of the many that are.
-    return QueueModel.group_id.not_in(groups_with_takes(_NOT[op], number))
+    return QueueModel.group_id.not_in(groups_with_annotations(_NOT[op], number))
 
 
-def came_to(state: str) -> Condition:
+def has_outcome(state: str) -> Condition:
     """Its annotations were compared, in some batch, and came to that."""
     return QueueModel.group_id.in_(groups_that_came_to(state))
 
@@ -283,7 +283,7 @@ class Listing:
 
     def count(self) -> int:
         """How many groups there are."""
-        found: int | None = self.session.scalar(self._all(select(func.count())))
+        found: int | None = self.session.scalar(self._over_all_groups(select(func.count())))
         return found or 0
 
     def place(self, order: Order, keys: Sequence[Key], group_id: int) -> tuple[int | None, int]:
@@ -291,15 +291,15 @@ class Listing:
         there are."""
         here = func.sum(case((QueueModel.group_id == group_id, 1), else_=0))
         before = func.sum(case((order.before(keys), 1), else_=0))
-        statement = self._all(select(func.count(), here, before), order)
+        statement = self._over_all_groups(select(func.count(), here, before), order)
         total, found, index = self.session.execute(statement).one()
         return (index if found else None), total
 
     def columns(self, names: Iterable[str], *, by_number: bool = False) -> Sequence[Any]:
         """Some columns of each group."""
         names = list(names)
-        asked = _names(self.conditions) | set(names)
-        statement = _by(_through(asked), _columns(names).where(*self._where))
+        needed = _names(self.conditions) | set(names)
+        statement = _with_index(_index_for(needed), _columns(names).where(*self._where))
         if by_number:
             statement = statement.order_by(QueueModel.number)
         return self.session.execute(statement).all()
@@ -348,18 +348,18 @@ class Listing:
     def _ids(self) -> Select[int]:
         return select(QueueModel.group_id).where(*self._where)
 
-    def _all(self, statement: Any, order: Order | None = None) -> Select[Any]:
+    def _over_all_groups(self, statement: Any, order: Order | None = None) -> Select[Any]:
         """The statement over all groups."""
-        asked = statement.select_from(QueueModel).where(*self._where)
+        filtered = statement.select_from(QueueModel).where(*self._where)
         names = _names(self.conditions) | (set() if order is None else _names(order.keys))
-        return asked if _is_sorted(names) else _by(_through(names), asked)
+        return filtered if _is_sorted(names) else _with_index(_index_for(names), filtered)
 
     def _page(self, order: Order, reach: int, total: int) -> Select[int]:
         """Ids of which ``reach`` are read in order, out of ``total``."""
         few = self.conditions and reach * _FEW > total
         if few:
-            return _by(_through(_names(self.conditions) | _names(order.keys)), self._ids)
-        return _by(order.index, self._ids)
+            return _with_index(_index_for(_names(self.conditions) | _names(order.keys)), self._ids)
+        return _with_index(order.index, self._ids)
 
     def _scalars(self, statement: Select[int]) -> list[int]:
         return list(self.session.scalars(statement))
@@ -380,12 +380,12 @@ def _is_sorted(names: set[str]) -> bool:
     return names <= SORTED and len(names - {"number"}) <= 1
 
 
-def _through(names: set[str]) -> str:
+def _index_for(names: set[str]) -> str:
     """The index through which all groups are read by their number, for these columns."""
     return _SCAN if names <= {*QUEUE_SCANNED, "dataset_id", "group_id"} else _FILE_ORDER
 
 
-def _by(index: str | None, statement: Select[Any]) -> Select[Any]:
+def _with_index(index: str | None, statement: Select[Any]) -> Select[Any]:
     """The statement by an index, where there is one; SQLite would choose by what it guesses."""
     if index is None:
         return statement

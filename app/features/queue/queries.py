@@ -31,7 +31,12 @@ from app.features.datasets.tables import (
     StationModel,
     ViewModel,
 )
-from app.features.findings.queries import SHOWN, GroupDismissals, dismissed_kinds, standing
+from app.features.findings.queries import (
+    SHOWN,
+    GroupDismissals,
+    current_dismissals,
+    dismissed_kinds,
+)
 from app.features.findings.tables import DismissalModel
 from app.features.groups.queries import StoredGroup
 from app.features.people.alias_queries import shown_actor
@@ -104,7 +109,7 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
             .where(GroupModel.id.in_(ids))
         )
         values = [
-            {"of": head.id, **_judged(head, verdicts.get(head.id), edited, head.passes)}
+            {"of": head.id, **_verdict_values(head, verdicts.get(head.id), edited, head.passes)}
             for head in heads.all()
         ]
         if values:
@@ -134,7 +139,7 @@ def update_row(
     edited = {stored.id} if stored.edited else set[int]()
     values = {
         "changed": stored.changed,
-        **_judged(stored, verdict, edited, summary.passes),
+        **_verdict_values(stored, verdict, edited, summary.passes),
         **_computed(summary, noticed),
     }
     session.execute(_ROW, {"row": stored.id, **values})
@@ -145,10 +150,10 @@ def update_verdict(
 ) -> None:
     """Show a new verdict in a group's row; the rest of it is in step."""
     edited = {stored.id} if stored.edited else set[int]()
-    session.execute(_ROW, {"row": stored.id, **_judged(stored, verdict, edited, passes)})
+    session.execute(_ROW, {"row": stored.id, **_verdict_values(stored, verdict, edited, passes)})
 
 
-def rows_apart(session: Session) -> tuple[int, list[int]]:
+def differing_rows(session: Session) -> tuple[int, list[int]]:
     """How many groups there are, and ids of those whose row ``refresh_queue`` would write otherwise.
 
     Raises:
@@ -180,8 +185,8 @@ def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     rows = []
     for head, summary in _heads(session, ids):
         passes = None if summary is None else summary.passes
-        judged = _judged(head, verdicts.get(head.id), edited, passes)
-        row = {**_said(head, views[head.id]), **judged}
+        judged = _verdict_values(head, verdicts.get(head.id), edited, passes)
+        row = {**_head_values(head, views[head.id]), **judged}
         row.update(_computed(summary, [item.kind for item in findings[head.id]]))
         rows.append(row | checked.get(head.id, {}))
     return rows
@@ -209,11 +214,11 @@ def _checked(
     )
     solutions = read_solutions(session, [SolutionKey(*key) for key in keys], markings=False)
     checked = {}
-    for group, said in dismissals.items():
+    for group, dismissed in dismissals.items():
         solved = solutions.get(group)
         own = [Finding(row.kind, row.sentence, view=row.view) for row in noticed[group]]
         found = [*(() if solved is None else solved.findings), *own]
-        opened, closed = dismissed_kinds(found, said)
+        opened, closed = dismissed_kinds(found, dismissed)
         checked[group] = {"findings": _list(opened), "dismissed": _list(closed)}
     return checked
 
@@ -273,7 +278,7 @@ def read_noticed(
     for row in rows:
         if row.source != _DISMISSED:
             found[row.group].append(row)
-    return found, standing(row for row in rows if row.source == _DISMISSED)
+    return found, current_dismissals(row for row in rows if row.source == _DISMISSED)
 
 
 def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
@@ -281,7 +286,7 @@ def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]
     return read_noticed(session, ids)[0]
 
 
-def _said(head: Any, views: Sequence[Any]) -> dict[str, Any]:
+def _head_values(head: Any, views: Sequence[Any]) -> dict[str, Any]:
     main = views[0].id if views and views[0].media_path is not None else None
     names = ("dataset_id", "number", "key", "label", "match", "split", "changed")
     return {
@@ -324,7 +329,7 @@ def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
     return bool(verdict.fixed and accepted and edited and passes is not False)
 
 
-def _judged(
+def _verdict_values(
     head: Any, verdict: Any, edited: Collection[int], passes: bool | None
 ) -> dict[str, Any]:
     if verdict is None or verdict.state == "unreviewed":

@@ -169,9 +169,9 @@ def _condition(term: _Term) -> Condition:
     if term.field in NUMBERS:
         return _number(term)
     if term.field == "takes" and term.value == "none":
-        return conditions.has_takes("=", 0)
+        return conditions.has_annotations("=", 0)
     if term.field == "takes":
-        return conditions.has_takes("=" if term.op == ":" else term.op, _value(term))
+        return conditions.has_annotations("=" if term.op == ":" else term.op, _value(term))
     if term.field == "id":
         return _listed_groups(term)
     if term.field == "batch":
@@ -285,8 +285,8 @@ def _annotations(term: _Term, value: str) -> Condition:
     """What people's own annotations of it came to."""
     choice = _choice(term, value)
     if choice in ("any", "none"):
-        return _if_any(choice, conditions.has_takes(">", 0))
-    return conditions.came_to("open" if choice == "waiting" else choice)
+        return _if_any(choice, conditions.has_annotations(">", 0))
+    return conditions.has_outcome("open" if choice == "waiting" else choice)
 
 
 def _mentions(_term: _Term, value: str) -> Condition:

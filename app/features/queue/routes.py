@@ -10,15 +10,15 @@ from app.features.datasets.service import dataset_id
 from app.features.groups import submit
 from app.features.groups.submit import find_view
 from app.features.groups.suggested_edits import influences
-from app.features.groups.suggestions import find_remedies
+from app.features.groups.suggestions import find_suggestions
 from app.features.people.visibility_queries import is_blind
 from app.features.queue.fields import FIELDS, ORDERS
 from app.features.queue.schemas import QueryFieldList
 from app.features.queue.statistics import Statistics, read_timeline, statistics
 from app.features.queue.statistics_schemas import (
     Influences,
-    Remedies,
     StatisticsDocument,
+    Suggestions,
     TimelineDocument,
 )
 from app.http.cursor import paged
@@ -86,18 +86,18 @@ insight_router = APIRouter(tags=["insight"], route_class=Route)
 
 
 @insight_router.get(
-    "/groups/{group}/remedies", operation_id="getRemedies", responses=responses(404)
+    "/groups/{group}/suggestions", operation_id="getSuggestions", responses=responses(404)
 )
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(QUESTIONS)
 @paged()
-def get_remedies(group: Id, store: AppStore) -> Remedies:
+def get_suggestions(group: Id, store: AppStore) -> Suggestions:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
     state = submit.load_solved(store, group)
     if state.solution is None:
-        return Remedies(items=[])
-    found = find_remedies(state.group, state.policy, state.solution)
-    return Remedies(items=found)
+        return Suggestions(items=[])
+    found = find_suggestions(state.group, state.policy, state.solution)
+    return Suggestions(items=found)
 
 
 @insight_router.get(

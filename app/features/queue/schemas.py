@@ -27,7 +27,7 @@ from app.soccer.choices import VerdictState
 from app.soccer.finding import Dismissal, Finding
 
 THUMBNAIL_WIDTH = 208
-TOLD_KINDS = frozenset(STATION_EDITS) | frozenset(
+KINDS_WITH_BODY = frozenset(STATION_EDITS) | frozenset(
     {
         "edit",
         "undo",
@@ -177,8 +177,8 @@ class FindingRow(Document):
     @staticmethod
     def of(found: GroupFindings, finding: Finding, dismissed: Dismissal | None) -> FindingRow:
         """The row of a finding in a group."""
-        said = FindingDocument.of(finding, found.group, dismissed)
-        return FindingRow(group=found.group.key, group_id=found.group_id, **dict(said))
+        document = FindingDocument.of(finding, found.group, dismissed)
+        return FindingRow(group=found.group.key, group_id=found.group_id, **dict(document))
 
 
 class FindingList(ListDocument[FindingRow]):
@@ -202,8 +202,8 @@ class LogEntryDocument(Document):
     @staticmethod
     def of(entry: LogEntry) -> LogEntryDocument:
         """The document of an entry."""
-        told = entry.kind in TOLD_KINDS and isinstance(entry.body, dict)
-        body = {**entry.body} if told else None
+        has_body = entry.kind in KINDS_WITH_BODY and isinstance(entry.body, dict)
+        body = {**entry.body} if has_body else None
         if body is not None and entry.kind == "comment":
             # Its writer may have deleted it since.
             body.pop("text", None)

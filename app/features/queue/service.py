@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.agreement.queries import states_of
 from app.features.comments.queries import count_open
-from app.features.independent_annotations.queries import count_handed_in
+from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
 from app.features.queue.listing_queries import Key, Listing, find_place, read_rows
 from app.features.queue.query import NUMBERS, Query, parse_query
@@ -202,14 +202,18 @@ def list_groups(
             rows = listing.rows_after(order, keys, limit + 1)
             more = len(rows) > limit
         ids = [row.group_id for row in rows[:limit]]
-        said, takes = count_open(session, ids), count_handed_in(session, ids)
-        states = states_of(session, list(takes)) if takes else {}
+        comments, annotations = count_open(session, ids), count_submitted(session, ids)
+        states = states_of(session, list(annotations)) if annotations else {}
     rows = rows[:limit]
     following = encode(parsed, order.keys_of(rows[-1])) if more else None
     found = [
-        replace(_row(row, said), takes=takes.get(row.group_id, 0), came_to=states.get(row.group_id))
-        if takes
-        else _row(row, said)
+        replace(
+            _row(row, comments),
+            takes=annotations.get(row.group_id, 0),
+            came_to=states.get(row.group_id),
+        )
+        if annotations
+        else _row(row, comments)
         for row in rows
     ]
     return Page(found, following, total)
@@ -259,12 +263,12 @@ _STORED = [
 ]
 
 
-def _row(row: Any, said: Mapping[int, int]) -> GroupRow:
+def _row(row: Any, comments: Mapping[int, int]) -> GroupRow:
     return GroupRow(
         id=row.group_id,
         findings=_kinds(row.findings),
         dismissed=_kinds(row.dismissed),
-        comments=said.get(row.group_id, 0),
+        comments=comments.get(row.group_id, 0),
         **{name: getattr(row, name) for name in _STORED},
     )
 
@@ -274,12 +278,12 @@ def _kinds(text: str) -> tuple[str, ...]:
     return tuple(text.strip(",").split(",")) if text else ()
 
 
-def even(low: float, high: float, bins: int) -> tuple[float, ...]:
+def even_bins(low: float, high: float, bins: int) -> tuple[float, ...]:
     """Edges of bins of equal width, shape (bins + 1,)."""
     return tuple(np.round(np.linspace(low, high, bins + 1), 6).tolist())
 
 
-def decades(first: int, last: int, per_decade: int) -> tuple[float, ...]:
+def logarithmic_bins(first: int, last: int, per_decade: int) -> tuple[float, ...]:
     """Edges of logarithmic bins from ``10**first`` to ``10**last``, after one that begins at 0.
 
     Numbers that spread over decades (errors of given and of drawn cameras, say) would fall into
@@ -299,9 +303,9 @@ def decades(first: int, last: int, per_decade: int) -> tuple[float, ...]:
     return (0.0, *(float(f"{10 ** (step / per_decade):.3g}") for step in steps))
 
 
-SIGMA_M = decades(-2, 2, 5)
+SIGMA_M = logarithmic_bins(-2, 2, 5)
 """Of the ball's uncertainty, metres: from a centimetre to a hundred metres."""
-ERROR_PERCENT = decades(-2, 1, 6)
+ERROR_PERCENT = logarithmic_bins(-2, 1, 6)
 """Of the reprojection error, per cent of the diagonal: from 0.2 px in HD to 220 px."""
 
 
@@ -329,7 +333,7 @@ class HistogramColumn:
 
     Attributes:
         open_high: The last bin has no upper end.
-        log: Its bins are powers of ten apart (see ``bins.decades``).
+        log: Its bins are powers of ten apart (see ``bins.logarithmic_bins``).
     """
 
     edges: tuple[float, ...]
@@ -338,12 +342,12 @@ class HistogramColumn:
 
 
 COLUMNS = {
-    "jac": HistogramColumn(even(0, 1, 20), open_high=False),
+    "jac": HistogramColumn(even_bins(0, 1, 20), open_high=False),
     "error_percent": HistogramColumn(ERROR_PERCENT, log=True),
     "sigma": HistogramColumn(SIGMA_M, log=True),
-    "parallax": HistogramColumn(even(0, 180, 20), open_high=False),
-    "size_ratio": HistogramColumn(even(0, 2, 20)),
-    "agreement": HistogramColumn(even(0, 1, 20), open_high=False),
+    "parallax": HistogramColumn(even_bins(0, 180, 20), open_high=False),
+    "size_ratio": HistogramColumn(even_bins(0, 2, 20)),
+    "agreement": HistogramColumn(even_bins(0, 1, 20), open_high=False),
 }
 """The bins are fixed, so that they stay put while one filters."""
 

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.features.people.visibility_queries import is_blind as is_blind
 from app.features.queue.listing_queries import Listing, compares
 from app.features.queue.query import NUMBERS, parse_query
-from app.features.queue.service import ERROR_PERCENT, SIGMA_M, even, places
+from app.features.queue.service import ERROR_PERCENT, SIGMA_M, even_bins, places
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 
 
@@ -101,28 +101,30 @@ class Statistics:
 
 
 MEASURES = (
-    Measure("distance", "Camera to ball", "m", "distance", even(0, 120, 24)),
-    Measure("parallax", "Parallax", "°", "parallax", even(0, 180, 36), open_high=False),
+    Measure("distance", "Camera to ball", "m", "distance", even_bins(0, 120, 24)),
+    Measure("parallax", "Parallax", "°", "parallax", even_bins(0, 180, 36), open_high=False),
     Measure("sigma", "Uncertainty", "m", "sigma", SIGMA_M, log=True),
-    Measure("box", "Ball diameter in the image", "px", "box", even(0, 40, 20)),
-    Measure("size_ratio", "Annotated over expected size", "", "ratio", even(0, 3, 30)),
-    Measure("height", "Height above the grass", "m", "height", even(-1, 11, 24), open_low=True),
+    Measure("box", "Ball diameter in the image", "px", "box", even_bins(0, 40, 20)),
+    Measure("size_ratio", "Annotated over expected size", "", "ratio", even_bins(0, 3, 30)),
+    Measure(
+        "height", "Height above the grass", "m", "height", even_bins(-1, 11, 24), open_low=True
+    ),
     Measure(
         "error", "Reprojection error", "% of the diagonal", "error_percent", ERROR_PERCENT, log=True
     ),
-    Measure("jac", "Lowest JaC of the views", "", "jac", even(0, 1, 20), open_high=False),
+    Measure("jac", "Lowest JaC of the views", "", "jac", even_bins(0, 1, 20), open_high=False),
     Measure(
         "agreement",
         "Lowest agreement with the paint",
         "",
         "agreement",
-        even(0, 1, 20),
+        even_bins(0, 1, 20),
         open_high=False,
     ),
 )
 
-X_EDGES = even(-60, 60, 24)
-Y_EDGES = even(-40, 40, 16)
+X_EDGES = even_bins(-60, 60, 24)
+Y_EDGES = even_bins(-40, 40, 16)
 """Cells of 5 m, with a rim around the pitch."""
 
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from app.features.groups.solution_schemas import XY, FixDocument, GuideDocument, Jac, OfferDocument
 from app.features.groups.suggested_edits import Influence
-from app.features.groups.suggestions import Remedy
+from app.features.groups.suggestions import Suggestion
 from app.features.queue.statistics import (
     Measure,
     MeasureHistogram,
@@ -92,7 +92,7 @@ class TimelineDocument(BaseModel):
         return TimelineDocument.model_construct(total=len(timeline.id), **values)
 
 
-class RemedyEdit(FixDocument):
+class SuggestedEdit(FixDocument):
     """An edit as findings propose it, or a point moved."""
 
     point: XY | None = Field(
@@ -100,13 +100,13 @@ class RemedyEdit(FixDocument):
     )
 
 
-class RemedyDocument(Document):
+class SuggestionDocument(Document):
     """What the solver has tried out: an edit, or where a person should look and draw."""
 
     gate: str = Field(description="The gate that fails now.")
     view: str | None
     sentence: str = Field(description='Reads on after "would pass if".')
-    edit: RemedyEdit
+    edit: SuggestedEdit
     offers: list[OfferDocument] = Field(
         description="Edits that carry it out; none where a person has to look or draw."
     )
@@ -119,12 +119,12 @@ class RemedyDocument(Document):
     @model_validator(mode="before")
     @classmethod
     def _with_point(cls, value: Any) -> Any:
-        if isinstance(value, Remedy):
+        if isinstance(value, Suggestion):
             return {**vars(value), "edit": {**vars(value.fix), "point": value.point}}
         return value
 
 
-class Remedies(ListDocument[RemedyDocument]):
+class Suggestions(ListDocument[SuggestionDocument]):
     """What would make a group pass, the gentlest first; empty when it passes."""
 
 

@@ -19,7 +19,7 @@ from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
 from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
 from app.features.recordings.service import Recording, get_recording, groups_taken, read_index
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
@@ -71,7 +71,7 @@ def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
 
 
 def take_instants(
-    store: Store, recording_id: int, frames: Sequence[int], actor: str, progress: TellProgress
+    store: Store, recording_id: int, frames: Sequence[int], actor: str, progress: ReportProgress
 ) -> Taken:
     """Make a group of one view of each instant; in a worker process, which decodes.
 

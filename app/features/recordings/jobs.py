@@ -31,7 +31,7 @@ from app.features.recordings.service import (
 )
 from app.features.solve.jobs import request_solve
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.worker_process import WorkerEnded, WorkerLimits
 
 INDEX, INSTANTS = "recording", "instants"
@@ -176,7 +176,7 @@ def take_in_worker(
     frames: Sequence[int],
     *,
     actor: str,
-    progress: TellProgress,
+    progress: ReportProgress,
     stop: Any,
 ) -> dict[str, Any]:
     """``instants.take_instants`` in a worker process, within the limits of imports."""
@@ -200,5 +200,5 @@ def take_in_worker(
 
 def resume_recordings(jobs: Jobs, store: Store) -> None:
     """Let what an earlier server was at go on; what is done stays as it is."""
-    jobs.resumes(INDEX, partial(index_work, store))
-    jobs.resumes(INSTANTS, partial(instants_work, jobs, store))
+    jobs.register_resume(INDEX, partial(index_work, store))
+    jobs.register_resume(INSTANTS, partial(instants_work, jobs, store))

@@ -22,7 +22,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ConflictError, ImageError, InputError, NotFoundError, StorageError
-from app.features.audit.audit_events import note_deed
+from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset, require_name
 from app.features.groups.state import require_etag
@@ -39,7 +39,7 @@ from app.formats.frame_names import VIDEO_SUFFIXES
 from app.geometry.arrays import FloatArray
 from app.media.frames import refused_picture
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.choices import ShotKind, ShotStart
 from app.soccer.policy import TOUCHLINE
 from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes
@@ -188,7 +188,7 @@ def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Reco
         if there is None:
             name = _free_name(path.stem, {row.name for row in known})
             there = insert_recording(session, number, name, str(path), actor=actor)
-            note_deed(session, actor, "recording added", number, recording=there, name=name)
+            add_audit_event(session, actor, "recording added", number, recording=there, name=name)
         return _recording(need_recording(session, there))
 
 
@@ -202,7 +202,7 @@ def remove_recording(store: Store, recording_id: int, *, actor: str) -> None:
         row = need_recording(session, recording_id)
         delete_recording(session, recording_id)
         what = {"recording": recording_id, "name": row.name}
-        note_deed(session, actor, "recording removed", row.dataset_id, **what)
+        add_audit_event(session, actor, "recording removed", row.dataset_id, **what)
         session.respond(None)
 
 
@@ -224,7 +224,7 @@ def index_now(
     store: Store,
     recording_id: int,
     *,
-    progress: TellProgress,
+    progress: ReportProgress,
     stop: Callable[[], None],
 ) -> Recording:
     """Decode a recording once in a worker process: its index, its facts, and its shots.
@@ -263,7 +263,7 @@ def _in_worker(
     path: Path,
     work: Callable[..., Found],
     *arguments: Any,
-    progress: TellProgress,
+    progress: ReportProgress,
     stop: Callable[[], None],
 ) -> Found:
     """The result of ``work(path, *arguments, send)`` in a worker process."""
@@ -346,7 +346,7 @@ def find_again(
     recording_id: int,
     *,
     actor: str,
-    progress: TellProgress,
+    progress: ReportProgress,
     stop: Callable[[], None],
 ) -> RecordingShots:
     """Find the shots of a recording anew, in place of those that it has.
@@ -405,7 +405,7 @@ def put_shots(
         if text != row.shots:
             update_recording(session, recording_id, shots=text, revision=row.revision + 1)
             what = {"recording": recording_id, "name": row.name, "shots": len(shots)}
-            note_deed(session, actor, "shots changed", row.dataset_id, **what)
+            add_audit_event(session, actor, "shots changed", row.dataset_id, **what)
         found = _shots(store.settings, need_recording(session, recording_id))
         session.respond(found)
     return found

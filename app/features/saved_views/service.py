@@ -10,7 +10,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import checked_title
 from app.features.people.visibility_queries import judges_in
-from app.features.queue.fields import asks_blind
+from app.features.queue.fields import reads_hidden_work
 from app.features.queue.listing_queries import Listing
 from app.features.queue.query import parse_query
 from app.features.saved_views.queries import (
@@ -50,7 +50,7 @@ def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
     """The saved views of a dataset, by name, each with the number of groups that match."""
     with store.read() as session:
         rows = dataset_saved_views(session, dataset_id)
-        return [_saved_view(row, _matching(session, row)) for row in rows if _is_told(row)]
+        return [_saved_view(row, _matching(session, row)) for row in rows if _is_visible(row)]
 
 
 def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: str) -> SavedView:
@@ -106,14 +106,14 @@ def delete_view(store: Store, view_id: int) -> SavedView:
 
 def _read(session: Session, view_id: int) -> SavedView:
     row = find_saved_view(session, view_id)
-    if row is None or not _is_told(row):
+    if row is None or not _is_visible(row):
         raise NotFoundError(f"there is no saved view {view_id}")
     return _saved_view(row, _matching(session, row))
 
 
-def _is_told(row: Any) -> bool:
+def _is_visible(row: Any) -> bool:
     """Whether whoever asks may know of a view: its number of groups answers its query."""
-    return judges_in(row.dataset_id) or not asks_blind(row.query)
+    return judges_in(row.dataset_id) or not reads_hidden_work(row.query)
 
 
 def _matching(session: Session, row: Any) -> int:

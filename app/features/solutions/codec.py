@@ -62,7 +62,7 @@ def _named(value: Any) -> Any:
     return [_named(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def _same(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     return value
 
 
@@ -74,9 +74,9 @@ def _codec(hint: Any) -> Codec:
 def _compiled(hint: Any) -> Codec:
     if hint is float:
         # ``float`` also reads the names of numbers that are not finite.
-        return _same, float
+        return _identity, float
     if hint in (int, str, bool, type(None)):
-        return _same, _same
+        return _identity, _identity
     if hint is ImagePoint:
         return list, ImagePoint._make
     if hint is Camera:
@@ -89,7 +89,7 @@ def _compiled(hint: Any) -> Codec:
     if origin is tuple:
         return _tuple_codec(arguments)
     if origin is typing.Literal:
-        return _same, _same
+        return _identity, _identity
     raise TypeError(f"no codec for {hint}")
 
 
@@ -146,7 +146,7 @@ def _optional_codec(arguments: tuple[Any, ...]) -> Codec:
 def _tuple_codec(arguments: tuple[Any, ...]) -> Codec:
     if len(arguments) == 2 and arguments[1] is Ellipsis:
         to, back = _codec(arguments[0])
-        if to is _same:
+        if to is _identity:
             return list, lambda value: tuple(map(back, value))
         return (
             lambda value: [to(item) for item in value],

@@ -24,7 +24,6 @@ from app.features.groups.queries import read_groups
 from app.features.groups.view_queries import read_stations, station_pitches
 from app.features.policies.queries import policy_history
 from app.features.queue.queries import refresh_queue
-from app.features.solutions.kept_queries import KeptSolution, kept_solutions
 from app.features.solutions.queries import (
     EncodedSolution,
     SolutionKey,
@@ -37,20 +36,23 @@ from app.features.solutions.queries import (
     read_calibrations,
     unsolved_groups,
 )
+from app.features.solutions.stored_queries import KeptSolution, kept_solutions
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
-from app.solving.another_tau import alike_under, has_smaller_tau, retold
 from app.solving.calibrate import calibrate_station, calibration_key, view_keys
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
+from app.solving.rethreshold import differs_in_smaller_tau, rethreshold, unchanged_under
 from app.solving.solve import solve_with_facts
 from app.workers.executors import fan_out
 
 
-def contradicted(stations: Iterable[tuple[Station, Pitch]], policy: Policy) -> dict[str, float]:
+def contradicted_cameras(
+    stations: Iterable[tuple[Station, Pitch]], policy: Policy
+) -> dict[str, float]:
     """JaC of the static cameras whose lines do not fit the camera that was given, by their keys.
 
     Args:
@@ -69,7 +71,7 @@ def contradicted(stations: Iterable[tuple[Station, Pitch]], policy: Policy) -> d
 
 
 def sentence_of(off: Mapping[str, float], where: str, how: str) -> str:
-    """What ``contradicted`` found, and what to do.
+    """What ``contradicted_cameras`` found, and what to do.
 
     Args:
         off: What it found.
@@ -126,7 +128,7 @@ RETHRESHOLDED_AT_ONCE = 200
 
 
 @dataclass(frozen=True)
-class RetellTask:
+class RethresholdTask:
     """Groups on their way to a worker: solutions under policies of before, those by their hash."""
 
     kept: tuple[KeptSolution, ...]
@@ -134,48 +136,52 @@ class RetellTask:
     policy: Policy
 
 
-def retell_tasks(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Iterator[RetellTask]:
+def rethreshold_tasks(
+    store: Store, dataset: DatasetHead, ids: Sequence[int]
+) -> Iterator[RethresholdTask]:
     """What can be retold of groups that have no solution under the policy of their dataset."""
     with store.read() as session:
         history = policy_history(session, dataset.id)
     policy = dataset.policy
     before = {
-        item.policy.hash: item.policy for item in history if has_smaller_tau(policy, item.policy)
+        item.policy.hash: item.policy
+        for item in history
+        if differs_in_smaller_tau(policy, item.policy)
     }
     for start in range(0, len(ids) if before else 0, RETHRESHOLDED_AT_ONCE):
         with store.read() as session:
             kept = kept_solutions(session, ids[start : start + RETHRESHOLDED_AT_ONCE], before)
         if kept:
-            yield RetellTask(tuple(kept), before, policy)
+            yield RethresholdTask(tuple(kept), before, policy)
 
 
-def retell_task(task: RetellTask) -> list[Result]:
+def rethreshold_task(task: RethresholdTask) -> list[Result]:
     """The solutions of those groups of which tau decides nothing new; runs in a worker.
 
     What is damaged is left out, like all others: it is solved.
     """
     try:
-        return [result for kept in _by_policy(task) for result in _retell(task, kept)]
+        return [result for kept in _by_policy(task) for result in _rethreshold(task, kept)]
     except DamagedError:
         return []
 
 
-def _by_policy(task: RetellTask) -> Iterator[list[KeptSolution]]:
+def _by_policy(task: RethresholdTask) -> Iterator[list[KeptSolution]]:
     for digest in task.before:
         kept = [item for item in task.kept if item.policy_hash == digest]
         if kept:
             yield kept
 
 
-def _retell(task: RetellTask, kept: Sequence[KeptSolution]) -> Iterator[Result]:
+def _rethreshold(task: RethresholdTask, kept: Sequence[KeptSolution]) -> Iterator[Result]:
     policy = task.policy
     facts = facts_from_bytes([item.facts for item in kept])
-    same = alike_under(facts, task.before[kept[0].policy_hash], policy)
+    same = unchanged_under(facts, task.before[kept[0].policy_hash], policy)
     ends = np.cumsum(np.bincount(facts.view_group, minlength=facts.groups))
     diagonals = np.split(facts.view_diagonal, ends[:-1])
     for place in np.flatnonzero(same).tolist():
         item = kept[place]
-        solution = retold(item.solution, diagonals[place].tolist(), policy)
+        solution = rethreshold(item.solution, diagonals[place].tolist(), policy)
         if solution is not None:
             key = SolutionKey(item.group_id, item.inputs_hash, policy.hash)
             yield Result(key, item.group, solution.passes, item.encode(solution))
@@ -223,8 +229,8 @@ class SolveReport:
     @property
     def sentence(self) -> str:
         """How many groups pass, how many do not and why, and how many could not be solved."""
-        said = outcome_sentence(self.solved, self.passed, len(self.failed), self.failing)
-        return f"{said}. {self.advice}" if self.advice else said
+        outcome = outcome_sentence(self.solved, self.passed, len(self.failed), self.failing)
+        return f"{outcome}. {self.advice}" if self.advice else outcome
 
 
 def outcome_sentence(
@@ -261,7 +267,7 @@ def solve_dataset(
     store: Store,
     dataset: str | int,
     executor: Executor | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     stop: Callable[[], bool] = lambda: False,
     chosen: Callable[[Sequence[int]], Sequence[int]] = lambda ids: ids,
 ) -> SolveReport:
@@ -285,7 +291,7 @@ def solve_dataset(
             progress(report.solved + len(report.failed), report.total)
 
     keep([])
-    for results in fan_out(retell_task, retell_tasks(store, found, ids), executor, stop):
+    for results in fan_out(rethreshold_task, rethreshold_tasks(store, found, ids), executor, stop):
         keep(results)
     if report.solved:
         left = set(stale_groups(store, dataset))
@@ -297,7 +303,7 @@ def solve_dataset(
         keep(results)
     if report.failing["jac"]:
         with store.read() as session:
-            off = contradicted(_shared(session, found.id), found.policy)
+            off = contradicted_cameras(_shared(session, found.id), found.policy)
         where = f"{report.failing['jac']:,} of {report.solved:,} groups fail first at the gate jac"
         report.advice = sentence_of(off, where, _AGAIN) if off else ""
     return report

@@ -14,8 +14,8 @@ from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers
 from app.terminal.server import ServerPlace, connected, given_server
 from app.terminal.terminal import (
     INTERRUPTED,
-    complain,
     held_interrupts,
+    print_error,
     print_json,
     say,
     show_progress,
@@ -53,7 +53,7 @@ def solve(
         _print_solved(*_solve_at(server, dataset, chosen), json_=json_)
         return
     from app.features.policies.service import change_policy
-    from app.features.solve.jobs import count_yield, left_undone, solve_fully
+    from app.features.solve.jobs import count_yield, pending_work, solve_fully
 
     chosen = None if policy is None else read_policy_option(policy)
     with opened_to_solve("Solving", workers, cluster) as (store, executor, progress):
@@ -61,9 +61,11 @@ def solve(
             change_policy(store, dataset, chosen, if_match=None, actor=acting())
         with held_interrupts() as interrupted:
             report = solve_fully(store, dataset, executor, progress, interrupted, actor=acting())
-            left = left_undone(store, dataset) if interrupted() else None
+            left = pending_work(store, dataset) if interrupted() else None
             if left is not None:
-                complain(f"stopped; {plural(report.solved, 'group is', 'groups are')} kept, {left}")
+                print_error(
+                    f"stopped; {plural(report.solved, 'group is', 'groups are')} kept, {left}"
+                )
                 raise typer.Exit(INTERRUPTED)
         count_yield(store, dataset, report, progress)
     _print_solved(vars(report), report.sentence, json_=json_)
@@ -106,6 +108,6 @@ def findings(dataset: Dataset, json_: Json = False) -> None:
         return
     for value in values:
         place = " ".join(value[key] for key in ("group", "view") if value.get(key))
-        said = value.get("dismissed")
-        checked = "" if said is None else f" (checked by {said['by']}, fine)"
+        dismissal = value.get("dismissed")
+        checked = "" if dismissal is None else f" (checked by {dismissal['by']}, fine)"
         say(f"{value['kind']:20} {place}: {value['sentence']}{checked}")

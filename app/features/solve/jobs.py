@@ -16,7 +16,7 @@ from app.features.datasets.queries import dataset_name, group_ids
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
-from app.features.jobs.run import JobProgress, counting
+from app.features.jobs.run import JobProgress, counting_progress
 from app.features.jobs.service import Jobs, Pool
 from app.features.pitches.service import (
     DatasetPitches,
@@ -30,7 +30,7 @@ from app.features.solutions.queries import unsolved_groups
 from app.features.solutions.service import SolveReport, solve_dataset, stale_groups
 from app.features.what_if.service import AT_ONCE, YieldStore
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.actors import LOCAL_USER
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
@@ -40,7 +40,7 @@ def solve_fully(
     store: Store,
     dataset: str | int,
     executor: Executor | None,
-    progress: TellProgress,
+    progress: ReportProgress,
     stop: Callable[[], bool] = lambda: False,
     *,
     actor: str = LOCAL_USER,
@@ -80,7 +80,7 @@ def solve_fully(
     return report
 
 
-def left_undone(store: Store, dataset: str | int) -> str | None:
+def pending_work(store: Store, dataset: str | int) -> str | None:
     """What ``solve_fully`` would do now, as a sentence; None: nothing."""
     groups, matches = len(stale_groups(store, dataset)), len(stale_matches(store, dataset))
     if groups:
@@ -90,13 +90,13 @@ def left_undone(store: Store, dataset: str | int) -> str | None:
 
 
 def count_yield(
-    store: Store, dataset: str | int, report: SolveReport, progress: TellProgress
+    store: Store, dataset: str | int, report: SolveReport, progress: ReportProgress
 ) -> None:
     """Count what a dataset yields where many groups were solved, so that the first look finds it."""
     if report.solved > AT_ONCE:
         found = get_dataset_head(store, dataset)
         progress(report.total, report.total, f"Counting what {found.name} yields.")
-        YieldStore(store).keep_up(found.id)
+        YieldStore(store).update_table(found.id)
 
 
 KIND, EDITED = "solve", "edited"
@@ -247,7 +247,7 @@ def request_pitches(
 
 def resume_solving(jobs: Jobs, store: Store) -> None:
     """Let solving that an earlier server was at go on."""
-    jobs.resumes(KIND, partial(solve_work, store, jobs.pool))
+    jobs.register_resume(KIND, partial(solve_work, store, jobs.pool))
 
 
 def solve_leftovers(jobs: Jobs, store: Store, *, actor: str) -> None:
@@ -267,8 +267,8 @@ def solve_work(store: Store, pool: Pool, progress: JobProgress) -> Json:
     follow = not edited or stale > MOSTLY * whole
     large = stale >= WORTH_A_POOL or len(stale_matches(store, found.id)) >= MATCHES_WORTH_A_POOL
     with pool() if large else nullcontext() as executor:
-        told = counting(progress, "groups solved")
-        report = solve_fully(store, found.id, executor, told, actor=actor, follow=follow)
+        counter = counting_progress(progress, "groups solved")
+        report = solve_fully(store, found.id, executor, counter, actor=actor, follow=follow)
     count_yield(store, found.id, report, progress)
     progress(report.total, report.total, report.sentence)
     return {"policy": found.policy.name, **_report(report)}

@@ -65,7 +65,7 @@ class _Change:
     station: Station
 
 
-class _How(TypedDict):
+class _EditOptions(TypedDict):
     """How a step is taken.
 
     Attributes:
@@ -97,7 +97,7 @@ def submit_station(
     store: Store,
     station_id: int,
     edit: StationEdit,
-    **how: Unpack[_How],
+    **how: Unpack[_EditOptions],
 ) -> StationState:
     """Save an edit of a static camera; its groups are then stale until they are solved again.
 
@@ -165,12 +165,12 @@ def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: 
     refresh_queue(session, sorted(groups))
 
 
-def undo_station(store: Store, station_id: int, **how: Unpack[_How]) -> StationState:
+def undo_station(store: Store, station_id: int, **how: Unpack[_EditOptions]) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
     return _change(store, station_id, _plan_step("undo"), **how)
 
 
-def redo_station(store: Store, station_id: int, **how: Unpack[_How]) -> StationState:
+def redo_station(store: Store, station_id: int, **how: Unpack[_EditOptions]) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
     return _change(store, station_id, _plan_step("redo"), **how)
 

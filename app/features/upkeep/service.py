@@ -25,7 +25,7 @@ from app.db.store import Store
 from app.db.stored_responses import delete_old_responses, shorten_responses
 from app.errors import ReviewError
 from app.features.datasets.orphan_queries import expire_cache
-from app.features.datasets.service import delete_spare_calibrations
+from app.features.datasets.service import delete_unused_calibrations
 from app.features.exports.folder import ExportFolder
 from app.features.imports.upload_queries import expire_uploads
 from app.features.jobs.queries import count_jobs, forget_jobs
@@ -46,7 +46,7 @@ DELIVERIES_KEPT = timedelta(days=30)
 
 
 @dataclass(frozen=True)
-class Tidied:
+class CleanupCounts:
     """How many of each went."""
 
     answers: int = 0
@@ -60,7 +60,7 @@ class Tidied:
     deliveries: int = 0
 
 
-def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
+def clean_up(store: Store, wanted: Callable[[], bool] = lambda: True) -> CleanupCounts:
     """Take away what is older or larger than the settings allow, and what nothing uses.
 
     Every step is a short transaction of its own, safe to be killed in. One that fails is logged,
@@ -79,15 +79,15 @@ def tidy(store: Store, wanted: Callable[[], bool] = lambda: True) -> Tidied:
         "leftovers": lambda: delete_leftovers(settings),
         "exports": lambda: ExportFolder(settings.exports).forget_unfinished(),
         "expired_exports": lambda: ExportFolder(settings.exports).expire(settings.export_days),
-        "calibrations": lambda: delete_spare_calibrations(store, wanted),
+        "calibrations": lambda: delete_unused_calibrations(store, wanted),
         "deliveries": lambda: forget_old_deliveries(store),
     }
-    gone = {name: _attempt(name, step) or 0 for name, step in steps.items() if wanted()}
-    _attempt("anchor", lambda: sync_anchor(settings.database_file))
-    return Tidied(**gone)
+    gone = {name: _run_step(name, step) or 0 for name, step in steps.items() if wanted()}
+    _run_step("anchor", lambda: sync_anchor(settings.database_file))
+    return CleanupCounts(**gone)
 
 
-def _attempt(name: str, step: Callable[[], T]) -> T | None:
+def _run_step(name: str, step: Callable[[], T]) -> T | None:
     """What a step returns; None where it fails, which the log tells."""
     try:
         return step()
@@ -151,18 +151,18 @@ class Upkeep:
         wait = FIRST_SECONDS
         while not self._closing.wait(wait):
             wait = BUSY_SECONDS
-            if self._jobs.leads() and self._jobs.are_idle():
+            if self._jobs.is_leader() and self._jobs.are_idle():
                 self.round()
                 wait = BETWEEN_SECONDS
 
     def round(self) -> None:
         """Tidy once, and look at the whole database once in a while."""
         self._rounds += 1
-        tidied = tidy(self._store, self._is_wanted)
-        if tidied != Tidied():
+        tidied = clean_up(self._store, self._is_wanted)
+        if tidied != CleanupCounts():
             log.info("tidied", **vars(tidied))
         if self._rounds % ROUNDS_BETWEEN_CHECKS == 1:
-            _attempt("check", lambda: self._store.require_whole(self._is_wanted))
+            _run_step("check", lambda: self._store.require_whole(self._is_wanted))
 
     def _is_wanted(self) -> bool:
         return not self._closing.is_set()

@@ -19,7 +19,7 @@ from app.db.store import Store
 from app.errors import ConflictError
 from app.features.independent_annotations.queries import closed_copies
 from app.features.people.visibility_queries import COPIES, judges_in
-from app.features.queue.fields import asks_blind
+from app.features.queue.fields import reads_hidden_work
 from app.features.queue.listing_queries import Listing, read_columns
 from app.features.queue.queries import edited_groups, refresh_verdicts
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
@@ -124,7 +124,7 @@ def plan_verdicts(
     conditions = parse_query(query, MAX_LISTED_LENGTH).conditions
     with store.read() as session:
         rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-        sorted_out = sort_out(session, dataset_id, rows, verdict)
+        sorted_out = select_groups(session, dataset_id, rows, verdict)
     sample = [
         SampleGroup(row.group_id, row.key, row.number, row.label)
         for row in sorted_out.change[:SAMPLE]
@@ -171,27 +171,27 @@ def give_verdicts(
     with store.read() as session:
         begun = run.resume(session)
         rows = Listing(session, dataset_id, conditions).columns(ASKED, by_number=True)
-        found = sort_out(session, dataset_id, rows, verdict)
+        found = select_groups(session, dataset_id, rows, verdict)
     if begun is None:
         _require_expected(found, expected)
         left, refused = found.change, found.refused
         if not left:
             return BatchReport(None, 0, refused)
     else:
-        left = _left(found.change, begun)
+        left = _remaining(found.change, begun)
         refused = tuple(Refusal(*item) for item in begun["refused"])
     places = [(row.number, row.group_id) for row in left]
     # Of a million groups, what the queue says of each is much.
     del rows, found, left
-    told = [[item.reason, item.groups] for item in refused]
+    counts = [[item.reason, item.groups] for item in refused]
     for start in range(0, max(len(places), 1), CHUNK):
         chunk = places[start : start + CHUNK]
         with store.write() as session:
             rows = read_columns(session, [group for _, group in chunk], conditions, ASKED)
-            run.save(session, sort_out(session, dataset_id, rows, verdict).change)
+            run.save(session, select_groups(session, dataset_id, rows, verdict).change)
             if start + CHUNK < len(places):
                 here, end = chunk[-1][0], places[-1][0]
-                run.interrupt(session, {"after": here, "until": end, "refused": told})
+                run.interrupt(session, {"after": here, "until": end, "refused": counts})
             else:
                 run.close(session)
                 report = BatchReport(run.batch, run.changed, refused)
@@ -199,7 +199,7 @@ def give_verdicts(
     return report
 
 
-def _left(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
+def _remaining(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
     """Those of some groups that a run which was stopped had left.
 
     It remembers the numbers between which they lie, so that whatever was imported since is not
@@ -211,7 +211,7 @@ def _left(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
     return [row for row in rows if begun["after"] < row.number <= begun["until"]]
 
 
-def _require_expected(found: SortedOut, expected: int | None) -> None:
+def _require_expected(found: VerdictSelection, expected: int | None) -> None:
     if expected is not None and expected != len(found.change):
         raise ConflictError(
             f"{plural(len(found.change), 'group')} would change, not {expected}",
@@ -236,7 +236,9 @@ def list_batches(
     found: list[StoredBulkVerdict] = []
     with store.read() as session:
         while some := read_batches(session, dataset_id, limit, before):
-            found += [one for one in some if judges_in(dataset_id) or not asks_blind(one.query)]
+            found += [
+                one for one in some if judges_in(dataset_id) or not reads_hidden_work(one.query)
+            ]
             if len(some) < limit or len(found) >= limit:
                 break
             before = some[-1].id
@@ -244,21 +246,23 @@ def list_batches(
 
 
 @dataclass(frozen=True)
-class SortedOut:
+class VerdictSelection:
     """Rows that a verdict changes, and those that it is refused for."""
 
     change: list[Any]
     refused: tuple[Refusal, ...]
 
 
-def sort_out(session: Session, dataset_id: int, rows: Sequence[Any], verdict: Verdict) -> SortedOut:
+def select_groups(
+    session: Session, dataset_id: int, rows: Sequence[Any], verdict: Verdict
+) -> VerdictSelection:
     """The groups of a dataset that a verdict changes, and how many it is refused for, and why."""
     reasons = (SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE)
     change, refused = [], dict.fromkeys(reasons, 0)
     closed = closed_copies(session, dataset_id) if dataset_id > COPIES else ()
     unsolved = _unsolved(session, dataset_id, rows) if verdict.state == "accepted" else ()
     for row in rows:
-        if _has(row, verdict):
+        if _has_verdict(row, verdict):
             continue
         if row.group_id in closed:
             refused[SUBMITTED] += 1
@@ -272,8 +276,8 @@ def sort_out(session: Session, dataset_id: int, rows: Sequence[Any], verdict: Ve
             refused[NO_PICTURE] += 1
         else:
             change.append(row)
-    told = (Refusal(reason, count) for reason, count in refused.items() if count)
-    return SortedOut(change, tuple(told))
+    refusals = (Refusal(reason, count) for reason, count in refused.items() if count)
+    return VerdictSelection(change, tuple(refusals))
 
 
 def _unsolved(session: Session, dataset_id: int, rows: Sequence[Any]) -> set[int]:
@@ -291,7 +295,7 @@ def _is_unusable(row: Any) -> bool:
     return any(makes_unusable(kind, row.sigma_m) for kind in kinds)
 
 
-def _has(row: Any, verdict: Verdict) -> bool:
+def _has_verdict(row: Any, verdict: Verdict) -> bool:
     """Whether a group has the verdict already; one with a note of its own is always new."""
     if verdict.state == row.status == "unreviewed":
         return True
@@ -326,7 +330,7 @@ class BatchRun:
         if self._left is None:
             return None
         self.batch = self._left["batch"]
-        self._standing(session)
+        self._stored_batch(session)
         return self._left
 
     def interrupt(self, session: Session, left: dict[str, Any]) -> None:
@@ -344,7 +348,7 @@ class BatchRun:
         Raises:
             ConflictError: What was given before has been taken back meanwhile.
         """
-        given = self._standing(session)
+        given = self._stored_batch(session)
         self.changed = 0 if given is None else given.changed
         if not rows:
             return
@@ -366,7 +370,7 @@ class BatchRun:
         (log_id,) = append(session, [entry])
         update_batch(session, self.batch, log_id=log_id)
 
-    def _standing(self, session: Session) -> StoredBulkVerdict | None:
+    def _stored_batch(self, session: Session) -> StoredBulkVerdict | None:
         """The batch as it is stored, which others may go on with or take back; None before it is.
 
         Raises:

@@ -12,7 +12,14 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.queue.listing_queries import read_columns
 from app.features.solutions.queries import present_keys
-from app.features.verdicts.bulk import ASKED, BatchRun, Refusal, chunks, save_verdicts, sort_out
+from app.features.verdicts.bulk import (
+    ASKED,
+    BatchRun,
+    Refusal,
+    chunks,
+    save_verdicts,
+    select_groups,
+)
 from app.features.verdicts.queries import (
     Spans,
     StoredBulkVerdict,
@@ -54,11 +61,11 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     """
     with store.read() as session:
         before = read_batch(session, batch_id).undo_spans or ()
-        restored = _restored(session, before)
+        restored = _count_groups(session, before)
     known, number = _verdicts_in(before), 0
     while True:
         with store.write() as session:
-            batch = _standing(session, batch_id)
+            batch = _active_batch(session, batch_id)
             left = chunks(batch.spans)[number:]
             # What another run has taken back is not taken back again: it is not the newest.
             verdicts = _restore(session, batch, *left[0], actor) if left else []
@@ -70,14 +77,14 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
             if len(left) <= 1:
                 if _verdicts_in(spans) != known:
                     # Another run has been at it meanwhile.
-                    restored = _restored(session, spans)
+                    restored = _count_groups(session, spans)
                 report = UndoReport(batch_id, restored, batch.changed - restored)
                 _close(session, batch, report, actor)
                 session.respond(report)
                 return report
 
 
-def _restored(session: Session, spans: Spans) -> int:
+def _count_groups(session: Session, spans: Spans) -> int:
     """Of how many groups these verdicts are."""
     return len({group for span in spans for group in judged_between(session, *span)})
 
@@ -86,7 +93,7 @@ def _verdicts_in(spans: Spans) -> int:
     return sum(last - first + 1 for first, last in spans)
 
 
-def _standing(session: Session, batch_id: int) -> StoredBulkVerdict:
+def _active_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
     """A batch that was not taken back, or not wholly.
 
     Raises:
@@ -127,14 +134,16 @@ def _restore(
     again: list[StoredVerdict] = []
     for verdicts in read_verdicts(session, judged_between(session, first, last)).values():
         if first <= verdicts[0].id <= last:
-            again += _before(verdicts, batch.actor, at)
+            again += _earlier_verdicts(verdicts, batch.actor, at)
     numbered = [replace(item, id=number + place) for place, item in enumerate(again)]
     if numbered:
         save_verdicts(session, batch.dataset_id, numbered, actor=actor, at=at)
     return numbered
 
 
-def _before(verdicts: Sequence[StoredVerdict], judge: str, at: str) -> list[StoredVerdict]:
+def _earlier_verdicts(
+    verdicts: Sequence[StoredVerdict], judge: str, at: str
+) -> list[StoredVerdict]:
     """Verdicts that put a group back: its judge's own last one, then the one that counted.
 
     The newest verdict counts, so what counted before is said last.
@@ -190,10 +199,10 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
         return _report(batch, run, refused)
     for number, (first, last) in enumerate(spans, 1):
         with store.write() as session:
-            run.batch = _begun(session, batch_id, actor)
+            run.batch = _unfinished_redo(session, batch_id, actor)
             ids = _unchanged(session, batch.spans, first, last)
             rows = read_columns(session, ids, (), ASKED)
-            found = sort_out(session, batch.dataset_id, rows, verdict)
+            found = select_groups(session, batch.dataset_id, rows, verdict)
             run.save(session, found.change)
             refused.update({item.reason: item.groups for item in found.refused})
             if run.batch is not None:
@@ -227,7 +236,7 @@ def _spans(batch: StoredBulkVerdict) -> Spans:
     return chunks(batch.undo_spans)
 
 
-def _begun(session: Session, batch_id: int, actor: str) -> int | None:
+def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
     """The batch that gives a batch again and is not complete; None where nobody has begun."""
     redone = read_batch(session, batch_id).redone
     if redone is None:

@@ -11,7 +11,7 @@ from app.soccer.choices import VerdictState
 from app.terminal.opened import opened_store
 from app.terminal.options import Dataset, Json, acting
 from app.terminal.server import connected, given_server
-from app.terminal.terminal import complain, print_json, print_values, say
+from app.terminal.terminal import print_error, print_json, print_values, say
 
 commands = typer.Typer()
 
@@ -56,8 +56,8 @@ def verdict(
         with connected(server) as client:
             plan, report = remote.verdict_values(client, dataset, body, dry_run=dry_run)
     else:
-        said = (query, state, reason, note)
-        plan, report = _judge_here(dataset, said, expected, dry_run=dry_run)
+        arguments = (query, state, reason, note)
+        plan, report = _judge_here(dataset, arguments, expected, dry_run=dry_run)
     done = plan if report is None else report
     values: dict[str, Any] = {"matches": plan["matches"]}
     if report is None:
@@ -74,13 +74,13 @@ def verdict(
         for item in sample:
             say(f"  {item['number']:6} {item['label'] or item['key']}")
     if refused and not plan["would_change"]:
-        complain("no group was judged: each that matches was refused", "Say why in --note.")
+        print_error("no group was judged: each that matches was refused", "Say why in --note.")
         raise typer.Exit(1)
 
 
 def _judge_here(
     dataset: str,
-    said: tuple[str, str, str | None, str | None],
+    values: tuple[str, str, str | None, str | None],
     expected: int | None,
     *,
     dry_run: bool,
@@ -91,8 +91,8 @@ def _judge_here(
 
     with opened_store() as store:
         found = dataset_id(store, dataset)
-        plan = plan_verdicts(store, found, *said)
+        plan = plan_verdicts(store, found, *values)
         if dry_run:
             return asdict(plan), None
-        report = give_verdicts(store, found, *said, actor=acting(), expected=expected)
+        report = give_verdicts(store, found, *values, actor=acting(), expected=expected)
     return asdict(plan), asdict(report)

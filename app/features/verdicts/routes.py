@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, BackgroundTasks, Query, Response
 
-from app.features.agreement.service import after_hand_in
+from app.features.agreement.service import after_submission
 from app.features.datasets.service import dataset_id
 from app.features.findings.service import FindingName, set_dismissal
 from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document
@@ -54,12 +54,12 @@ def put_verdict(
     background: BackgroundTasks,
 ) -> GroupState:
     """Accept, reject with a reason, defer, or take a verdict back."""
-    store, said = services.store, (verdict.state, verdict.reason, verdict.note)
+    store, values = services.store, (verdict.state, verdict.reason, verdict.note)
     with current_state(lambda: load_document(store, group)):
-        state = set_verdict(store, group, *said, if_match=if_match, actor=actor)
+        state = set_verdict(store, group, *values, if_match=if_match, actor=actor)
     # A verdict on an independent annotation of a group, and on nothing else, submits that.
     if state.is_copy:
-        background.add_task(after_hand_in, store, group, services.paint)
+        background.add_task(after_submission, store, group, services.paint)
     return state
 
 
@@ -73,7 +73,7 @@ def put_verdict(
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @responds(group_answer)
 def put_dismissal(
-    group: Id, said: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
+    group: Id, body: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:
     """Say that a finding was checked and is fine, or that it is to be looked at again.
 
@@ -81,14 +81,14 @@ def put_dismissal(
     says something else: its number has moved by more than 5 %, or, without one, its sentence is
     another.
     """
-    named = FindingName(said.kind, said.view, said.marking, said.suggested, said.number)
+    named = FindingName(body.kind, body.view, body.marking, body.suggested, body.number)
     with current_state(lambda: load_document(services.store, group)):
         return set_dismissal(
             services.store,
             group,
             named,
-            dismissed=said.dismissed,
-            note=said.note,
+            dismissed=body.dismissed,
+            note=body.note,
             if_match=if_match,
             actor=actor,
         )
@@ -117,10 +117,10 @@ def post_verdicts(
     stay as they are.
     """
     found = dataset_id(store, dataset)
-    said = (verdict.q, verdict.state, verdict.reason, verdict.note)
+    values = (verdict.q, verdict.state, verdict.reason, verdict.note)
     if dry_run:
-        return document(BulkResult.planned(bulk.plan_verdicts(store, found, *said)))
-    return bulk.give_verdicts(store, found, *said, actor=actor, expected=verdict.expected)
+        return document(BulkResult.planned(bulk.plan_verdicts(store, found, *values)))
+    return bulk.give_verdicts(store, found, *values, actor=actor, expected=verdict.expected)
 
 
 @router.get(

@@ -9,7 +9,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError
 from app.features.groups.queries import StoredGroup
-from app.features.groups.state import GroupState, require_said, require_unchanged
+from app.features.groups.state import GroupState, require_content, require_unchanged
 from app.features.groups.submit import read_solved
 from app.features.queue.listing_queries import count_reviewed
 from app.features.queue.queries import update_verdict
@@ -69,10 +69,10 @@ def set_verdict(
         _require_seen(stored.group, verdict)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
-            require_said(session, group_id, record.said, if_match, what)
+            require_content(session, group_id, record.content, if_match, what)
             # Under another policy other gates may fail.
             if policy_hash == stored.policy.hash:
-                given = _given(session, stored, verdict, override, actor)
+                given = _insert(session, stored, verdict, override, actor)
                 insert_verdicts(session, stored.dataset_id, [given], actor=actor, at=given.at)
                 passes = None if solution is None else solution.passes
                 update_verdict(session, stored, given, passes)
@@ -139,7 +139,7 @@ def _require_seen(group: Group, verdict: Verdict) -> None:
         )
 
 
-def _given(
+def _insert(
     session: Session, stored: StoredGroup, verdict: Verdict, override: str | None, actor: str
 ) -> StoredVerdict:
     return StoredVerdict(

@@ -25,7 +25,7 @@ from app.features.versions.frozen_queries import (
     members_without_content,
     named_texts,
 )
-from app.features.versions.queries import all_versions, said_rows
+from app.features.versions.queries import all_versions, annotation_rows
 from app.features.versions.service import calibration_names, version_hash
 
 WRONG = "not as it was frozen"
@@ -39,7 +39,7 @@ def examine_versions(store: Store) -> list[Check]:
     with store.read() as session:
         restore = dialect_in(session).restoring
         versions = all_versions(session)
-        apart = [*_apart(session, versions)]
+        apart = [*_differing(session, versions)]
         count, changed = _frozen(session)
         return [
             compared("frozen versions", f"{len(versions):,}, as frozen", apart, WRONG, restore),
@@ -47,7 +47,7 @@ def examine_versions(store: Store) -> list[Check]:
         ]
 
 
-def _apart(session: Session, versions: Any) -> Iterator[str]:
+def _differing(session: Session, versions: Any) -> Iterator[str]:
     """Each version that is not what was frozen, with what is wrong with it."""
     try:
         with as_written():
@@ -58,7 +58,7 @@ def _apart(session: Session, versions: Any) -> Iterator[str]:
     for row in versions:
         entry = None if logged is None else logged.pop(row.id, None)
         why = None
-        if logged is not None and not _is_said(row, entry):
+        if logged is not None and not _is_logged(row, entry):
             why = "the log says otherwise"
         why = why or _wrong(session, row)
         if why is not None:
@@ -79,16 +79,22 @@ def _logged(session: Session) -> dict[int, LogEntry]:
     return found
 
 
-def _is_said(row: Any, entry: LogEntry | None) -> bool:
+def _is_logged(row: Any, entry: LogEntry | None) -> bool:
     if entry is None:
         return False
-    said = (entry.dataset_id, entry.body.get("name"), entry.body.get("hash"), entry.at, entry.actor)
-    return said == (row.dataset_id, row.name, row.hash, row.created, row.actor)
+    logged = (
+        entry.dataset_id,
+        entry.body.get("name"),
+        entry.body.get("hash"),
+        entry.at,
+        entry.actor,
+    )
+    return logged == (row.dataset_id, row.name, row.hash, row.created, row.actor)
 
 
 def _wrong(session: Session, row: Any) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
-    rows = [item._mapping for item in said_rows(session, row.id)]
+    rows = [item._mapping for item in annotation_rows(session, row.id)]
     try:
         with as_written():
             counts, policy = parse(row.counts), policy_from_json(parse(row.policy))

@@ -12,7 +12,14 @@ from app.terminal.opened import opened_store, opened_to_solve
 from app.terminal.options import Cluster, Dataset, Json, Workers, acting, parse_cameras, read_text
 from app.terminal.remote import VERSION
 from app.terminal.server import connected, given_server
-from app.terminal.terminal import complain, print_json, print_rows, print_values, say, show_progress
+from app.terminal.terminal import (
+    print_error,
+    print_json,
+    print_rows,
+    print_values,
+    say,
+    show_progress,
+)
 
 if TYPE_CHECKING:
     from app.features.versions.service import Version
@@ -65,7 +72,7 @@ def freeze(
     if server is not None:
         from app.terminal import remote
 
-        asked = {
+        body = {
             "name": name or named,
             "note": note,
             "licence": text,
@@ -73,7 +80,7 @@ def freeze(
             "split": vars(chosen),
         }
         with connected(server) as client, show_progress("Freezing") as progress:
-            found = remote.freeze_values(client, dataset, asked, progress, dry_run=dry_run)
+            found = remote.freeze_values(client, dataset, body, progress, dry_run=dry_run)
         print_values(found, json_)
         return
     with opened_store() as store, show_progress("Freezing") as progress:
@@ -154,7 +161,7 @@ def verify(
     if not report.ok:
         if not json_:
             _say_some([f"  {_difference(item)}" for item in report.differences])
-        complain(report.sentence)
+        print_error(report.sentence)
         raise typer.Exit(1)
 
 

@@ -14,7 +14,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
 from app.features.groups.codecs import policy_to_json
-from app.features.versions.queries import said_rows
+from app.features.versions.queries import annotation_rows
 from app.features.versions.service import Version, read_version
 from app.plural import plural
 
@@ -22,7 +22,7 @@ NEW, GONE = "not in the dataset", "no longer in the dataset"
 
 
 @dataclass(frozen=True)
-class Passage:
+class MembershipChange:
     """A group that came into the newer version, or that left it; ``why`` it was not in the older one, or is
     not in the newer one."""
 
@@ -31,7 +31,7 @@ class Passage:
 
 
 @dataclass(frozen=True)
-class Move:
+class BallMove:
     """A 3D ball that lies elsewhere; pitch frame, metres."""
 
     group: str
@@ -63,9 +63,9 @@ class VersionDiff:
 
     older: Version
     newer: Version
-    added: tuple[Passage, ...]
-    dropped: tuple[Passage, ...]
-    moved: tuple[Move, ...]
+    added: tuple[MembershipChange, ...]
+    dropped: tuple[MembershipChange, ...]
+    moved: tuple[BallMove, ...]
     changed: tuple[ChangedGroup, ...]
     settings: tuple[Setting, ...]
     unchanged: int
@@ -103,7 +103,7 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     if older.dataset_id != newer.dataset_id:
         raise InputError("the two versions belong to two datasets", pointer="/against")
     before, after = (
-        {row.key: row for row in said_rows(session, item.id)} for item in (older, newer)
+        {row.key: row for row in annotation_rows(session, item.id)} for item in (older, newer)
     )
     both = [key for key, row in after.items() if row.member and _is_in(before, key)]
     changes = (_change(before[key], after[key]) for key in both)
@@ -113,8 +113,8 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     return VersionDiff(
         older=older,
         newer=newer,
-        added=_passages(after, before, NEW),
-        dropped=_passages(before, after, GONE),
+        added=_membership_changes(after, before, NEW),
+        dropped=_membership_changes(before, after, GONE),
         moved=tuple(sorted(moved, key=lambda item: -item.metres)),
         changed=tuple(changed),
         settings=tuple(_settings(older, newer)),
@@ -142,7 +142,7 @@ def changelog_lines(diff: VersionDiff) -> list[str]:
     lines = [f"Since {diff.older.name}:"]
     for items, verb, when in ((diff.added, "added", "before"), (diff.dropped, "dropped", "now")):
         if items:
-            lines.append(f"{_groups(len(items))} {verb} ({when}: {_whys(items)}).")
+            lines.append(f"{_groups(len(items))} {verb} ({when}: {_reasons_sentence(items)}).")
     for what, count in sorted(Counter(w for item in diff.changed for w in item.what).items()):
         lines.append(f"{_groups(count)} with {_CHANGES[what]}.")
     if diff.moved:
@@ -152,7 +152,7 @@ def changelog_lines(diff: VersionDiff) -> list[str]:
             f"{metres[0]:.3f} m at most."
         )
     lines += [
-        f"{item.name}: {_word(item.before)} before, {_word(item.after)} now."
+        f"{item.name}: {_setting_text(item.before)} before, {_setting_text(item.after)} now."
         for item in diff.settings
     ]
     return lines if len(lines) > 1 else [f"Nothing changed since {diff.older.name}."]
@@ -170,16 +170,18 @@ def _is_in(rows: dict[str, Any], key: str) -> bool:
     return key in rows and bool(rows[key].member)
 
 
-def _passages(there: dict[str, Any], elsewhere: dict[str, Any], absent: str) -> tuple[Passage, ...]:
+def _membership_changes(
+    there: dict[str, Any], elsewhere: dict[str, Any], absent: str
+) -> tuple[MembershipChange, ...]:
     """Members of one version that are none of the other."""
     return tuple(
-        Passage(key, elsewhere[key].why if key in elsewhere else absent)
+        MembershipChange(key, elsewhere[key].why if key in elsewhere else absent)
         for key, row in there.items()
         if row.member and not _is_in(elsewhere, key)
     )
 
 
-def _word(value: Any) -> str:
+def _setting_text(value: Any) -> str:
     """A setting as people write it: in words, and by name where it holds several values."""
     if value is None:
         return "not set"
@@ -187,13 +189,15 @@ def _word(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, dict):
         rest = [
-            f"{name.replace('_', ' ')} {_word(value[name])}" for name in value if name != "kind"
+            f"{name.replace('_', ' ')} {_setting_text(value[name])}"
+            for name in value
+            if name != "kind"
         ]
         kind, named = value.get("kind"), ", ".join(rest)
-        told = str(kind or "")
-        return (f"{told} ({named})" if told and rest else told or named) or "none"
+        kind_name = str(kind or "")
+        return (f"{kind_name} ({named})" if kind_name and rest else kind_name or named) or "none"
     if isinstance(value, list):
-        return ", ".join(map(_word, value)) or "none"
+        return ", ".join(map(_setting_text, value)) or "none"
     return str(value)
 
 
@@ -207,11 +211,11 @@ def _change(before: Any, after: Any) -> ChangedGroup:
     return ChangedGroup(after.key, tuple(name for name, differs in differ.items() if differs))
 
 
-def _move(before: Any, after: Any) -> Move | None:
+def _move(before: Any, after: Any) -> BallMove | None:
     if before.ball is None or after.ball is None or before.ball == after.ball:
         return None
     then, now = _point(before.ball), _point(after.ball)
-    return Move(after.key, math.dist(then, now), then, now)
+    return BallMove(after.key, math.dist(then, now), then, now)
 
 
 def _point(text: str) -> tuple[float, float, float]:
@@ -236,7 +240,7 @@ def _flat(policy: Json) -> dict[str, Json]:
     return {f"policy {name}": value for name, value in {**rest, **part}.items()}
 
 
-def _whys(items: Sequence[Passage]) -> str:
+def _reasons_sentence(items: Sequence[MembershipChange]) -> str:
     counts = Counter(item.why for item in items)
     return ", ".join(f"{count} {why}" for why, count in sorted(counts.items()))
 

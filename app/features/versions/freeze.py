@@ -32,7 +32,7 @@ from app.features.versions.frozen_queries import (
     SOLUTION,
     body_of,
     frames_of,
-    freeze_said,
+    freeze_annotations,
     insert_frozen,
     json_of,
     known_frozen,
@@ -49,7 +49,7 @@ from app.features.versions.service import (
 from app.finite import quoted
 from app.formats.manifest import software_version
 from app.media.files import media_facts
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.finding import Finding
 from app.soccer.group import Group
 from app.soccer.reasons import checked_note
@@ -148,7 +148,7 @@ def freeze(
     request: FreezeRequest,
     *,
     actor: str,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> Version:
     """Freeze a dataset as it is in one snapshot.
 
@@ -189,7 +189,7 @@ class _Run:
         dataset: DatasetHead,
         request: FreezeRequest,
         candidates: Sequence[Candidate],
-        progress: TellProgress | None,
+        progress: ReportProgress | None,
     ):
         self._store, self._session, self._dataset = store, session, dataset
         self._request, self._candidates, self._progress = request, candidates, progress
@@ -247,20 +247,22 @@ class _Run:
         names: set[str] = set()
         rows = {}
         for number, item in stored.items():
-            said, body = freeze_said(item.group), solutions[number]
+            annotations, body = freeze_annotations(item.group), solutions[number]
             key, solved = SOLUTION + digest_of(body), json_of(body)
-            texts.update(said.texts)
+            texts.update(annotations.texts)
             bodies[key] = body
             names |= calibration_names(solved)
-            rows[number] = self._member(item.group, said.key, key, solved)
+            rows[number] = self._member(item.group, annotations.key, key, solved)
             if number in dismissals:
                 own = [Finding(one.kind, one.sentence, view=one.view) for one in noticed[number]]
                 found = [*(_finding(value) for value in solved["findings"]), *own]
                 rows[number]["dismissed"] = _dismissed(found, dismissals[number])
-        self._keep(texts, bodies, names)
+        self._freeze_new(texts, bodies, names)
         return rows
 
-    def _member(self, group: Group, said: str, solution: str, solved: Json) -> dict[str, Any]:
+    def _member(
+        self, group: Group, annotations: str, solution: str, solved: Json
+    ) -> dict[str, Any]:
         views = [view.key for view in group.views]
         splits = self._splitter.views(views)
         split = self._splitter.group(group.match, group.split, views)
@@ -275,13 +277,15 @@ class _Run:
         return {
             "split": split,
             "splits": None if splits is None else canonical(splits),
-            "said": said,
+            "said": annotations,
             "solution": solution,
             "ball": canonical(solved["ball"]["point"]) if solved["ball"] else None,
             "frames": None if frames is None else pack(frames),
         }
 
-    def _keep(self, texts: Mapping[str, str], bodies: Mapping[str, bytes], names: set[str]) -> None:
+    def _freeze_new(
+        self, texts: Mapping[str, str], bodies: Mapping[str, bytes], names: set[str]
+    ) -> None:
         """Bring what is not frozen yet into the database, in a transaction of its own."""
         known = known_frozen(self._session, self._dataset.id, {*texts, *bodies, *names})
         fresh: dict[str, bytes | None] = dict.fromkeys(names - known)
@@ -289,10 +293,10 @@ class _Run:
         fresh |= {key: body_of(text) for key, text in texts.items() if key not in known}
         if fresh:
             with self._store.write() as session:
-                gone = self._gone(session, names - known)
+                gone = self._deleted_calibrations(session, names - known)
                 insert_frozen(session, self._dataset.id, {**fresh, **gone})
 
-    def _gone(self, session: Session, names: set[str]) -> dict[str, bytes]:
+    def _deleted_calibrations(self, session: Session, names: set[str]) -> dict[str, bytes]:
         """Calibrations that somebody deleted since the snapshot, as they are in it."""
         keys = {name.removeprefix(CALIBRATION) for name in names}
         gone = keys - known_calibrations(session, keys)
@@ -372,10 +376,10 @@ def _dismissed(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json
             "marking": finding.marking,
             "suggested": finding.suggested,
             "number": finding.number,
-            "note": said.note,
+            "note": dismissal.note,
         }
-        for finding, said in pairs
-        if said is not None
+        for finding, dismissal in pairs
+        if dismissal is not None
     ]
 
 

@@ -39,14 +39,14 @@ Frames = Mapping[str, Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class FrozenSaid:
+class FrozenAnnotations:
     """What was said about a group: its key, and texts by key that belong with it."""
 
     key: str
     texts: Mapping[str, str]
 
 
-def freeze_said(group: Group) -> FrozenSaid:
+def freeze_annotations(group: Group) -> FrozenAnnotations:
     """A group as canonical JSON without media; a shared station is a text of its own, and so is what
     was read of a picture's paint."""
     texts = {PAINT + reading.digest: reading.text for reading in group.paint.values()}
@@ -62,7 +62,7 @@ def freeze_said(group: Group) -> FrozenSaid:
         views.append(value)
     text = canonical({**group_head_to_json(group), "views": views})
     key = SAID + digest_of(text.encode())
-    return FrozenSaid(key, {**texts, key: text})
+    return FrozenAnnotations(key, {**texts, key: text})
 
 
 def _station(station: Station) -> Json:
@@ -98,41 +98,43 @@ for _kind in (FrozenOutline, OutlineStation):
     look_through(_kind)
 
 
-def named_texts(said: Json) -> set[str]:
+def named_texts(annotations: Json) -> set[str]:
     """Keys of the shared stations and readings of paint that a frozen group names."""
-    stations = {view["station"] for view in said["views"] if isinstance(view["station"], str)}
-    return stations | {PAINT + digest for digest in said.get("paint", {}).values()}
+    stations = {
+        view["station"] for view in annotations["views"] if isinstance(view["station"], str)
+    }
+    return stations | {PAINT + digest for digest in annotations.get("paint", {}).values()}
 
 
-def thaw_group(said: Json, texts: Mapping[str, Json], frames: Frames | None = None) -> Group:
-    """Back from ``freeze_said``, with media where ``frames`` has them.
+def thaw_group(annotations: Json, texts: Mapping[str, Json], frames: Frames | None = None) -> Group:
+    """Back from ``freeze_annotations``, with media where ``frames`` has them.
 
     Args:
-        said: The frozen group.
+        annotations: The frozen group.
         texts: What it names, by key.
         frames: Where pictures lie.
     """
     known = frames or {}
-    views = tuple(_thaw_view(view, texts, known.get(view["key"])) for view in said["views"])
-    paint = said.get("paint", {}).items()
+    views = tuple(_thaw_view(view, texts, known.get(view["key"])) for view in annotations["views"])
+    paint = annotations.get("paint", {}).items()
     return Group(
-        key=said["key"],
+        key=annotations["key"],
         views=views,
-        match=said["match"],
-        pitch=Pitch(*said["pitch"]),
-        split=said["split"],
-        label=said["label"],
-        positions=positions_from_json(said.get("positions")),
+        match=annotations["match"],
+        pitch=Pitch(*annotations["pitch"]),
+        split=annotations["split"],
+        label=annotations["label"],
+        positions=positions_from_json(annotations.get("positions")),
         paint={view: reading_from_json(texts[PAINT + digest]) for view, digest in paint},
     )
 
 
 def thaw_outline(
-    said: FrozenOutline, stations: Mapping[str, OutlineStation], frames: Frames | None = None
+    outline: FrozenOutline, stations: Mapping[str, OutlineStation], frames: Frames | None = None
 ) -> Group:
     """What names the files of a frozen group: no lines, no cameras, no balls, no paint."""
     views = []
-    for value in said.views:
+    for value in outline.views:
         named, known = value.station, (frames or {}).get(value.key, {})
         found = stations[named] if isinstance(named, str) else named
         flipped = known.get("flipped", False)
@@ -141,15 +143,15 @@ def thaw_outline(
         if "path" in known:
             media = Media(known["path"], known["member"], known["frame"])
         views.append(View(value.key, station, media=media))
-    return Group(said.key, tuple(views), said.match, split=said.split)
+    return Group(outline.key, tuple(views), outline.match, split=outline.split)
 
 
 def _thaw_view(
     value: Mapping[str, Any], stations: Mapping[str, Json], frame: Mapping[str, Any] | None
 ) -> View:
-    said = value["station"]
+    stored = value["station"]
     known = frame or {}
-    station = stations[said] if isinstance(said, str) else said
+    station = stations[stored] if isinstance(stored, str) else stored
     media = None
     if "path" in known:
         media = [known["path"], known["member"], known["frame"]]

@@ -15,7 +15,7 @@ from app.features.jobs.service import Jobs
 from app.features.versions.freeze import FreezeRequest, freeze, plan_freeze
 from app.features.versions.service import FREEZE, Version, get_version, list_versions
 from app.features.versions.verify import keep_failure, verify_and_keep
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.split import Split
 from app.worker_process import WorkerEnded
 
@@ -36,7 +36,7 @@ def request_freeze(
     plan_freeze(store, found.id, request, strict=True)
     return jobs.submit(
         FREEZE,
-        f"Freeze {found.name} as {_called(request)}",
+        f"Freeze {found.name} as {_version_title(request)}",
         partial(freeze_work, store),
         dataset_id=found.id,
         actor=actor,
@@ -65,14 +65,14 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
         done = _frozen_by(jobs, store, progress.job, _request_of(progress.job))
         return freeze_work(store, progress) if done is None else version_result(done)
 
-    jobs.resumes(FREEZE, freezing)
-    jobs.resumes(VERIFY, partial(verify_work, store))
+    jobs.register_resume(FREEZE, freezing)
+    jobs.register_resume(VERIFY, partial(verify_work, store))
 
 
 def freeze_work(store: Store, progress: JobProgress) -> Json:
     """The work of freezing; its result names the version."""
     job, request = progress.job, _request_of(progress.job)
-    progress(0, None, f"Freezing {_called(request)}.")
+    progress(0, None, f"Freezing {_version_title(request)}.")
     return run_job_in_worker(
         store,
         "freezing",
@@ -119,12 +119,12 @@ def version_result(version: Version) -> dict[str, Any]:
 
 
 def _freeze(
-    store: Store, dataset_id: int, request: FreezeRequest, actor: str, progress: TellProgress
+    store: Store, dataset_id: int, request: FreezeRequest, actor: str, progress: ReportProgress
 ) -> Json:
     return version_result(freeze(store, dataset_id, request, actor=actor, progress=progress))
 
 
-def _verify(store: Store, version_id: int, actor: str, progress: TellProgress) -> Json:
+def _verify(store: Store, version_id: int, actor: str, progress: ReportProgress) -> Json:
     report = verify_and_keep(store, version_id, progress=progress, actor=actor)
     return {"version_id": version_id, **report.values()}
 
@@ -137,7 +137,7 @@ def _request_of(job: Job) -> FreezeRequest:
     return FreezeRequest(**{**job.request, "split": Split.of(job.request["split"])})
 
 
-def _called(request: FreezeRequest) -> str:
+def _version_title(request: FreezeRequest) -> str:
     return request.name or "the next version"
 
 
@@ -146,13 +146,13 @@ def _frozen_by(jobs: Jobs, store: Store, job: Job, request: FreezeRequest) -> Ve
     dataset_id = job.dataset_id or 0
     done = jobs.find(dataset_id=dataset_id, kinds=(FREEZE,), states=(DONE,), limit=MOST_LOOKED_AT)
     others = {other.result["version"] for other in done}
-    asked = (job.actor, request.groups, request.split)
+    wanted = (job.actor, request.groups, request.split)
     made = [
         version
         for version in list_versions(store, dataset_id)
         if version.created >= job.created
         and version.id not in others
         and request.name in (None, version.name)
-        and (version.actor, version.groups, version.split) == asked
+        and (version.actor, version.groups, version.split) == wanted
     ]
     return made[-1] if made else None

@@ -107,13 +107,13 @@ def _accepted(row: Any) -> str | None:
         return _decided(row) or "unreviewed"
     if row.stale:
         return "changed after its verdict"
-    return _judged(row)
+    return _verdict_of(row)
 
 
 def _passing(row: Any) -> str | None:
     if row.status in ("rejected", "deferred"):
         return _decided(row)
-    return _judged(row)
+    return _verdict_of(row)
 
 
 def _decided(row: Any) -> str | None:
@@ -122,7 +122,7 @@ def _decided(row: Any) -> str | None:
     return "deferred" if row.status == "deferred" else None
 
 
-def _judged(row: Any) -> str | None:
+def _verdict_of(row: Any) -> str | None:
     if not row.solved:
         return UNSOLVED
     # An override speaks of the gate that failed then, of no other that fails now.
@@ -205,8 +205,8 @@ def _rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
 def _verdicts(session: Session, version_id: int) -> tuple[dict[str, int], list[Json]]:
     counts: Counter[str] = Counter()
     overrides: list[Json] = []
-    for key, said in version_verdicts(session, version_id, member=True):
-        verdict = {"state": "unreviewed"} if said is None else said
+    for key, stored in version_verdicts(session, version_id, member=True):
+        verdict = {"state": "unreviewed"} if stored is None else stored
         counts[verdict["state"]] += 1
         if verdict.get("override"):
             gate, note = verdict["override"], verdict["note"]

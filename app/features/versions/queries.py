@@ -110,7 +110,7 @@ def read_page(
     return [_row(row) for row in session.execute(statement)]
 
 
-def said_rows(session: Session, version_id: int) -> Iterator[Any]:
+def annotation_rows(session: Session, version_id: int) -> Iterator[Any]:
     """What was said of each group of a version, as its hash and its differences need it."""
     model = VersionGroupModel
     columns = (model.key, model.member, model.why, model.split, model.splits, model.verdict)

@@ -46,7 +46,7 @@ def called(
     ] = None,
 ) -> int:
     """Id of the version that the address names."""
-    return versions.version_called(store, version, dataset)
+    return versions.find_version_id(store, version, dataset)
 
 
 VersionId = Annotated[int, Depends(called)]
@@ -137,7 +137,7 @@ def get_diff(
     ] = 500,
 ) -> VersionDiffDocument:
     """What changed in a version against another: groups added, dropped, moved, and why."""
-    older = versions.version_called(
+    older = versions.find_version_id(
         store, against, str(versions.get_version(store, version).dataset_id)
     )
     return VersionDiffDocument.model_validate(diff_versions(store, older, version).values(limit))

@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from app.features.policies.schemas import PolicyDocument
-from app.features.versions.diff import Move, Passage, Setting
+from app.features.versions.diff import BallMove, MembershipChange, Setting
 from app.features.versions.freeze import MAX_LICENCE, FreezeRequest
 from app.features.versions.queries import Verification
 from app.features.versions.verify import VersionDifference
@@ -185,7 +185,7 @@ class VersionName(BaseModel):
     hash: str
 
 
-class MoveDocument(Document, shows=Move):
+class BallMoveDocument(Document, shows=BallMove):
     """A 3D ball that lies elsewhere; pitch frame, metres."""
 
     before: Point
@@ -207,8 +207,8 @@ class VersionDiffDocument(BaseModel):
     same: bool = Field(description="Whether both versions have the same hash.")
     counts: dict[str, int]
     lines: list[str] = Field(description="In sentences.")
-    added: list[Passage]
-    dropped: list[Passage]
-    moved: list[MoveDocument] = Field(description="The farthest first.")
+    added: list[MembershipChange]
+    dropped: list[MembershipChange]
+    moved: list[BallMoveDocument] = Field(description="The farthest first.")
     changed: list[ChangeDocument]
     settings: list[Setting]

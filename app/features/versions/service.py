@@ -17,7 +17,7 @@ from app.errors import InputError, NotFoundError, StorageError
 from app.features.datasets.service import read_dataset_head
 from app.features.groups.codecs import policy_from_json
 from app.features.jobs.queries import OPEN, read_jobs
-from app.features.people.ownership import MIN_HASH, versions_called
+from app.features.people.ownership import MIN_HASH, find_versions
 from app.features.solutions.queries import decode_camera, decode_solution
 from app.features.versions.frozen_queries import (
     CALIBRATION,
@@ -128,7 +128,7 @@ def find_version(store: Store, dataset: str | int, version: str) -> Version:
     return fitting[0]
 
 
-def version_called(store: Store, version: str, dataset: str | None = None) -> int:
+def find_version_id(store: Store, version: str, dataset: str | None = None) -> int:
     """Id of the version that an address names: by its id, or by its name or hash.
 
     Args:
@@ -144,7 +144,7 @@ def version_called(store: Store, version: str, dataset: str | None = None) -> in
         return find_version(store, dataset, version).id
     with store.read() as session:
         found = _versions(session, all_versions(session))
-    fitting: list[Version] = versions_called(found, version)
+    fitting: list[Version] = find_versions(found, version)
     if not fitting:
         raise NotFoundError(f"there is no version {quoted(version)}")
     if len(fitting) > 1:
@@ -211,11 +211,13 @@ def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]
         StorageError: Content is missing.
     """
     bodies = _frozen(session, version, {row.said or "" for row in rows})
-    said = [json_of(bodies[row.said or ""]) for row in rows]
-    shared = {key for value in said for key in named_texts(value)}
+    annotations = [json_of(bodies[row.said or ""]) for row in rows]
+    shared = {key for value in annotations for key in named_texts(value)}
     more = _frozen(session, version, shared)
     texts = {key: json_of(more[key]) for key in shared}
-    return [thaw_group(value, texts, row.frames) for row, value in zip(rows, said, strict=True)]
+    return [
+        thaw_group(value, texts, row.frames) for row, value in zip(rows, annotations, strict=True)
+    ]
 
 
 def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[Group]:
@@ -225,11 +227,15 @@ def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGrou
         StorageError: Content is missing.
     """
     bodies = _frozen(session, version, {row.said or "" for row in rows})
-    said = [parse_as(inflate(bodies[row.said or ""]), FrozenOutline) for row in rows]
-    shared = {view.station for one in said for view in one.views if isinstance(view.station, str)}
+    outlines = [parse_as(inflate(bodies[row.said or ""]), FrozenOutline) for row in rows]
+    shared = {
+        view.station for one in outlines for view in one.views if isinstance(view.station, str)
+    }
     more = _frozen(session, version, shared)
     stations = {key: parse_as(inflate(more[key]), OutlineStation) for key in shared}
-    return [thaw_outline(one, stations, row.frames) for row, one in zip(rows, said, strict=True)]
+    return [
+        thaw_outline(one, stations, row.frames) for row, one in zip(rows, outlines, strict=True)
+    ]
 
 
 def _frozen(session: Session, version: Version, keys: set[str]) -> Mapping[str, bytes]:

@@ -26,14 +26,14 @@ from app.features.versions.frozen_queries import (
 )
 from app.features.versions.queries import (
     VersionGroup,
+    annotation_rows,
     keep_verification,
     read_page,
-    said_rows,
     version_matches,
 )
 from app.features.versions.service import Version, calibration_names, read_version, version_hash
 from app.plural import plural
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Calibration
@@ -130,7 +130,7 @@ def verify(
     store: Store,
     version_id: int,
     executor: Executor | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
 ) -> VerifyReport:
     """Compute a version from its frozen annotations and compare all of it.
 
@@ -168,7 +168,7 @@ def verify_and_keep(
     store: Store,
     version_id: int,
     executor: Executor | None = None,
-    progress: TellProgress | None = None,
+    progress: ReportProgress | None = None,
     *,
     actor: str,
 ) -> VerifyReport:
@@ -206,7 +206,9 @@ def verify_task(task: VerifyTask) -> list[list[VersionDifference]]:
 def _version_differences(session: Session, version: Version) -> Iterator[VersionDifference]:
     """What of the version's own row does not follow from its groups."""
     names = ("key", "member", "split", "splits", "verdict", "said")
-    rows = ({name: getattr(row, name) for name in names} for row in said_rows(session, version.id))
+    rows = (
+        {name: getattr(row, name) for name in names} for row in annotation_rows(session, version.id)
+    )
     found = version_hash(version.policy, version.solver_version, rows)
     if found != version.hash:
         yield VersionDifference(None, "hash", version.hash, found)
@@ -243,8 +245,8 @@ class _Tasks:
 
     def _task(self, rows: tuple[VersionGroup, ...], frozen: Mapping[str, bytes]) -> VerifyTask:
         sound = (row for row in rows if not _missing(row, frozen))
-        said = (json_of(frozen[row.said or ""]) for row in sound)
-        known = self._known([thaw_group(value, _texts(value, frozen)) for value in said])
+        annotations = (json_of(frozen[row.said or ""]) for row in sound)
+        known = self._known([thaw_group(value, _texts(value, frozen)) for value in annotations])
         policy = self._version.policy
         return VerifyTask(rows, frozen, known, policy, self._splitter)
 
@@ -277,8 +279,8 @@ def _missing(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
     return sorted(wanted - frozen.keys())
 
 
-def _texts(said: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
-    return {key: json_of(frozen[key]) for key in named_texts(said)}
+def _texts(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
+    return {key: json_of(frozen[key]) for key in named_texts(annotations)}
 
 
 def _differences(
@@ -290,8 +292,8 @@ def _differences(
         return
     try:
         yield from _frozen_differences(row, task)
-        said = json_of(task.frozen[row.said or ""])
-        group = thaw_group(said, _texts(said, task.frozen))
+        annotations = json_of(task.frozen[row.said or ""])
+        group = thaw_group(annotations, _texts(annotations, task.frozen))
         yield from _split_differences(row, group, task.splitter)
         yield from _solution_differences(row, group, task, known)
     except Exception as error:
@@ -301,8 +303,8 @@ def _differences(
 
 def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
     """Parts that are not what their key says."""
-    said, solution = row.said or "", row.solution or ""
-    for key in (said, *named_texts(json_of(task.frozen[said])), solution):
+    annotations, solution = row.said or "", row.solution or ""
+    for key in (annotations, *named_texts(json_of(task.frozen[annotations])), solution):
         found = fitting_key(key, task.frozen[key])
         if found != key:
             yield VersionDifference(row.key, "digest", key, found)

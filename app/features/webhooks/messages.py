@@ -113,7 +113,7 @@ def _of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[M
     for (kind, actor), rows in groupby(entries, what):
         found = list(rows)
         first, last = found[0].id, found[-1].id
-        told = {
+        data = {
             "dataset": dataset,
             "actor": actor,
             "entries": [
@@ -124,7 +124,7 @@ def _of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[M
         yield Message(
             f"msg_{webhook_id}_log{first}-{last}",
             kind,
-            _body(kind, found[-1].at, told),
+            _body(kind, found[-1].at, data),
             log_id=last,
         )
 
@@ -132,12 +132,12 @@ def _of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[M
 def _of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Iterator[Message]:
     for row in jobs:
         kind = _OF_JOBS[row.state]
-        told = {
+        data = {
             "dataset": dataset,
             "actor": row.actor,
             "job": {"id": row.id, "kind": row.kind, "title": row.title, "state": row.state},
         }
-        body = _body(kind, row.ended, told)
+        body = _body(kind, row.ended, data)
         name = f"msg_{webhook_id}_job{row.id}"
         yield Message(name, kind, body, ended=row.ended, job_id=row.id)
 

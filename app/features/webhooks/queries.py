@@ -22,7 +22,7 @@ from app.features.webhooks.tables import DeliveryModel, WebhookModel
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
 """States of a delivery."""
-_TOLD_APART = ("work",)
+_DISTINCT_KINDS = ("work",)
 """Kinds of entries of which ``app.features.webhooks.queries`` tells."""
 _WEBHOOKS = select(*WebhookModel.__table__.columns)
 _DELIVERIES = select(*DeliveryModel.__table__.columns)
@@ -81,7 +81,7 @@ def entries_since(session: Session, dataset_id: int, log_id: int, most: int) -> 
     where = (
         LogModel.id > log_id,
         LogModel.dataset_id == dataset_id,
-        LogModel.kind.not_in((*DEEDS, *_TOLD_APART)),
+        LogModel.kind.not_in((*DEEDS, *_DISTINCT_KINDS)),
     )
     return session.execute(select(*columns).where(*where).order_by(LogModel.id).limit(most)).all()
 
@@ -259,10 +259,10 @@ def announce(
     hooks = listeners(session, dataset_id, kind)
     if not hooks:
         return 0
-    told: dict[str, Json] = {"dataset": dataset_name(session, dataset_id), "actor": actor}
+    data: dict[str, Json] = {"dataset": dataset_name(session, dataset_id), "actor": actor}
     if batch_id is not None:
-        told["batch"] = batch_told(session, batch_id)
-    body = canonical({"type": kind, "timestamp": at, "data": {**told, **(also or {})}})
+        data["batch"] = batch_values(session, batch_id)
+    body = canonical({"type": kind, "timestamp": at, "data": {**data, **(also or {})}})
     return sum(insert_delivery(session, hook, f"msg_{hook}_{event}", kind, body) for hook in hooks)
 
 
@@ -275,7 +275,7 @@ def announce_batch(session: Session, batch_id: int, kind: str, *, actor: str, at
     return announce(session, row.dataset_id, kind, event, actor=actor, at=at, batch_id=batch_id)
 
 
-def batch_told(session: Session, batch_id: int) -> dict[str, Any] | None:
+def batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
     """What a message says of a batch; None where it is gone."""
     row = batch_of(session, batch_id)
     if row is None:

@@ -19,7 +19,7 @@ from app.db.json_columns import parse
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
-from app.features.batches.progress import tell_stalls
+from app.features.batches.progress import notify_of_stalls
 from app.features.datasets.queries import dataset_names
 from app.features.webhooks.messages import Message, read_messages, secret_of, sign
 from app.features.webhooks.queries import (
@@ -177,7 +177,7 @@ class WebhookSender:
     def start(self) -> None:
         """Begin to follow the log."""
         self._store.listen(self._wake.set)
-        self._thread = threading.Thread(target=self._follow, name="webhooks", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="webhooks", daemon=True)
         self._thread.start()
 
     def wake(self) -> None:
@@ -206,7 +206,7 @@ class WebhookSender:
         with self._store.write() as session:
             still = {row.id: row for row in webhooks_on(session)}
             return sum(
-                _tell(session, row, messages)
+                _queue_messages(session, row, messages)
                 for row, messages in found
                 # Who was changed meanwhile is told at the next look.
                 if messages and still.get(row.id) == row
@@ -218,7 +218,7 @@ class WebhookSender:
         if last is not None and (at - last).total_seconds() < STALLS_SECONDS:
             return 0
         self._stalls_at = at
-        return tell_stalls(self._store, at)
+        return notify_of_stalls(self._store, at)
 
     def send(self) -> int:
         """Send what is due, as much as goes at a time; returns how many tries came to an end.
@@ -232,14 +232,14 @@ class WebhookSender:
         if answers:
             with self._store.write() as session:
                 for row, answer in answers:
-                    self._note(session, row, answer)
+                    self._save_attempt(session, row, answer)
         return len(answers)
 
     async def _try_all(self, due: Sequence[Any]) -> list[tuple[Any, Attempt]]:
         async with httpx.AsyncClient(
             timeout=SECONDS, follow_redirects=False, trust_env=False, verify=_trusted()
         ) as client:
-            tries = {asyncio.ensure_future(self._try(client, row)): row for row in due}
+            tries = {asyncio.ensure_future(self._send(client, row)): row for row in due}
             left = set(tries)
             while left and not self._closing.is_set():
                 _, left = await asyncio.wait(left, timeout=GLANCE_SECONDS)
@@ -248,13 +248,13 @@ class WebhookSender:
             await asyncio.gather(*left, return_exceptions=True)
         return [(row, task.result()) for task, row in tries.items() if task not in left]
 
-    def _follow(self) -> None:
+    def _run(self) -> None:
         while not self._closing.is_set():
             self._wake.clear()
             wait = POLL_SECONDS
             try:
                 if self._leads():
-                    wait = self._followed()
+                    wait = self._run_once()
             except ReviewError as error:
                 log.warning("webhook messages could not be sent", error=str(error))
             except Exception:
@@ -262,7 +262,7 @@ class WebhookSender:
             self._closing.wait(LOOK_SECONDS)
             self._wake.wait(wait)
 
-    def _followed(self) -> float:
+    def _run_once(self) -> float:
         """Tell and send all that can be; seconds until the next look."""
         self.look()
         self.look_for_stalls()
@@ -279,7 +279,7 @@ class WebhookSender:
         seconds = (datetime.fromisoformat(due) - self._clock()).total_seconds()
         return min(max(seconds, 0.0), POLL_SECONDS)
 
-    async def _try(self, client: httpx.AsyncClient, row: Any) -> Attempt:
+    async def _send(self, client: httpx.AsyncClient, row: Any) -> Attempt:
         """One try; whatever goes wrong with one address is its own answer."""
         try:
             async with asyncio.timeout(SECONDS):
@@ -306,7 +306,7 @@ class WebhookSender:
         async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:
             return answer.status_code
 
-    def _note(self, session: Session, row: Any, answer: Attempt) -> None:
+    def _save_attempt(self, session: Session, row: Any, answer: Attempt) -> None:
         now = self._clock()
         tried = {"attempts": row.attempts + 1, "tried": text_of(now), "status": answer.status}
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
@@ -337,7 +337,7 @@ def _trusted() -> ssl.SSLContext:
     return httpx.create_ssl_context(trust_env=False)
 
 
-def _tell(session: Session, row: Any, messages: Sequence[Message]) -> int:
+def _queue_messages(session: Session, row: Any, messages: Sequence[Message]) -> int:
     wanted = set(parse(row.kinds))
     made = 0
     for message in messages:
@@ -346,6 +346,6 @@ def _tell(session: Session, row: Any, messages: Sequence[Message]) -> int:
     logged = max((message.log_id for message in messages), default=0)
     ended = max((message.ended, message.job_id) for message in messages)
     until, job = max((row.jobs_until, row.job_id), ended)
-    told = {"log_id": max(row.log_id, logged), "jobs_until": until, "job_id": job}
-    update_webhook(session, row.id, told)
+    position = {"log_id": max(row.log_id, logged), "jobs_until": until, "job_id": job}
+    update_webhook(session, row.id, position)
     return made

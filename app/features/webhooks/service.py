@@ -12,7 +12,7 @@ from app.db.log import newest_entry
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.audit.audit_events import note_deed
+from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.queries import dataset_name
 from app.features.datasets.service import dataset_id
 from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping, secret_of
@@ -90,7 +90,7 @@ class Delivery:
 def list_webhooks(store: Store, dataset: str) -> list[Webhook]:
     """The webhooks of a dataset."""
     with store.read() as session:
-        return _all(session, dataset_id(store, dataset))
+        return _webhooks_of(session, dataset_id(store, dataset))
 
 
 def make_webhook(
@@ -108,9 +108,9 @@ def make_webhook(
     with store.write() as session:
         if len(webhooks_of(session, number)) >= MOST:
             raise ConflictError(f"this dataset has {MOST} webhooks", hint="Delete one of them.")
-        made = insert_webhook(session, number, url, _chosen(kinds), salt=salt, by=actor)
-        note_deed(session, actor, "webhook made", number, url=url)
-        return _one(session, number, made), secret
+        made = insert_webhook(session, number, url, _checked_kinds(kinds), salt=salt, by=actor)
+        add_audit_event(session, actor, "webhook made", number, url=url)
+        return _webhook_of(session, number, made), secret
 
 
 def change_webhook(
@@ -132,19 +132,19 @@ def change_webhook(
         require_allowed(url, store.settings.webhooks, "/url")
     number = dataset_id(store, dataset)
     with store.write() as session:
-        found = _one(session, number, webhook_id)
+        found = _webhook_of(session, number, webhook_id)
         values: dict[str, Any] = {}
         if url is not None:
             values["url"] = url
         if kinds is not None:
-            values["kinds"] = canonical(_chosen(kinds))
+            values["kinds"] = canonical(_checked_kinds(kinds))
         if on is not None and on != (found.off is None):
             values |= _turned_on(session) if on else {"off": OFF}
         if values:
             update_webhook(session, webhook_id, values)
             did = "webhook turned off" if on is False else "webhook changed"
-            note_deed(session, actor, did, number, url=url or found.url)
-        return _one(session, number, webhook_id)
+            add_audit_event(session, actor, did, number, url=url or found.url)
+        return _webhook_of(session, number, webhook_id)
 
 
 def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> tuple[Webhook, str]:
@@ -152,19 +152,19 @@ def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> 
     number, salt = dataset_id(store, dataset), new_salt()
     secret = secret_of(store.settings, salt)
     with store.write() as session:
-        found = _one(session, number, webhook_id)
+        found = _webhook_of(session, number, webhook_id)
         update_webhook(session, webhook_id, {"salt": salt})
-        note_deed(session, actor, "webhook's secret renewed", number, url=found.url)
-        return _one(session, number, webhook_id), secret
+        add_audit_event(session, actor, "webhook's secret renewed", number, url=found.url)
+        return _webhook_of(session, number, webhook_id), secret
 
 
 def remove_webhook(store: Store, dataset: str, webhook_id: int, *, actor: str) -> None:
     """Tell an address nothing more, and forget what it was told."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        found = _one(session, number, webhook_id)
+        found = _webhook_of(session, number, webhook_id)
         delete_webhook(session, webhook_id)
-        note_deed(session, actor, "webhook deleted", number, url=found.url)
+        add_audit_event(session, actor, "webhook deleted", number, url=found.url)
 
 
 def list_deliveries(
@@ -173,7 +173,7 @@ def list_deliveries(
     """What a webhook was told, newest first, from below an id."""
     number = dataset_id(store, dataset)
     with store.read() as session:
-        _one(session, number, webhook_id)
+        _webhook_of(session, number, webhook_id)
         return [_delivery(row) for row in deliveries_of(session, webhook_id, before, most)]
 
 
@@ -181,7 +181,7 @@ def send_again(store: Store, dataset: str, webhook_id: int, delivery_id: int) ->
     """Send a message once more, at once; its tries are counted anew."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_on(_one(session, number, webhook_id))
+        _require_on(_webhook_of(session, number, webhook_id))
         if delivery_of(session, webhook_id, delivery_id) is None:
             raise NotFoundError(f"this webhook has no delivery {delivery_id}")
         update_delivery(session, delivery_id, {"state": WAITING, "attempts": 0, "next_at": now()})
@@ -192,7 +192,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
     """Send a message that says nothing, to see whether messages arrive; one that waits is sent now."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_on(_one(session, number, webhook_id))
+        _require_on(_webhook_of(session, number, webhook_id))
         waiting = waiting_of_kind(session, webhook_id, Kind.PING)
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
@@ -213,7 +213,7 @@ def _turned_on(session: Session) -> Mapping[str, Any]:
     return {"off": None, "log_id": newest_entry(session), "jobs_until": now()}
 
 
-def _chosen(kinds: Iterable[Kind]) -> list[str]:
+def _checked_kinds(kinds: Iterable[Kind]) -> list[str]:
     chosen = sorted({str(kind) for kind in kinds})
     if not chosen or Kind.PING in chosen:
         raise InputError(
@@ -224,14 +224,14 @@ def _chosen(kinds: Iterable[Kind]) -> list[str]:
     return chosen
 
 
-def _one(session: Session, dataset: int, webhook_id: int) -> Webhook:
+def _webhook_of(session: Session, dataset: int, webhook_id: int) -> Webhook:
     row = webhook_of(session, dataset, webhook_id)
     if row is None:
         raise NotFoundError(f"this dataset has no webhook {webhook_id}")
     return _webhook(row, count_deliveries(session, [webhook_id]))
 
 
-def _all(session: Session, dataset: int) -> list[Webhook]:
+def _webhooks_of(session: Session, dataset: int) -> list[Webhook]:
     rows = webhooks_of(session, dataset)
     counts = count_deliveries(session, [row.id for row in rows])
     return [_webhook(row, counts) for row in rows]

@@ -33,7 +33,7 @@ _NUMBERS = ("baseline", "point", "parallax", "distance")
 
 
 @dataclass
-class Judged:
+class BlockResults:
     """Groups under a policy; what is not asked for yet is computed when it first is.
 
     Attributes:
@@ -56,11 +56,11 @@ class Judged:
     lock: Lock = field(default_factory=Lock, repr=False)
 
     @staticmethod
-    def by(facts: Facts, jac: FloatArray, policy: Policy) -> Judged:
+    def by(facts: Facts, jac: FloatArray, policy: Policy) -> BlockResults:
         """Judge groups."""
         uncertainty = MeanCovariance(facts)
         judgement = judge(facts, policy, uncertainty, _jac(facts, jac, policy))
-        found = Judged(facts, jac, policy, judgement)
+        found = BlockResults(facts, jac, policy, judgement)
         if policy.max_sigma_m is not None:
             found.sigma = _sigma(facts, policy, judgement, uncertainty)
         return found
@@ -86,17 +86,17 @@ class Judged:
 
     def under(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
-        if _asks_more(policy) and noise_of(policy) != noise_of(self.policy):
+        if _is_stricter(policy) and noise_of(policy) != noise_of(self.policy):
             jac = _jac(self.facts, self.jac, policy)
             return judge(self.facts, policy, self._uncertainty(), jac)
         return self._under(policy)[0]
 
-    def moved(self, policy: Policy) -> Judged:
+    def moved(self, policy: Policy) -> BlockResults:
         """The groups judged by another policy from now on."""
         if noise_of(policy) != noise_of(self.policy):
-            return Judged.by(self.facts, self.jac, policy)
+            return BlockResults.by(self.facts, self.jac, policy)
         judgement, new, part = self._under(policy)
-        found = Judged(self.facts, self.jac, policy, judgement)
+        found = BlockResults(self.facts, self.jac, policy, judgement)
         if self.sigma is not None and self.p_value is not None:
             found.sigma, found.p_value = self.sigma.copy(), self.p_value.copy()
             if part is not None:
@@ -104,7 +104,7 @@ class Judged:
                 found.sigma[new], found.p_value[new] = part.sigma, part.p_value
         return found
 
-    def _under(self, policy: Policy) -> tuple[Judgement, BoolArray, Judged | None]:
+    def _under(self, policy: Policy) -> tuple[Judgement, BoolArray, BlockResults | None]:
         """The judgement, which groups had to be judged anew, and those by themselves."""
         facts, known = self.facts, self.judgement
         jac = _jac(facts, self.jac, policy)
@@ -127,7 +127,7 @@ class Judged:
             numbers = [array.copy() for array in numbers]
             for array, name in zip(numbers, _NUMBERS, strict=True):
                 array[new] = getattr(found, name)
-            part = Judged(some, self.jac, policy, found)
+            part = BlockResults(some, self.jac, policy, found)
         return Judgement(jac, view_failed, pair_failed, failed, *numbers), new, part
 
     def _measured(self, policy: Policy) -> tuple[FloatArray | None, FloatArray | None]:
@@ -155,7 +155,7 @@ def noise_of(policy: Policy) -> tuple[float, float, float]:
     return policy.click_sigma_px, policy.box_sigma_share, policy.given_sigma_px
 
 
-def _asks_more(policy: Policy) -> bool:
+def _is_stricter(policy: Policy) -> bool:
     """Whether it asks for what depends on the noise of clicks."""
     return policy.max_sigma_m is not None or policy.min_p_value is not None
 

@@ -24,7 +24,13 @@ from app.features.groups.revision_queries import (
     newest_change,
 )
 from app.features.solutions.queries import read_calibrations, solution_facts
-from app.features.what_if.cache import KeptBlock, KeptTable, keep_block, keep_list, kept_table
+from app.features.what_if.cache import (
+    CachedBlock,
+    CachedTable,
+    cache_block,
+    cache_block_list,
+    cached_table,
+)
 from app.features.what_if.table import EMPTY, YieldTable, join, table_of
 from app.solving.facts import NOTHING, Facts, group_facts
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
@@ -81,7 +87,7 @@ FLUSH = 1000
 
 
 @dataclass
-class Gathered:
+class DatasetBlocks:
     """The groups of a dataset.
 
     Attributes:
@@ -101,27 +107,29 @@ class Gathered:
     calibration: str
     mark: int
     through: int | None = 0
-    blocks: list[KeptBlock] = field(default_factory=list)
+    blocks: list[CachedBlock] = field(default_factory=list)
     bare: YieldTable = EMPTY
     noted: int = 0
     version: int = 0
     whole: int | None = None
 
     @staticmethod
-    def begin(session: Session, folder: Path, dataset_id: int, calibration: str) -> Gathered:
+    def begin(session: Session, folder: Path, dataset_id: int, calibration: str) -> DatasetBlocks:
         """No group yet, as the database stands."""
-        return Gathered(folder, dataset_id, calibration, newest_change(session))
+        return DatasetBlocks(folder, dataset_id, calibration, newest_change(session))
 
     @staticmethod
-    def load(session: Session, folder: Path, dataset_id: int, calibration: str) -> Gathered | None:
+    def load(
+        session: Session, folder: Path, dataset_id: int, calibration: str
+    ) -> DatasetBlocks | None:
         """What the cache holds; None where it holds nothing that this database could have said."""
-        kept = kept_table(folder, calibration)
+        kept = cached_table(folder, calibration)
         if kept is None or kept.mark > newest_change(session):
             return None
         number, digest = kept.entry
         if number and entry_hash(session, number) != digest:
             return None
-        found = Gathered(folder, dataset_id, calibration, kept.mark, kept.through)
+        found = DatasetBlocks(folder, dataset_id, calibration, kept.mark, kept.through)
         found.blocks, found.bare = list(kept.blocks), kept.bare
         return found
 
@@ -145,14 +153,14 @@ class Gathered:
 
     def step(self, session: Session) -> bool:
         """Come a block of groups closer to the database; False: it is in step with the session."""
-        return self._gather(session) if self.through is not None else self._follow(session)
+        return self._gather(session) if self.through is not None else self._update(session)
 
     def _gather(self, session: Session) -> bool:
         rows = groups_from(session, self.dataset_id, self.through or 0, BLOCK)
         solved, bare = read_tables(session, rows)
         if solved.groups:
             large = self.through or len(rows) >= WORTH_KEEPING
-            self.blocks.append(self._written(solved) if large else KeptBlock("", solved))
+            self.blocks.append(self._written(solved) if large else CachedBlock("", solved))
         self.bare = join([self.bare, bare]) if bare.groups else self.bare
         self.through = rows[-1].number if len(rows) == BLOCK else None
         self.version += 1
@@ -160,7 +168,7 @@ class Gathered:
             self._keep(session)
         return True
 
-    def _follow(self, session: Session) -> bool:
+    def _update(self, session: Session) -> bool:
         """Read again what has changed; what was only solved under other thresholds has not."""
         rows = changed_groups(session, self.dataset_id, self.mark, BLOCK)
         if not rows:
@@ -169,8 +177,8 @@ class Gathered:
             return False
         self.mark = rows[-1].change_id
         self.noted += len(rows)
-        same = self._known([row.group_id for row in rows])
-        new = [row for row in rows if same.get(row.group_id) != _said(row)]
+        same = self._rows_in_blocks([row.group_id for row in rows])
+        new = [row for row in rows if same.get(row.group_id) != _row_values(row)]
         if new:
             self._replace(read_tables(session, new))
             self.version += 1
@@ -178,7 +186,7 @@ class Gathered:
             self._flush(session)
         return True
 
-    def _known(self, group_ids: list[int]) -> dict[int, tuple[object, ...]]:
+    def _rows_in_blocks(self, group_ids: list[int]) -> dict[int, tuple[object, ...]]:
         """What the blocks hold of groups."""
         wanted, found = np.array(group_ids), dict[int, tuple[object, ...]]()
         for block in self.blocks:
@@ -203,7 +211,7 @@ class Gathered:
         self.blocks = [block for block in blocks if block.name and block.groups]
         if solved.groups or any(block.groups for block in tail):
             table = join([*(block.only_live for block in tail), solved])
-            self.blocks.append(KeptBlock("", table))
+            self.blocks.append(CachedBlock("", table))
         self.bare = join([self.bare.only(~np.isin(self.bare.group_id, new)), bare])
 
     def _flush(self, session: Session) -> None:
@@ -217,21 +225,21 @@ class Gathered:
             self.version += 1
         self._keep(session)
 
-    def _written(self, table: YieldTable) -> KeptBlock:
-        return keep_block(self.folder, table)
+    def _written(self, table: YieldTable) -> CachedBlock:
+        return cache_block(self.folder, table)
 
     def _keep(self, session: Session) -> None:
         number = newest_entry(session)
         entry = number, entry_hash(session, number) or ""
-        keep_list(
+        cache_block_list(
             self.folder,
-            KeptTable(
+            CachedTable(
                 self.calibration, self.mark, entry, self.through, tuple(self.blocks), self.bare
             ),
         )
         self.noted = 0
 
 
-def _said(row: object) -> tuple[object, ...]:
+def _row_values(row: object) -> tuple[object, ...]:
     names = ("inputs_hash", "split", "match", "pitch_length", "pitch_width")
     return tuple(getattr(row, name) for name in names)

@@ -16,7 +16,7 @@ import numpy as np
 import structlog
 
 from app.durable import replace_file
-from app.features.what_if.block_results import Judged, noise_of
+from app.features.what_if.block_results import BlockResults, noise_of
 from app.features.what_if.table import FIGURES, HEADS, YieldTable
 from app.finite import json_text
 from app.geometry.arrays import BoolArray, IntArray
@@ -127,7 +127,7 @@ log = structlog.get_logger("touchline.yields")
 
 
 @dataclass(frozen=True, eq=False)
-class KeptBlock:
+class CachedBlock:
     """A block in a file: its name, its groups, and those that still count; None: all do."""
 
     name: str
@@ -144,7 +144,7 @@ class KeptBlock:
         """The table of the groups that count."""
         return self.table if self.live is None else self.table.only(self.live)
 
-    def without(self, group_ids: IntArray) -> KeptBlock:
+    def without(self, group_ids: IntArray) -> CachedBlock:
         """The block in which some groups do not count any more."""
         gone = np.isin(self.table.group_id, group_ids)
         live = ~gone if self.live is None else self.live & ~gone
@@ -152,7 +152,7 @@ class KeptBlock:
 
 
 @dataclass(frozen=True, eq=False)
-class KeptTable:
+class CachedTable:
     """What a folder holds.
 
     Attributes:
@@ -167,11 +167,11 @@ class KeptTable:
     mark: int
     entry: tuple[int, str]
     through: int | None
-    blocks: tuple[KeptBlock, ...]
+    blocks: tuple[CachedBlock, ...]
     bare: YieldTable
 
 
-def keep_block(folder: Path, table: YieldTable) -> KeptBlock:
+def cache_block(folder: Path, table: YieldTable) -> CachedBlock:
     """Write a block, and map it; on a full disk it stays in memory under no name."""
     name = secrets.token_hex(8)
     arrays = {item: getattr(table.facts, item) for item in COLUMNS}
@@ -179,18 +179,18 @@ def keep_block(folder: Path, table: YieldTable) -> KeptBlock:
     about = {"format": FORMAT, "splits": table.splits, "matches": table.matches}
     try:
         write_arrays(_block(folder, name), about, arrays)
-        return KeptBlock(name, _table(folder, name))
+        return CachedBlock(name, _table(folder, name))
     except _NOT_READ as error:
-        _tell(error)
-        return KeptBlock("", table)
+        _log_failure(error)
+        return CachedBlock("", table)
 
 
-def keep_list(folder: Path, table: KeptTable) -> None:
+def cache_block_list(folder: Path, table: CachedTable) -> None:
     """Write which blocks count, and delete those that do not any more."""
     if not all(block.name for block in table.blocks):
         return
     blocks = [
-        {"name": block.name, "gone": [] if block.live is None else _gone(block.live)}
+        {"name": block.name, "gone": [] if block.live is None else _deleted_groups(block.live)}
         for block in table.blocks
     ]
     bare = table.bare
@@ -204,17 +204,17 @@ def keep_list(folder: Path, table: KeptTable) -> None:
             if path.name != LIST and path.name.partition(".")[0] not in names:
                 path.unlink(missing_ok=True)
     except OSError as error:
-        _tell(error)
+        _log_failure(error)
 
 
-def kept_table(folder: Path, calibration: str) -> KeptTable | None:
+def cached_table(folder: Path, calibration: str) -> CachedTable | None:
     """What a folder holds; None where there is none of this kind."""
     try:
         found = json.loads((folder / LIST).read_bytes())
         if found["format"] != FORMAT or found["calibration"] != calibration:
             return None
         blocks = tuple(
-            _with_gone(KeptBlock(item["name"], _table(folder, item["name"])), item["gone"])
+            _with_gone(CachedBlock(item["name"], _table(folder, item["name"])), item["gone"])
             for item in found["blocks"]
         )
         number, digest = found["entry"]
@@ -222,16 +222,16 @@ def kept_table(folder: Path, calibration: str) -> KeptTable | None:
             # What is used is not old, however long ago it was made.
             path.touch()
         through = found["through"]
-        bare = _bare(folder, found["mark"])
-        return KeptTable(calibration, found["mark"], (number, digest), through, blocks, bare)
+        bare = _empty_table(folder, found["mark"])
+        return CachedTable(calibration, found["mark"], (number, digest), through, blocks, bare)
     except FileNotFoundError:
         return None
     except _NOT_READ as error:
-        _tell(error)
+        _log_failure(error)
         return None
 
 
-def keep_judged(folder: Path, block: KeptBlock, judged: Judged) -> None:
+def cache_results(folder: Path, block: CachedBlock, judged: BlockResults) -> None:
     """Write what a policy makes of a block."""
     if not block.name:
         return
@@ -240,35 +240,35 @@ def keep_judged(folder: Path, block: KeptBlock, judged: Judged) -> None:
         if getattr(judged, name) is not None:
             arrays[name] = getattr(judged, name)
     try:
-        write_arrays(_judged(folder, block.name), {"policy": _key(judged.policy)}, arrays)
+        write_arrays(_results_path(folder, block.name), {"policy": _key(judged.policy)}, arrays)
     except OSError as error:
-        _tell(error)
+        _log_failure(error)
 
 
-def kept_judged(folder: Path, block: KeptBlock, policy: Policy) -> Judged | None:
+def cached_results(folder: Path, block: CachedBlock, policy: Policy) -> BlockResults | None:
     """What was kept of a block under this policy; None where nothing was."""
     if not block.name:
         return None
     try:
-        found = map_arrays(_judged(folder, block.name))
+        found = map_arrays(_results_path(folder, block.name))
         if found.about["policy"] != _key(policy):
             return None
         judgement = Judgement(**{name: found.arrays[name] for name in _JUDGEMENT})
         table = block.table
         if judgement.failed.shape[1:] != (table.groups,):
             raise ValueError("a judgement is not that of its block")
-        judged = Judged(table.facts, table.jac, policy, judgement)
+        judged = BlockResults(table.facts, table.jac, policy, judgement)
         for name in _LATER:
             setattr(judged, name, found.arrays.get(name))
         return judged
     except FileNotFoundError:
         return None
     except _NOT_READ as error:
-        _tell(error)
+        _log_failure(error)
         return None
 
 
-def forget_table(folder: Path) -> None:
+def delete_table(folder: Path) -> None:
     """Delete a kept table."""
     shutil.rmtree(folder, ignore_errors=True)
 
@@ -281,7 +281,7 @@ def _block(folder: Path, name: str) -> Path:
     return folder / f"{name}.facts"
 
 
-def _judged(folder: Path, name: str) -> Path:
+def _results_path(folder: Path, name: str) -> Path:
     return folder / f"{name}.judged"
 
 
@@ -301,7 +301,7 @@ def _table(folder: Path, name: str) -> YieldTable:
     return table
 
 
-def _bare(folder: Path, mark: int) -> YieldTable:
+def _empty_table(folder: Path, mark: int) -> YieldTable:
     found = map_arrays(folder / BARE)
     if found.about["mark"] != mark:
         raise ValueError("the list of a table is not of one piece")
@@ -331,18 +331,18 @@ def _require_sound(table: YieldTable) -> None:
         raise ValueError("a group lacks something")
 
 
-def _with_gone(block: KeptBlock, gone: Sequence[int]) -> KeptBlock:
+def _with_gone(block: CachedBlock, gone: Sequence[int]) -> CachedBlock:
     if not gone:
         return block
     live = np.ones(block.table.groups, bool)
     live[list(gone)] = False
-    return KeptBlock(block.name, block.table, live)
+    return CachedBlock(block.name, block.table, live)
 
 
-def _gone(live: BoolArray) -> list[int]:
+def _deleted_groups(live: BoolArray) -> list[int]:
     gone: list[int] = np.flatnonzero(~live).tolist()
     return gone
 
 
-def _tell(error: Exception) -> None:
+def _log_failure(error: Exception) -> None:
     log.warning("a yield table cannot be kept or read, and is made again", error=str(error))

@@ -28,7 +28,7 @@ def _zeros(*shape: int) -> IntArray:
 
 
 @dataclass(frozen=True)
-class Tally:
+class GroupCounts:
     """Counts of groups.
 
     Attributes:
@@ -53,20 +53,20 @@ class Tally:
     splits: Counter[str] = field(default_factory=Counter)
 
 
-def sum_of(tallies: Iterable[Tally]) -> Tally:
+def sum_of(tallies: Iterable[GroupCounts]) -> GroupCounts:
     """All groups of several blocks."""
-    total = Tally()
-    for tally in tallies:
-        total = Tally(
-            total.passing + tally.passing,
-            total.gained + tally.gained,
-            total.lost + tally.lost,
-            total.unmeasured + tally.unmeasured,
-            total.dropped + tally.dropped,
-            total.curves + tally.curves,
-            total.distances + tally.distances,
-            total.findings + tally.findings,
-            total.splits + tally.splits,
+    total = GroupCounts()
+    for counts in tallies:
+        total = GroupCounts(
+            total.passing + counts.passing,
+            total.gained + counts.gained,
+            total.lost + counts.lost,
+            total.unmeasured + counts.unmeasured,
+            total.dropped + counts.dropped,
+            total.curves + counts.curves,
+            total.distances + counts.distances,
+            total.findings + counts.findings,
+            total.splits + counts.splits,
         )
     return total
 
@@ -77,8 +77,8 @@ def tally_of(
     policy: Policy,
     present: Judgement,
     judgement: Judgement,
-    counted: Tally | None = None,
-) -> Tally:
+    counted: GroupCounts | None = None,
+) -> GroupCounts:
     """Count the groups of a block.
 
     Args:
@@ -91,10 +91,10 @@ def tally_of(
     """
     if counted is None:
         curves = np.stack([_curve(steps[live]) for steps in table.steps])
-        counted = Tally(unmeasured=int(table.unmeasured[live].sum()), curves=curves)
+        counted = GroupCounts(unmeasured=int(table.unmeasured[live].sum()), curves=curves)
     passes, before = judgement.passes[live], present.passes[live]
     split = np.bincount(table.split[live][passes], minlength=len(table.splits))
-    return Tally(
+    return GroupCounts(
         passing=int(passes.sum()),
         gained=int((passes & ~before).sum()),
         lost=int((before & ~passes).sum()),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from app.features.what_if.block_results import each, noise_of
-from app.features.what_if.counts import DISTANCES, FINDINGS, Leak, Tally, leaks, sum_of
+from app.features.what_if.counts import DISTANCES, FINDINGS, GroupCounts, Leak, leaks, sum_of
 from app.features.what_if.service import Block, Snapshot, YieldStore
 from app.features.what_if.table import JAC_STEPS
 from app.geometry.arrays import IntArray
@@ -99,8 +99,8 @@ def get_yield(
     unanswered = needs_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
 
-    def tally(block: Block) -> Tally:
-        return block.tally if same else block.tally_under(policy)
+    def tally(block: Block) -> GroupCounts:
+        return block.tally if same else block.count_under(policy)
 
     # Who tries another noise judges every group anew; else threads would wait for each other.
     side_by_side = noise_of(policy) != noise_of(snapshot.policy)
@@ -108,12 +108,12 @@ def get_yield(
     return _answer(snapshot, policy, total, unanswered)
 
 
-def needs_solving(present: Policy, asked: Policy) -> tuple[str, ...]:
+def needs_solving(present: Policy, tried: Policy) -> tuple[str, ...]:
     """Names of thresholds that differ and that the table cannot answer for."""
     return tuple(
         item.name
         for item in THRESHOLDS
-        if item.subject == CALIBRATION and item.value(present) != item.value(asked)
+        if item.subject == CALIBRATION and item.value(present) != item.value(tried)
     )
 
 
@@ -123,7 +123,9 @@ def _changed(policy: Policy, values: Mapping[str, Any]) -> Policy:
     return replace(policy, **{**values, "calibration": calibration})
 
 
-def _answer(snapshot: Snapshot, policy: Policy, total: Tally, unanswered: tuple[str, ...]) -> Yield:
+def _answer(
+    snapshot: Snapshot, policy: Policy, total: GroupCounts, unanswered: tuple[str, ...]
+) -> Yield:
     return Yield(
         policy=policy,
         groups=snapshot.solved + snapshot.unsolved,
@@ -166,7 +168,7 @@ def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[Funn
     return tuple(steps)
 
 
-def _splits(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
+def _splits(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
     everyone: Counter[str] = Counter()
     for (_, split), groups in snapshot.places.items():
         everyone[split] += groups
@@ -175,7 +177,7 @@ def _splits(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
     )
 
 
-def _distances(snapshot: Snapshot, total: Tally) -> tuple[FunnelPart, ...]:
+def _distances(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
     groups, passing = total.distances.tolist()
     groups[-1] += snapshot.unsolved

@@ -136,7 +136,7 @@ def _split_counts(splits: Iterable[tuple[str, int]]) -> list[SplitCount]:
     return [SplitCount(split=name, groups=groups) for name, groups in splits]
 
 
-class Leakage(Document):
+class SplitLeakage(Document):
     """A match that lies in several splits."""
 
     match: str
@@ -160,7 +160,7 @@ class YieldDocument(Document):
     splits: list[SplitYield]
     distances: list[DistanceYield]
     findings: list[FindingYield]
-    leakage: list[Leakage]
+    leakage: list[SplitLeakage]
     gained: int = Field(description="Groups that pass and do not under the present policy.")
     lost: int = Field(description="Groups that pass under the present policy and do not here.")
     needs_solving: list[str] = Field(

@@ -17,17 +17,17 @@ from app.db.store import Store
 from app.errors import NotFoundError, OverloadedError, ReviewError
 from app.features.datasets.queries import dataset_names, find_dataset, policy_of
 from app.features.groups.revision_queries import count_changes, count_groups
-from app.features.what_if.block_results import Judged, each
-from app.features.what_if.blocks import Gathered
+from app.features.what_if.block_results import BlockResults, each
+from app.features.what_if.blocks import DatasetBlocks
 from app.features.what_if.cache import (
     ARRAYS,
-    KeptBlock,
-    forget_table,
-    keep_judged,
-    kept_judged,
+    CachedBlock,
+    cache_results,
+    cached_results,
+    delete_table,
     map_arrays,
 )
-from app.features.what_if.counts import Tally, tally_of
+from app.features.what_if.counts import GroupCounts, tally_of
 from app.features.what_if.table import EMPTY, YieldTable, join
 from app.geometry.arrays import BoolArray
 from app.plural import plural
@@ -51,16 +51,16 @@ log = structlog.get_logger("touchline.yields")
 class Block:
     """A block of a table, and what the present policy makes of it."""
 
-    block: KeptBlock
-    judged: Judged
+    block: CachedBlock
+    judged: BlockResults
 
     @cached_property
-    def tally(self) -> Tally:
+    def tally(self) -> GroupCounts:
         """What is counted of its groups under the present policy."""
         judgement = self.judged.judgement
         return tally_of(self.table, self.live, self.judged.policy, judgement, judgement)
 
-    def tally_under(self, policy: Policy) -> Tally:
+    def count_under(self, policy: Policy) -> GroupCounts:
         """What is counted of them under another one."""
         judgement = self.judged.under(policy)
         return tally_of(self.table, self.live, policy, self.judged.judgement, judgement, self.tally)
@@ -126,11 +126,11 @@ class Snapshot:
 
 
 @dataclass
-class _Kept:
+class _StoreEntry:
     """A dataset's groups, and the snapshot that was made of them last."""
 
     lock: threading.Lock = field(default_factory=threading.Lock)
-    gathered: Gathered | None = None
+    gathered: DatasetBlocks | None = None
     version: int | None = None
     snapshot: Snapshot | None = None
     read: tuple[int, int] = (0, 0)
@@ -143,7 +143,7 @@ class YieldStore:
     def __init__(self, store: Store):
         self._store = store
         self._lock = threading.Lock()
-        self._kept: OrderedDict[int, _Kept] = OrderedDict()
+        self._kept: OrderedDict[int, _StoreEntry] = OrderedDict()
 
     def snapshot(self, dataset_id: int) -> Snapshot:
         """The table of a dataset as it is now; what has changed since the last look is read.
@@ -152,28 +152,28 @@ class YieldStore:
             NotFoundError: There is no such dataset.
             OverloadedError: So many groups have changed that a thread reads them first.
         """
-        kept = self._of(dataset_id)
+        kept = self._entry_of(dataset_id)
         if not kept.lock.acquire(timeout=PATIENCE_SECONDS):
-            raise _not_yet(kept)
+            raise _not_ready_error(kept)
         try:
             snapshot = self._tried(dataset_id, kept, AT_ONCE)
         finally:
             kept.lock.release()
         if snapshot is None:
-            error = _not_yet(kept)
-            work = threading.Thread(target=self._caught_up, args=(dataset_id,), daemon=True)
+            error = _not_ready_error(kept)
+            work = threading.Thread(target=self._update_table, args=(dataset_id,), daemon=True)
             work.start()
             raise error
         self._forget()
         return snapshot
 
-    def keep_up(self, dataset_id: int) -> None:
+    def update_table(self, dataset_id: int) -> None:
         """Bring a table in step, however much has changed, before somebody asks.
 
         Raises:
             NotFoundError: There is no such dataset.
         """
-        kept = self._of(dataset_id)
+        kept = self._entry_of(dataset_id)
         with kept.lock:
             self._tried(dataset_id, kept, None)
         self._forget()
@@ -184,60 +184,62 @@ class YieldStore:
             names = dataset_names(session)
             large = [number for number in names if count_groups(session, number) > AT_ONCE]
         for dataset_id in large:
-            self._caught_up(dataset_id)
+            self._update_table(dataset_id)
 
-    def _caught_up(self, dataset_id: int) -> None:
+    def _update_table(self, dataset_id: int) -> None:
         try:
-            self.keep_up(dataset_id)
+            self.update_table(dataset_id)
         except ReviewError as error:
             log.warning("a yield table stays behind", error=error.message)
         except Exception:
             log.exception("a yield table stays behind")
 
-    def _of(self, dataset_id: int) -> _Kept:
+    def _entry_of(self, dataset_id: int) -> _StoreEntry:
         with self._lock:
-            kept = self._kept.setdefault(dataset_id, _Kept())
+            kept = self._kept.setdefault(dataset_id, _StoreEntry())
             self._kept.move_to_end(dataset_id)
         return kept
 
     def _folder(self, dataset_id: int) -> Path:
         return self._store.settings.yields / str(dataset_id)
 
-    def _tried(self, dataset_id: int, kept: _Kept, most: int | None) -> Snapshot | None:
+    def _tried(self, dataset_id: int, kept: _StoreEntry, most: int | None) -> Snapshot | None:
         try:
             return self._refreshed(dataset_id, kept, most)
         except NotFoundError:
             with self._lock:
                 self._kept.pop(dataset_id, None)
-            forget_table(self._folder(dataset_id))
+            delete_table(self._folder(dataset_id))
             raise
 
-    def _refreshed(self, dataset_id: int, kept: _Kept, most: int | None) -> Snapshot | None:
+    def _refreshed(self, dataset_id: int, kept: _StoreEntry, most: int | None) -> Snapshot | None:
         """The snapshot as of now; None where more groups than ``most`` would have to be read."""
         while True:
             with self._store.read() as session:
                 policy = read_policy(session, dataset_id)
-                gathered = self._gathered(session, dataset_id, kept, policy)
-                left = gathered.left(session)
-                kept.read = gathered.groups, left
+                blocks = self._gathered(session, dataset_id, kept, policy)
+                left = blocks.left(session)
+                kept.read = blocks.groups, left
                 if most is not None and left > most:
                     return None
-                if gathered.step(session):
+                if blocks.step(session):
                     continue
-                if not gathered.is_whole(session):
+                if not blocks.is_whole(session):
                     # Groups went without a mark, as when the log is replayed.
-                    folder, calibration = gathered.folder, gathered.calibration
-                    kept.gathered = Gathered.begin(session, folder, dataset_id, calibration)
+                    folder, calibration = blocks.folder, blocks.calibration
+                    kept.gathered = DatasetBlocks.begin(session, folder, dataset_id, calibration)
                     kept.snapshot = None
                     continue
             break
         old = kept.snapshot
-        if old is None or kept.version != gathered.version or old.policy != policy:
-            kept.snapshot = self._judged(gathered, policy, old)
-            kept.version = gathered.version
+        if old is None or kept.version != blocks.version or old.policy != policy:
+            kept.snapshot = self._make_snapshot(blocks, policy, old)
+            kept.version = blocks.version
         return kept.snapshot
 
-    def _gathered(self, session: Session, dataset_id: int, kept: _Kept, policy: Policy) -> Gathered:
+    def _gathered(
+        self, session: Session, dataset_id: int, kept: _StoreEntry, policy: Policy
+    ) -> DatasetBlocks:
         """The groups as they were looked at last, here or by another process."""
         calibration, folder = (
             f"{policy.calibration_hash} {SOLVER_VERSION}",
@@ -247,38 +249,40 @@ class YieldStore:
         if known is not None and known.calibration != calibration:
             known = None
         if known is None or count_changes(session, dataset_id, known.mark) > FAR_BEHIND:
-            found = Gathered.load(session, folder, dataset_id, calibration)
+            found = DatasetBlocks.load(session, folder, dataset_id, calibration)
             if found is not None and (known is None or found.mark > known.mark):
                 known = found
         if known is None:
-            known = Gathered.begin(session, folder, dataset_id, calibration)
+            known = DatasetBlocks.begin(session, folder, dataset_id, calibration)
         if known is not kept.gathered:
             kept.gathered, kept.snapshot = known, None
         return known
 
-    def _judged(self, gathered: Gathered, policy: Policy, old: Snapshot | None) -> Snapshot:
+    def _make_snapshot(
+        self, blocks: DatasetBlocks, policy: Policy, old: Snapshot | None
+    ) -> Snapshot:
         """The snapshot of groups under a policy; what was judged before no longer is."""
         before = {id(part.table): part for part in old.blocks} if old is not None else {}
 
-        def judged_block(block: KeptBlock) -> Block:
+        def judged_block(block: CachedBlock) -> Block:
             known = before.get(id(block.table))
             if known is not None and known.judged.policy.hash == policy.hash:
                 return known if known.block is block else Block(block, known.judged)
             if known is None:
-                judged = kept_judged(gathered.folder, block, policy)
+                judged = cached_results(blocks.folder, block, policy)
                 if judged is not None:
                     return Block(block, judged)
             table = block.table
             if known is not None:
                 judged = known.judged.moved(policy)
             else:
-                judged = Judged.by(table.facts, table.jac, policy)
+                judged = BlockResults.by(table.facts, table.jac, policy)
             if block.name:
                 judged.complete()
-                keep_judged(gathered.folder, block, judged)
+                cache_results(blocks.folder, block, judged)
             return Block(block, judged)
 
-        return Snapshot(policy, tuple(each(judged_block, gathered.blocks)), gathered.bare)
+        return Snapshot(policy, tuple(each(judged_block, blocks.blocks)), blocks.bare)
 
     def _forget(self) -> None:
         with self._lock:
@@ -301,7 +305,7 @@ def read_policy(session: Session, dataset_id: int) -> Policy:
     return policy_of(row.policy)
 
 
-def _not_yet(kept: _Kept) -> OverloadedError:
+def _not_ready_error(kept: _StoreEntry) -> OverloadedError:
     done, left = kept.read
     return OverloadedError(
         f"the yield is being counted: {done:,} groups are read, about {left:,} are left",

@@ -42,7 +42,7 @@ log = structlog.get_logger("touchline.statistics")
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
+class _DatasetColumns:
     """Groups in order of their ids, as of a moment.
 
     Attributes:
@@ -69,7 +69,7 @@ class StatisticsStore:
         self._store = store
         self._lock = threading.Lock()
         self._locks: dict[int, threading.Lock] = {}
-        self._kept: dict[int, _Kept] = {}
+        self._kept: dict[int, _DatasetColumns] = {}
 
     def statistics(self, dataset_id: int) -> Statistics:
         """The statistics of all groups of a dataset as it is now.
@@ -102,12 +102,12 @@ class StatisticsStore:
     def _file(self, dataset_id: int) -> Path:
         return self._store.settings.yields / "statistics" / f"{dataset_id}.counted"
 
-    def _refreshed(self, dataset_id: int) -> _Kept:
+    def _refreshed(self, dataset_id: int) -> _DatasetColumns:
         with self._store.read() as session:
             policy = f"{read_policy(session, dataset_id).hash} {SOLVER_VERSION}"
             kept = self._kept.get(dataset_id) or _load(session, self._file(dataset_id))
             if kept is not None and kept.policy == policy:
-                kept = _followed(session, dataset_id, kept)
+                kept = _updated(session, dataset_id, kept)
             if (
                 kept is None
                 or kept.policy != policy
@@ -121,15 +121,15 @@ class StatisticsStore:
         return kept
 
 
-def _gathered(session: Session, dataset_id: int, policy: str) -> _Kept:
+def _gathered(session: Session, dataset_id: int, policy: str) -> _DatasetColumns:
     """Every group."""
     ids, parts = [], []
     for rows in _batches(session, dataset_id):
         ids.append(np.array([row[0] for row in rows], np.int64))
         parts.append(counted([row[1:] for row in rows]))
-    return _Kept(
+    return _DatasetColumns(
         policy,
-        **_moment(session),
+        **_current_marks(session),
         group_id=np.concatenate(ids or [np.zeros(0, np.int64)]),
         counted=_join(parts) if parts else counted([]),
     )
@@ -142,7 +142,7 @@ def _batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
         after = rows[-1].group_id
 
 
-def _moment(session: Session) -> dict[str, Any]:
+def _current_marks(session: Session) -> dict[str, Any]:
     number = newest_entry(session)
     return {
         "change": newest_change(session),
@@ -151,11 +151,11 @@ def _moment(session: Session) -> dict[str, Any]:
     }
 
 
-def _followed(session: Session, dataset_id: int, kept: _Kept) -> _Kept:
+def _updated(session: Session, dataset_id: int, kept: _DatasetColumns) -> _DatasetColumns:
     """What has changed, read again; groups that are gone show in the number of those left."""
     changed = set(changed_ids(session, dataset_id, kept.change))
     ids = sorted(changed | set(judged_since(session, dataset_id, kept.verdict)))
-    moment = _moment(session)
+    moment = _current_marks(session)
     if not ids:
         return replace(kept, **moment)
     rows = [
@@ -168,7 +168,7 @@ def _followed(session: Session, dataset_id: int, kept: _Kept) -> _Kept:
     group_id = np.concatenate([kept.group_id[stays], new])
     joined = _join([_only(kept.counted, stays), counted([row[1:] for row in rows])])
     order = np.argsort(group_id, kind="stable")
-    return _Kept(
+    return _DatasetColumns(
         kept.policy,
         **moment,
         group_id=group_id[order],
@@ -197,7 +197,7 @@ def _coded(before: Sequence[str], codes: Any, names: Sequence[str]) -> Any:
     return np.array([places[name] for name in before], np.int32)[codes] if len(codes) else codes
 
 
-def _keep(file: Path, kept: _Kept) -> None:
+def _keep(file: Path, kept: _DatasetColumns) -> None:
     about = {
         "format": FORMAT,
         "policy": kept.policy,
@@ -214,7 +214,7 @@ def _keep(file: Path, kept: _Kept) -> None:
         log.warning("statistics cannot be kept", error=str(error))
 
 
-def _load(session: Session, file: Path) -> _Kept | None:
+def _load(session: Session, file: Path) -> _DatasetColumns | None:
     """What the cache holds; None where it holds nothing that this database could have said."""
     try:
         found = map_arrays(file, whole=True)
@@ -226,7 +226,7 @@ def _load(session: Session, file: Path) -> _Kept | None:
             return None
         group_id = arrays.pop("group_id")
         held = Counted(tuple(about["splits"]), tuple(about["matches"]), **arrays)
-        return _Kept(
+        return _DatasetColumns(
             about["policy"], about["change"], about["verdict"], (number, digest), group_id, held
         )
     except FileNotFoundError:

@@ -4,19 +4,19 @@
 import { html } from 'htm/preact';
 import { useCallback, useEffect, useMemo, useState } from 'preact/hooks';
 
-import { getCase, getWaiting, postAdjudicatedBack, postDecision } from '../../api/agreement.js';
+import { getCase, getWaiting, postReturnForCorrection, postDecision } from '../../api/agreement.js';
 import { ApiError, sentenceOf } from '../../api/problem.js';
 import { words } from '../../lib/format.js';
 import { useKeys } from '../../lib/hooks.js';
 import { useResource } from '../../lib/resource.js';
 import { address, navigate, page } from '../../lib/router.js';
 import { comparison, show } from '../../state/compare.js';
-import { question } from '../../state/hand_back.js';
+import { question } from '../../state/return_group.js';
 import { isTeam, myName } from '../../state/me.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { announce, complain } from '../../state/notice.js';
 import { NoticeBar } from '../bars.js';
-import { HandBackDialog } from '../hand_back_dialog.js';
+import { ReturnDialog } from '../return_dialog.js';
 import { Header } from '../header.js';
 import { Loading, Trouble } from '../page_frame.js';
 import { CompareWorkspace } from './workspace.js';
@@ -92,7 +92,7 @@ function Adjudication({ found }) {
 			kind: 'back', person: mine ? 'yourself' : take.person,
 			says: `${mine ? 'You' : take.person} can change it and submit it again. Until then the group needs no decision; it is then compared again, and settled automatically if all agree.`,
 			send: async (reason) => {
-				await postAdjudicatedBack(group.id, take.id, reason);
+				await postReturnForCorrection(group.id, take.id, reason);
 				announce(`Returned to ${take.person}.`);
 				await goOn(group.dataset.name, group.id);
 			},
@@ -120,7 +120,7 @@ function Adjudication({ found }) {
 			names=${takes.map(({ person }) => person)} images=${new Map(group.views.map((view) => [view.key, view.image]))}
 			chosen=${chosen} choose=${refused ? null : choose}
 		><${DecisionCard} found=${found} chosen=${chosen} third=${third} busy=${busy} decide=${decide} flipThird=${flipThird} back=${back} /><//>
-		${question.value ? html`<${HandBackDialog} />` : null}
+		${question.value ? html`<${ReturnDialog} />` : null}
 	`;
 }
 

@@ -6,7 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { agreementFile, getAgreement, getWaiting, putLimits } from '../../api/agreement.js';
 import { ApiError, sentenceOf } from '../../api/problem.js';
-import { getTakes } from '../../api/takes.js';
+import { getIndependentAnnotations } from '../../api/independent_annotations.js';
 import { getBatches } from '../../api/work.js';
 import { withValue } from '../../lib/field.js';
 import { fixed, plural, words } from '../../lib/format.js';
@@ -17,7 +17,7 @@ import { whyNot } from '../../state/rights.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { When } from '../when.js';
 
-/** @import {TakeJson} from '../../api/takes.js' */
+/** @import {IndependentAnnotationJson} from '../../api/independent_annotations.js' */
 /** @import {AgreementJson, CoefficientJson, GroupAgreementJson, LimitsJson, PeopleAgreementJson, SpreadJson, WaitingJson} from '../../api/agreement.js' */
 
 /** So many rows of a table are drawn. */
@@ -166,7 +166,7 @@ function GroupsCard({ found }) {
 	`;
 }
 
-/** @param {TakeJson} one */
+/** @param {IndependentAnnotationJson} one */
 function stateOf({ handed_in: handed, settled, handed_back: back }) {
 	if (settled) return html`<span title="It is used in its group, or another one is">done</span> <small><${When} at=${settled} /></small>`;
 	if (handed) return html`<strong>submitted</strong> <small><${When} at=${handed} /></small>`;
@@ -175,11 +175,11 @@ function stateOf({ handed_in: handed, settled, handed_back: back }) {
 
 /** Everybody's own annotations, those that a lead can do something about first. @param {{dataset: string, batch: number | null}} props */
 function TakesCard({ dataset, batch }) {
-	const found = useResource((signal) => getTakes(dataset, signal), [dataset]);
+	const found = useResource((signal) => getIndependentAnnotations(dataset, signal), [dataset]);
 	const items = (found.value?.items ?? []).filter((one) => batch === null || (one.batch ?? 0) === batch);
 	if (found.error) return html`<${Trouble} title="The annotations cannot be shown" error=${found.error} retry=${found.reload} />`;
 	if (items.length === 0) return null;
-	/** @param {TakeJson} one */
+	/** @param {IndependentAnnotationJson} one */
 	const rank = (one) => (one.settled ? 2 : one.handed_in ? 0 : 1);
 	const sorted = items.toSorted((a, b) => rank(a) - rank(b) || b.id - a.id);
 	return html`

@@ -10,10 +10,10 @@ import { drawExpected } from '../../overlays/expected_ball.js';
 import { drawGhosts } from '../../overlays/ghosts.js';
 import { drawStrip } from '../../overlays/line_strip.js';
 import { drawMarkings } from '../../overlays/markings.js';
-import { drawMendMarks } from '../../overlays/mend_marks.js';
+import { drawSuggestionMarks } from '../../overlays/suggestion_marks.js';
 import { drawPins } from '../../overlays/pins.js';
 import { drawPixelGrid } from '../../overlays/pixel_grid.js';
-import { drawPoints, drawSelectedPoint, drawWhiskers } from '../../overlays/points.js';
+import { drawPoints, drawSelectedPoint, drawResidualLines } from '../../overlays/points.js';
 import { drawPredictions } from '../../overlays/predictions.js';
 import { proposalDrawing } from '../../overlays/proposal.js';
 import { drawUndrawn } from '../../overlays/undrawn.js';
@@ -71,7 +71,7 @@ const PICTURES = {
 		{ name: 'Annotated point', meaning: 'A click of a person. White with a dark ring.', tokens: 'canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings, drawPoints) },
 		{ name: 'Point of a wrong line', meaning: 'The ring is red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings, drawPoints) },
 		{ name: 'Point that is not used', meaning: 'The solver left its line out because it contradicts all others. Filled red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { used: false })] }), drawPoints) },
-		{ name: 'Error line', meaning: 'Leads from the line to the annotated point; W makes it 1, 5 or 20 times as long as it is.', tokens: 'canvas-warn canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf(gradeAt(12), 12)] }), drawMarkings, drawWhiskers, drawPoints) },
+		{ name: 'Error line', meaning: 'Leads from the line to the annotated point; W makes it 1, 5 or 20 times as long as it is.', tokens: 'canvas-warn canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf(gradeAt(12), 12)] }), drawMarkings, drawResidualLines, drawPoints) },
 		{ name: 'Proposed line', meaning: 'Read from the paint of a picture without a camera. It is not used until a person accepts it (Enter, Shift P). Violet, dashed, its name with a question mark.', tokens: 'canvas-predicted', draw: onGrass(sceneOf({}), proposalDrawing({ 'Side line': [{ x: 6, y: 34 }, { x: 40, y: 30 }, { x: 126, y: 20 }] })) },
 		{ name: 'Selected point', meaning: 'The yellow ring: arrows move this point.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('ok', 2, { marking: 'Side' })] }, { ...solid, viewport: { scale: 1, left: -50, top: 9 } }), drawPoints, drawSelectedPoint) },
 		{ name: 'Note', meaning: 'A remark that somebody left at this place.', tokens: 'canvas-warn canvas-point canvas-plate', draw: onGrass(sceneOf({ pins: [{ at: { x: 22, y: 40 }, text: 'check this' }] }), drawPins) },
@@ -89,7 +89,7 @@ const BALLS = {
 		{ name: 'Outline and cross', meaning: 'Where the 3D ball lies in this picture. Green; where a person marked the ball it must lie on it.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ ball: fit, outline: circle(66, 26, 12) }, { boxes: false }), drawBall) },
 		{ name: 'Expected ball', meaning: 'The ball is not drawn here; the other views see it at the green cross, and in 95 of 100 cases within the dashed ring.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ solved: expecting, outline: circle(66, 26, 9) }), drawExpected) },
 		{ name: 'Placed ball', meaning: 'It was put where the other views see it (Y). It is exported and confirms nothing until a person moves it. Green dots.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({}, {}, [ballAt({ inferred: true })]), drawBall) },
-		{ name: 'What the card speaks about', meaning: 'The point, line or view that Enter would fix. Yellow.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { marking: 'Side' })] }, { meant: /** @type {any} */ ({ marking: 'Side', index: 0, caption: 'point 1 of Side' }) }), drawMarkings, drawPoints, drawMendMarks) },
+		{ name: 'What the card speaks about', meaning: 'The point, line or view that Enter would fix. Yellow.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { marking: 'Side' })] }, { meant: /** @type {any} */ ({ marking: 'Side', index: 0, caption: 'point 1 of Side' }) }), drawMarkings, drawPoints, drawSuggestionMarks) },
 		{ name: 'Selected ball', meaning: 'Yellow with corners: drag it, or its corners; arrows move it.', tokens: 'canvas-selected', draw: onGrass(sceneOf({}, { selected: { kind: 'ball', view: KEY } }, [ballAt()]), drawBall) },
 		{ name: 'Several balls', meaning: 'More than one is marked: choose the one in play.', tokens: 'canvas-human', draw: onGrass(sceneOf({}, {}, [ballAt({ box: [10, 28, 14, 14] }), ballAt({ box: [70, 28, 14, 14] })]), drawBall) },
 		{ name: 'Ray of another view', meaning: 'The ball of that view lies somewhere on this line. Dotted, in the colour of the view, with its letter.', tokens: 'view-b', draw: onGrass(sceneOf({ epipolars: [{ letter: 'B', points: [{ x: 130, y: 2 }, { x: 4, y: 48 }] }] }), drawEpipolars) },

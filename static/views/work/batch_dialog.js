@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
-import { postGold } from '../../api/takes.js';
+import { postGold } from '../../api/independent_annotations.js';
 import { getVersions } from '../../api/versions.js';
 import { postBatch } from '../../api/work.js';
 import { useAttempt } from '../../lib/attempt.js';

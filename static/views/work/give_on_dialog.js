@@ -14,7 +14,7 @@ import { PeopleChoice } from './people_choice.js';
 /** @import {Chosen} from './people_choice.js' */
 
 /** @param {{one: TeamBatchJson, onClose: () => void, onDone: () => void}} props */
-export function GiveOnDialog({ one, onClose, onDone }) {
+export function ReassignDialog({ one, onClose, onDone }) {
 	const { batch, gold_every: goldEvery } = one;
 	const [people, setPeople] = useState(/** @type {Chosen} */ ({ annotator: batch.annotators, reviewer: batch.reviewers }));
 	const { error, attempt } = useAttempt();

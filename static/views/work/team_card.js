@@ -16,7 +16,7 @@ import { Trouble } from '../page_frame.js';
 import { Term } from '../term.js';
 import { When } from '../when.js';
 import { ConfirmButton } from '../evaluation/confirm_button.js';
-import { GiveOnDialog } from './give_on_dialog.js';
+import { ReassignDialog } from './give_on_dialog.js';
 import { Due, Progress } from './parts.js';
 
 /** @import {DatasetJson} from '../../api/types.js' */
@@ -79,7 +79,7 @@ export function TeamCard({ dataset, changed }) {
 			<p class="note">${items.length ? plural(items.length, 'batch').replace('batchs', 'batches') : 'None yet'}. Filter or tick groups in the <a class="link" href=${queueAddress(dataset.name, '')}>queue</a> and press “Assign…” to make one.</p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			<ul class="work__list">${items.map((one) => html`<${TeamBatch} key=${one.batch.id} one=${one} act=${act} give=${setGiving} />`)}</ul>
-			${giving ? html`<${GiveOnDialog} one=${giving} onClose=${() => setGiving(null)} onDone=${renew} />` : null}
+			${giving ? html`<${ReassignDialog} one=${giving} onClose=${() => setGiving(null)} onDone=${renew} />` : null}
 		</section>
 	`;
 }

@@ -9,17 +9,17 @@ import pytest
 
 from app.config import Settings
 from app.object_store.address import SCHEME
-from tests.moto_server import Door, fill_store, moto_server, stored_settings
+from tests.moto_server import ClassLimiter, fill_store, moto_server, stored_settings
 
 
 @pytest.fixture(scope="session")
-def _server() -> Iterator[Door]:
+def _server() -> Iterator[ClassLimiter]:
     with moto_server() as door:
         yield door
 
 
 @pytest.fixture
-def door(_server: Door) -> Iterator[Door]:
+def door(_server: ClassLimiter) -> Iterator[ClassLimiter]:
     """The S3 server, open."""
     _server.reset()
     yield _server
@@ -27,13 +27,15 @@ def door(_server: Door) -> Iterator[Door]:
 
 
 @pytest.fixture
-def settings(tmp_path: Path, door: Door) -> Settings:
+def settings(tmp_path: Path, door: ClassLimiter) -> Settings:
     """A home of its own with the store ``frames``."""
     return stored_settings(tmp_path / "home", door)
 
 
 @pytest.fixture(scope="session")
-def filled_store(_server: Door, tree: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+def filled_store(
+    _server: ClassLimiter, tree: Path, tmp_path_factory: pytest.TempPathFactory
+) -> str:
     """Address of a dataset of four groups, whose frames are in a zip for each match."""
     settings = stored_settings(tmp_path_factory.mktemp("filling"), _server)
     fill_store(settings, tree, "league")

@@ -36,13 +36,13 @@ from app.object_store.store import open_store
 from app.soccer.media import Media
 from app.worker_process import WorkerProcess
 from tests.e2e.service import serving
-from tests.moto_server import SIGNED, Door, store_settings, stored_settings
+from tests.moto_server import SIGNED, ClassLimiter, store_settings, stored_settings
 from tests.unit.features.jobs.steps import a_job
 
 
 @pytest.fixture(scope="session")
 def imported(
-    _server: Door, filled_store: str, tmp_path_factory: pytest.TempPathFactory
+    _server: ClassLimiter, filled_store: str, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Store]:
     """A database with the dataset of the store."""
     settings = stored_settings(tmp_path_factory.mktemp("imported"), _server)
@@ -57,7 +57,7 @@ def imported(
 
 class TestExports:
     def test_a_zip_appears_when_it_is_complete_with_the_frames_of_the_store(
-        self, imported: Store, door: Door, tmp_path: Path
+        self, imported: Store, door: ClassLimiter, tmp_path: Path
     ) -> None:
         settings = imported.settings
         out = target_path(settings, "s3://frames/out/league.zip")
@@ -76,7 +76,7 @@ class TestExports:
         assert not [*settings.exports.glob(".*")]
 
     def test_an_upload_that_breaks_off_leaves_the_earlier_export(
-        self, settings: Settings, imported: Store, door: Door
+        self, settings: Settings, imported: Store, door: ClassLimiter
     ) -> None:
         out = target_path(settings, "s3://frames/out/twice.zip")
         export(imported, "league", "parquet", out, everything=True)
@@ -94,7 +94,7 @@ class TestExports:
         assert out.store.head(out.key) != before
 
     def test_the_manifest_is_written_last_and_removed_first_when_a_folder_is_exported_again(
-        self, settings: Settings, imported: Store, door: Door
+        self, settings: Settings, imported: Store, door: ClassLimiter
     ) -> None:
         out = target_path(settings, "s3://frames/out/folder")
         export(imported, "league", "soccernet-v3", out, everything=True, images="copy")
@@ -127,7 +127,7 @@ class TestExports:
         assert open_store(settings, "frames").read_whole("own.zip", 99)[0] == b"somebody's own"
 
     def test_a_store_that_is_only_read_from_takes_no_export(
-        self, imported: Store, door: Door, tmp_path: Path
+        self, imported: Store, door: ClassLimiter, tmp_path: Path
     ) -> None:
         closed = stored_settings(tmp_path / "closed", door, exports=False)
         with pytest.raises(InputError, match="only read from"):
@@ -143,7 +143,7 @@ class TestExports:
 class TestExportApart:
     """A process of its own writes into the store."""
 
-    def test_it_appears_whole(self, imported: Store, door: Door, apart: Apart) -> None:
+    def test_it_appears_whole(self, imported: Store, door: ClassLimiter, apart: Apart) -> None:
         to = "s3://frames/apart/league.zip"
         result = apart.export(to, JobProgress(a_job(31), threading.Event()))
         out = find_path(imported.settings, to)
@@ -151,7 +151,7 @@ class TestExportApart:
         assert len(apart.processes) == 1 and os.getpid() not in apart.processes
 
     def test_cancelled_while_it_is_packed_nothing_of_it_is_there(
-        self, imported: Store, door: Door, apart: Apart
+        self, imported: Store, door: ClassLimiter, apart: Apart
     ) -> None:
         to = "s3://frames/apart/cancelled.zip"
         with pytest.raises(JobCancelled):
@@ -162,7 +162,7 @@ class TestExportApart:
             find_path(imported.settings, to)
 
     def test_killed_what_it_had_gathered_is_gone_with_it(
-        self, imported: Store, door: Door, apart: Apart
+        self, imported: Store, door: ClassLimiter, apart: Apart
     ) -> None:
         apart.killed = True
         with pytest.raises(OverloadedError, match="the process of the export was killed"):
@@ -229,7 +229,7 @@ def apart(imported: Store, monkeypatch: pytest.MonkeyPatch) -> Apart:
     return Apart(imported, monkeypatch)
 
 
-def _uploads(door: Door) -> int:
+def _uploads(door: ClassLimiter) -> int:
     """How many uploads in parts are begun and neither ended nor taken back."""
     answer = httpx.get(f"{door.endpoint}/soccer-data?uploads", headers={"Authorization": SIGNED})
     assert answer.status_code == 200, answer.text
@@ -238,7 +238,7 @@ def _uploads(door: Door) -> int:
 
 class TestServer:
     def test_a_dataset_of_a_store_is_imported_shown_and_exported_there(
-        self, door: Door, filled_store: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+        self, door: ClassLimiter, filled_store: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         stores = {"frames": _as_json(door), "signing": _as_json(door, delivery="signed")}
         monkeypatch.setenv("TOUCHLINE_STORES", json.dumps(stores))
@@ -270,7 +270,7 @@ class TestServer:
         document = ask.get(f"/groups/{groups[0]['id']}").json()
         return [view["image"] for view in document["views"]]
 
-    def _shows(self, ask: httpx.Client, door: Door, views: list[str]) -> None:
+    def _shows(self, ask: httpx.Client, door: ClassLimiter, views: list[str]) -> None:
         root = str(ask.base_url).partition("/api/")[0]
         door.mode = "hangs"
         with ThreadPoolExecutor(4) as people:
@@ -285,7 +285,7 @@ class TestServer:
             whole = httpx.get(f"{root}{view}", timeout=60)
             assert (whole.status_code, whole.headers["content-type"]) == (200, "image/png")
 
-    def _exports(self, ask: httpx.Client, door: Door) -> None:
+    def _exports(self, ask: httpx.Client, door: ClassLimiter) -> None:
         asked = {"dataset": "league", "format": "soccernet-v3", "all": True}
         for wrong, status in (
             ("s3://frames/a/folder", 400),
@@ -326,6 +326,6 @@ def finished(ask: httpx.Client, answer: httpx.Response) -> dict[str, Any]:
     return job
 
 
-def _as_json(door: Door, **more: object) -> dict[str, object]:
+def _as_json(door: ClassLimiter, **more: object) -> dict[str, object]:
     found = store_settings(door, **more).model_dump(mode="json", exclude_none=True)
     return {**found, "key": "tests", "secret": "of-tests"}

@@ -28,7 +28,7 @@ from app.object_store.path import find_path
 from app.object_store.store import open_store
 from app.soccer.group import Group
 from app.soccer.media import Media
-from tests.moto_server import Door, fill_store, store_settings, stored_settings
+from tests.moto_server import ClassLimiter, fill_store, store_settings, stored_settings
 
 
 def groups_of(settings: Settings, address: str) -> list[Group]:
@@ -50,7 +50,7 @@ class TestAddresses:
         ["s3://frames/../other", "s3://frames/a//b", "s3://frames/a\\b", "s3://frames/%2e%2e/b", "s3://frames/a\x00"],
     )  # fmt: skip
     def test_what_leads_out_of_the_store_is_refused(
-        self, settings: Settings, door: Door, address: str
+        self, settings: Settings, door: ClassLimiter, address: str
     ) -> None:
         with pytest.raises(InputError):
             resolve_folder(settings, address)
@@ -63,13 +63,13 @@ class TestAddresses:
         with pytest.raises(InputError):
             split_address(f"s3://frames/{inside}")
 
-    def test_only_configured_stores_are_asked(self, settings: Settings, door: Door) -> None:
+    def test_only_configured_stores_are_asked(self, settings: Settings, door: ClassLimiter) -> None:
         with pytest.raises(NotFoundError, match='no store "other-data"'):
             resolve_folder(settings, "s3://other-data/x")
         assert door.asked == []
 
     def test_objects_beside_the_prefix_are_not_there(
-        self, settings: Settings, door: Door, tmp_path: Path
+        self, settings: Settings, door: ClassLimiter, tmp_path: Path
     ) -> None:
         beside = Settings(
             home=tmp_path / "b",
@@ -81,7 +81,7 @@ class TestAddresses:
             find_path(settings, "s3://frames/secret.json")
 
     def test_folders_are_listed_with_the_format_that_they_hold(
-        self, settings: Settings, filled_store: str, door: Door
+        self, settings: Settings, filled_store: str, door: ClassLimiter
     ) -> None:
         assert [item.path for item in list_folder(settings).items] == ["s3://frames"]
         assert f"{filled_store}" in [i.path for i in list_folder(settings, "s3://frames").items]
@@ -108,7 +108,7 @@ class TestReading:
                 )
 
     def test_a_member_is_fetched_without_its_archive(
-        self, settings: Settings, door: Door, tmp_path: Path
+        self, settings: Settings, door: ClassLimiter, tmp_path: Path
     ) -> None:
         frame = _noise(2**20)
         with zipfile.ZipFile(tmp_path / "big.zip", "w") as archive:
@@ -131,7 +131,7 @@ class TestReading:
             read_frame(sealed, None, False, settings)
 
     def test_a_frame_is_fetched_once_and_kept_for_its_owner_alone(
-        self, settings: Settings, filled_store: str, door: Door
+        self, settings: Settings, filled_store: str, door: ClassLimiter
     ) -> None:
         media = first_media(settings, filled_store)
         first = read_frame(media, None, False, settings)
@@ -213,7 +213,7 @@ class TestBadDays:
         ],
     )
     def test_a_frame_that_cannot_be_had_says_so_and_is_had_later(
-        self, settings: Settings, door: Door, picture_object: Media, mode: str, said: str
+        self, settings: Settings, door: ClassLimiter, picture_object: Media, mode: str, said: str
     ) -> None:
         door.mode = mode
         with pytest.raises(StorageError) as caught:
@@ -252,7 +252,7 @@ class TestBadDays:
             read_frame(picture_object, None, False, settings)
 
     def test_a_frame_that_is_damaged_on_this_disk_is_fetched_again(
-        self, settings: Settings, picture_object: Media, door: Door
+        self, settings: Settings, picture_object: Media, door: ClassLimiter
     ) -> None:
         first = read_frame(picture_object, None, False, settings)
         (kept,) = [path for path in (settings.cache / "objects").rglob("*") if path.is_file()]
@@ -262,7 +262,7 @@ class TestBadDays:
         assert len(door.asked) == 1
 
     def test_keys_in_a_file_are_its_owners_and_read_again_when_they_change(
-        self, tmp_path: Path, door: Door
+        self, tmp_path: Path, door: ClassLimiter
     ) -> None:
         file = tmp_path / "keys"
         file.write_text("[default]\naws_access_key_id = one\naws_secret_access_key = s\n")
@@ -292,7 +292,7 @@ def picture_object(settings: Settings, tree: Path) -> Media:
 
 class TestDoctor:
     def test_says_what_a_store_can_do_and_what_it_cannot(
-        self, settings: Settings, filled_store: str, door: Door
+        self, settings: Settings, filled_store: str, door: ClassLimiter
     ) -> None:
         (check,) = examine_stores(settings)
         assert (check.ok, check.sentence) == (True, "lists, reads, writes")
@@ -305,7 +305,7 @@ class TestDoctor:
         assert "ExpiredToken" in check.sentence
 
     def test_a_store_that_gives_out_whatever_is_there_is_told(
-        self, settings: Settings, filled_store: str, door: Door
+        self, settings: Settings, filled_store: str, door: ClassLimiter
     ) -> None:
         door.mode = "unconditional"
         (check,) = examine_stores(settings)

@@ -20,7 +20,7 @@ from app.db.store import Store
 from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
 from app.features.datasets.queries import insert_dataset_row
 from app.features.datasets.service import list_datasets
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.policy import PAPER
 from app.worker_process import COUNTS, WorkerEnded, WorkerProcess
 from tests.waiting import SECONDS
@@ -40,7 +40,7 @@ def run(
     own_store: Store,
     work: Any,
     *arguments: Any,
-    progress: TellProgress = deaf,
+    progress: ReportProgress = deaf,
     stop: Any = wanted,
     answer: Any = lambda question: None,
 ) -> Any:

@@ -328,7 +328,7 @@ class TestPeek:
             writing.execute(text(INSERT.format("not yet")))
             for _ in range(20):
                 held.enter_context(own_store.read())
-            with own_store.peek() as session:
+            with own_store.read_without_waiting() as session:
                 found = session.scalars(text("SELECT name FROM dataset")).all()
                 promise = session.execute(text("PRAGMA busy_timeout")).scalar()
         assert (found, promise) == (["kept"], 0)
@@ -337,20 +337,24 @@ class TestPeek:
     def test_sees_what_was_written_since(self, own_store: Store) -> None:
         for name in ("one", "two"):
             add(own_store, name)
-            with own_store.peek() as session:
+            with own_store.read_without_waiting() as session:
                 found = session.scalars(text("SELECT name FROM dataset ORDER BY id")).all()
             assert found[-1] == name
 
     @pytest.mark.file_of_sqlite("a server of databases is always waited for")
     def test_who_would_wait_for_another_thread_is_told(self, own_store: Store) -> None:
-        with own_store.peek(), pytest.raises(BusyError), own_store.peek():
+        with (
+            own_store.read_without_waiting(),
+            pytest.raises(BusyError),
+            own_store.read_without_waiting(),
+        ):
             pytest.fail("it was answered")
 
     def test_where_every_statement_is_waited_for_it_is_refused(
         self, own_store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(own_store, "_peeker", None)
-        with pytest.raises(BusyError), own_store.peek():
+        with pytest.raises(BusyError), own_store.read_without_waiting():
             pytest.fail("it was answered")
 
 

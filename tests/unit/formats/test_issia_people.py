@@ -113,8 +113,8 @@ def issia_folder(root: Path) -> Path:
 def people(folder: IssiaFolder) -> list[float]:
     (group,) = folder.groups()
     (view,) = [view for view in group.views if view.key == "cam2"]
-    (spare,) = [item for item in folder.persons() if item.camera == "cam2"]
-    return [box["points"]["x1"] for box in (*view.extras.boxes, *spare.boxes)]
+    (unassigned,) = [item for item in folder.persons() if item.camera == "cam2"]
+    return [box["points"]["x1"] for box in (*view.extras.boxes, *unassigned.boxes)]
 
 
 class TestReading:

@@ -39,14 +39,14 @@ class TestWriteIssia:
         )
         views = (replace(group.views[0], station=station), group.views[1])
         groups = [issia_group(-2, cameras=(6,)), replace(group, views=views)]
-        spare = [FramePersons(7, "cam2", (person("3", -4.0),))]
-        counts = write_issia(tmp_path, reversed(groups), spare)
+        unassigned = [FramePersons(7, "cam2", (person("3", -4.0),))]
+        counts = write_issia(tmp_path, reversed(groups), unassigned)
         assert counts == {"groups": 2, "annotated_balls": 3, "persons": 5, "cameras": 4}
         folder = open_issia(tmp_path, IssiaOptions(), report)
         again = {found.key: found for found in folder.groups()}
         for written in groups:
             assert again[written.key].views == written.views
-        assert list(folder.persons()) == spare
+        assert list(folder.persons()) == unassigned
         assert report.problems == []
 
     def test_whole_pixels_are_whole_numbers_and_frames_are_shifted(

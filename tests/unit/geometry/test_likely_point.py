@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.geometry.likely_point import CameraTable, LikelyPoints, _look, likely_points
+from app.geometry.likely_point import CameraTable, LikelyPoints, _project, likely_points
 from tests.cameras import EVERY_COEFFICIENT, WIDE_LENSES, looking, wide
 
 MIDDLE = (10.0, 0.0, 0.0)
@@ -31,7 +31,7 @@ def found_from(cameras, views, start=(10.0, 0.0, -1.0), off=0.0) -> LikelyPoints
 def look(cameras: CameraTable, number, point):
     """Pixel of a point in one of the cameras, NaN where it does not show it, and its derivative."""
     pixel, slope = np.empty(2), np.empty((2, 3))
-    if not _look(*cameras.columns, number, point, pixel, slope):
+    if not _project(*cameras.columns, number, point, pixel, slope):
         pixel[:] = np.nan
     return pixel, slope
 

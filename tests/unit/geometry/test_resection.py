@@ -7,9 +7,9 @@ from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, levenberg_marqua
 from app.geometry.resection import (
     KAPPA,
     PARAMETERS,
+    CurvePoints,
     Curves,
     Prior,
-    Sightings,
     camera_from_parameters,
     distances,
     fit_curves,
@@ -35,7 +35,7 @@ CURVES = Curves(
 )
 
 
-def sightings(noise: float, parameters=TRUTH) -> Sightings:
+def curve_points(noise: float, parameters=TRUTH) -> CurvePoints:
     camera = camera_from_parameters(parameters, CENTER, HALF_DIAGONAL)
     shares = np.linspace(0.1, 0.9, 6)[:, None]
     pixels, curve = [], []
@@ -50,7 +50,7 @@ def sightings(noise: float, parameters=TRUTH) -> Sightings:
         curve.extend([index] * len(points))
     exact = np.vstack(pixels)
     generator = np.random.default_rng(1)
-    return Sightings(
+    return CurvePoints(
         exact + generator.normal(0, noise, exact.shape), np.array(curve), np.ones(len(exact))
     )
 
@@ -71,7 +71,7 @@ def rows(parameters, seen):
 
 
 def test_compiled_rounds_are_those_of_least_squares_bit_for_bit(monkeypatch) -> None:
-    seen, prior = sightings(1.5), Prior(np.zeros(8), np.array([9.0, 9, 9, 99, 99, 99, 99, 0.1]))
+    seen, prior = curve_points(1.5), Prior(np.zeros(8), np.array([9.0, 9, 9, 99, 99, 99, 99, 0.1]))
     starts = TRUTH + np.random.default_rng(2).normal(0, 1, (9, 8)) * [
         0.3, 0.1, 0.02, 9, 9, 4, 0.2, 0.02,
     ]  # fmt: skip
@@ -108,35 +108,35 @@ class TestCameraFromParameters:
 
 class TestDistances:
     def test_points_on_their_curve_have_distance_zero(self):
-        assert distances(TRUTH, CURVES, sightings(0.0), HALF_DIAGONAL).max() < 1e-6
+        assert distances(TRUTH, CURVES, curve_points(0.0), HALF_DIAGONAL).max() < 1e-6
 
     def test_a_point_aside_has_its_offset(self):
-        seen = sightings(0.0)
+        seen = curve_points(0.0)
         camera = camera_from_parameters(TRUTH, CENTER, HALF_DIAGONAL)
         ends = camera.project(CURVES.shapes[0].reshape(2, 3))
         along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
         moved = seen.pixels.copy()
         moved[2] += 5.0 * np.array([-along[1], along[0]])
-        apart = distances(TRUTH, CURVES, Sightings(moved, seen.curve, seen.weight), HALF_DIAGONAL)
+        apart = distances(TRUTH, CURVES, CurvePoints(moved, seen.curve, seen.weight), HALF_DIAGONAL)
         assert apart[2] == pytest.approx(5.0, abs=0.01)
 
     def test_beyond_the_end_of_a_segment_it_is_the_distance_to_the_end(self):
         camera = camera_from_parameters(TRUTH, CENTER, HALF_DIAGONAL)
         start, end = camera.project(CURVES.shapes[1].reshape(2, 3)) - CENTER
         beyond = end + 7.0 * (end - start) / np.linalg.norm(end - start)
-        seen = Sightings(beyond[None], np.array([1]), np.ones(1))
+        seen = CurvePoints(beyond[None], np.array([1]), np.ones(1))
         assert distances(TRUTH, CURVES, seen, HALF_DIAGONAL)[0] == pytest.approx(7.0, abs=0.01)
 
     def test_a_curve_behind_the_camera_is_far_from_everything(self):
         turned = TRUTH + np.pi * np.eye(8)[0]
-        assert (distances(turned, CURVES, sightings(0.0), HALF_DIAGONAL) > 1000).all()
+        assert (distances(turned, CURVES, curve_points(0.0), HALF_DIAGONAL) > 1000).all()
 
 
 class TestResidualRows:
     @pytest.mark.parametrize("parameter", range(PARAMETERS))
     def test_the_jacobian_equals_its_finite_difference(self, parameter):
         # Without noise the place on the curve is eliminated exactly: the twin must agree.
-        seen, step = sightings(0.0), 1e-6
+        seen, step = curve_points(0.0), 1e-6
         ahead, behind = TRUTH.copy(), TRUTH.copy()
         ahead[parameter] += step
         behind[parameter] -= step
@@ -148,7 +148,7 @@ class TestResidualRows:
 
 class TestNormalEquations:
     def test_the_gradient_is_the_slope_of_the_cost(self):
-        seen = sightings(2.0)
+        seen = curve_points(2.0)
         prior = Prior(TRUTH + 0.1, np.full(PARAMETERS, 0.5))
         cost_at = lambda row: normal_equations(  # noqa: E731
             row[None], CURVES, seen, prior, 2.0, HALF_DIAGONAL
@@ -161,7 +161,7 @@ class TestNormalEquations:
             assert slope == pytest.approx(gradient[parameter], rel=1e-3)
 
     def test_rows_are_independent(self):
-        seen, prior = sightings(1.0), Prior(np.zeros(8), np.full(8, np.inf))
+        seen, prior = curve_points(1.0), Prior(np.zeros(8), np.full(8, np.inf))
         both = np.stack([TRUTH, TRUTH + 0.001])
         together = normal_equations(both, CURVES, seen, prior, 2.0, HALF_DIAGONAL)
         alone = normal_equations(both[1:], CURVES, seen, prior, 2.0, HALF_DIAGONAL)

@@ -345,4 +345,4 @@ def bell(api: Any) -> Request:
     send(api, ("POST", "/groups/1/threads", {"text": "@ann look"}, {}))
     login = Login(1, person.id, "ann", DatasetRoles(Role.LEAD), datetime.now(UTC))
     api.app.dependency_overrides |= {get_login: lambda: login, get_team: lambda: None}
-    return "POST", "/bell/read", {"ids": None}, {}
+    return "POST", "/notifications/read", {"ids": None}, {}

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from app.db.store import Store
-from app.features.batches.leases import Leases, Worker
+from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, make_batch
-from app.features.independent_annotations.service import begin_take, hand_in
+from app.features.independent_annotations.service import begin_annotation, submit_annotation
 from app.features.people.queries import person_by_name, update_person
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -178,7 +178,7 @@ def comment_deleted(api: Any) -> Request:
 def own_annotations(api: Any) -> list[int]:
     """Copies of a group that two people annotated, who do not agree."""
     store = api.app.state.services.store
-    copies = [begin_take(store, 1, person=person).group for person in ("ann", "ben")]
+    copies = [begin_annotation(store, 1, person=person).group for person in ("ann", "ben")]
     for copy, state in zip(copies, ("accepted", "rejected"), strict=True):
         body = {"state": state, "note": "seen", "reason": None if copy == copies[0] else "other"}
         headers = etag_of(api, f"/groups/{copy}")
@@ -197,7 +197,7 @@ def adjudication_back(api: Any) -> Request:
     own_annotations(api)
     case = api.get(f"{API}/groups/1/adjudication").json()
     body = {"take": case["takes"][1]["id"], "reason": "The ball in B is the spot."}
-    return "POST", "/groups/1/adjudication/hand-back", body, {}
+    return "POST", "/groups/1/adjudication/return", body, {}
 
 
 def adoption(api: Any) -> Request:
@@ -205,17 +205,17 @@ def adoption(api: Any) -> Request:
 
 
 def take(_api: Any) -> Request:
-    return "POST", "/groups/1/takes", None, {}
+    return "POST", "/groups/1/independent-annotations", None, {}
 
 
 def take_handed_in(api: Any) -> Request:
-    return "POST", f"/groups/{send(api, take(api)).json()['group']}/hand-in", None, {}
+    return "POST", f"/groups/{send(api, take(api)).json()['group']}/submission", None, {}
 
 
 def take_handed_back(api: Any) -> Request:
-    own = begin_take(store_of(api), 1, person="ann")
-    hand_in(store_of(api), own.id, actor="ann")
-    return "POST", f"/groups/{own.group}/hand-back", {"reason": "Look again."}, {}
+    own = begin_annotation(store_of(api), 1, person="ann")
+    submit_annotation(store_of(api), own.id, actor="ann")
+    return "POST", f"/groups/{own.group}/return", {"reason": "Look again."}, {}
 
 
 def gold(api: Any) -> Request:
@@ -242,7 +242,7 @@ def own_of_batch(api: Any) -> str:
 
 
 def handed_in(api: Any) -> Request:
-    return "PUT", f"{own_of_batch(api)}/hand-in", None, {}
+    return "PUT", f"{own_of_batch(api)}/submission", None, {}
 
 
 def hand_in_taken_back(api: Any) -> Request:
@@ -252,13 +252,13 @@ def hand_in_taken_back(api: Any) -> Request:
     with store.write() as session:
         # Whoever asks a server without accounts is an annotator of this batch.
         update_person(session, person_by_name(session, "ann").id, name="local")
-    Leases(store).hand_in(made.id, 1, Worker("local"), actor="local")
-    return "DELETE", f"/batches/{made.id}/groups/1/hand-in", None, {}
+    Leases(store).submit(made.id, 1, BatchMember("local"), actor="local")
+    return "DELETE", f"/batches/{made.id}/groups/1/submission", None, {}
 
 
 def handed_back(api: Any) -> Request:
     store = store_of(api)
     invite(store, "ann", Role.ANNOTATOR, actor="local")
     made = make_batch(store, "broadcast", NewBatch("Once", annotators=["ann"]), actor="local")
-    Leases(store).hand_in(made.id, 1, Worker("ann"), actor="ann")
-    return "POST", f"/batches/{made.id}/groups/1/hand-back", {"reason": "Look again."}, {}
+    Leases(store).submit(made.id, 1, BatchMember("ann"), actor="ann")
+    return "POST", f"/batches/{made.id}/groups/1/return", {"reason": "Look again."}, {}

@@ -26,7 +26,7 @@ from app.errors import (
     UnknownMarkingError,
     UnsafePathError,
 )
-from app.features.batches.service import Here
+from app.features.batches.service import Presence
 from app.features.groups.schemas import LinesEdit
 from app.features.people.schemas import NewSession
 from app.http.errors import PreconditionRequiredError, StaleStateError, install_handlers, status_of
@@ -62,7 +62,7 @@ CASES: list[tuple[ReviewError, int]] = [
     (NotFoundError("x"), 404),
     (ConflictError("x"), 409),
     (SharedStationError("cam3", 7, "cam3"), 409),
-    (HeldGroupError("bo has this group open", [Here(7, "bo", SINCE, SINCE)]), 409),
+    (HeldGroupError("bo has this group open", [Presence(7, "bo", SINCE, SINCE)]), 409),
     (STALE, 412),
     (StaleStateError(STALE, "{}"), 412),
     (PreconditionRequiredError("x"), 428),

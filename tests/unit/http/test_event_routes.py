@@ -129,7 +129,7 @@ class TestListen:
         end = time.monotonic() + SECONDS
         while events._feeds and time.monotonic() < end:
             time.sleep(0.01)
-        with patch.object(events, "_look") as look:
+        with patch.object(events, "_publish_changes") as look:
             change_policy(store, "broadcast", STRICT, if_match=None, actor="bob")
             time.sleep(0.3)
         assert not look.called
@@ -297,7 +297,7 @@ class TestFeed:
             stream.next()
             seen = stream.last_id
             feed = next(iter(app.state.services.events._feeds))
-            feed.loop.call_soon_threadsafe(feed.take, [module.hello(1)] * 3)
+            feed.loop.call_soon_threadsafe(feed.take, [module.first_event(1)] * 3)
             with pytest.raises(EOFError):
                 stream.next()
         end = time.monotonic() + SECONDS

@@ -6,35 +6,35 @@ import asyncio
 
 import pytest
 
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import Change
-from app.http.events import Feed, _change_event, hello
+from app.http.events import Listener, _change_event, first_event
 
 
 @pytest.mark.parametrize(
     ("sight", "entry", "told"),
     [
-        (Sight(True, frozenset({9}), "ann", frozenset()), 9, False),
-        (Sight(True, frozenset({9}), "ann", frozenset()), 11, True),
-        (Sight(False, frozenset({9}), "ann"), 11, False),
+        (Visibility(True, frozenset({9}), "ann", frozenset()), 9, False),
+        (Visibility(True, frozenset({9}), "ann", frozenset()), 11, True),
+        (Visibility(False, frozenset({9}), "ann"), 11, False),
         (EVERYTHING, 9, True),
     ],
 )
 def test_who_comes_once_a_dataset_is_gone_is_told_of_it_only_if_they_see_everything(
-    sight: Sight, entry: int, told: bool
+    sight: Visibility, entry: int, told: bool
 ) -> None:
     async def ask() -> bool:
-        feed = Feed(None, 5, sight, began=10)
+        feed = Listener(None, 5, sight, began=10)
         return feed.is_told(Change(entry, 3, None, "delete", "eve"))
 
     assert asyncio.run(ask()) is told
 
 
 def test_who_annotates_blind_is_told_no_id_of_the_log() -> None:
-    told = [_change_event(Change(41, 3, "demo", "verdict", "eve", 7, "x")), hello(41)]
+    told = [_change_event(Change(41, 3, "demo", "verdict", "eve", 7, "x")), first_event(41)]
 
     async def read(numbered: bool) -> bytes:
-        feed = Feed(None, 5, EVERYTHING, began=10, numbered=numbered)
+        feed = Listener(None, 5, EVERYTHING, began=10, numbered=numbered)
         feed.take(told)
         feed.take([], ended=True)
         return b"".join([event async for event in feed.read()])

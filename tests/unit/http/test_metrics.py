@@ -26,7 +26,7 @@ from app.features.groups.large_edit_routes import LargeEdits
 from app.features.groups.preview_routes import Previews
 from app.features.imports.ingest import ingest
 from app.http import metrics
-from app.http.request_limits import EDITS, LANES
+from app.http.request_limits import EDITS, REQUEST_CLASSES
 from app.http.services import Services
 from app.worker_pool import WorkerPool
 from app.worker_process import KINDS, WorkerEnded
@@ -86,7 +86,7 @@ def test_says_how_long_the_files_are(app: FastAPI, read) -> None:
         assert read("touchline_file_bytes", file=name) == path.stat().st_size > 0
 
 
-@pytest.mark.parametrize("lane", [lane.name for lane in LANES])
+@pytest.mark.parametrize("lane", [lane.name for lane in REQUEST_CLASSES])
 def test_every_lane_begins_with_nobody(read, lane: str) -> None:
     for name in ("lane_busy", "lane_waiting", "lane_refused_total"):
         assert read(f"touchline_{name}", lane=lane) == 0
@@ -324,4 +324,4 @@ class TestOperations:
             for row in re.findall(r"^\| (`[a-z].*?) \|", text, re.M)
             for name in re.findall(r"`([a-z-]+)`", row)
         }
-        assert {*KINDS, *(lane.name for lane in LANES)} - rows == set()
+        assert {*KINDS, *(lane.name for lane in REQUEST_CLASSES)} - rows == set()

@@ -16,7 +16,7 @@ BAD = ([], {}, "x'y", "", -1.5, 1e99, None, True, [[1]], {"a": None})
 PLACES = {"dataset": "broadcast", "name": "x", "marking": "Circle left"}
 DOCUMENTS = (
     "/datasets", "/datasets/broadcast", "/datasets/broadcast/summary?q=", "/groups?dataset=broadcast",
-    "/groups/1", "/groups/1/history", "/groups/1/remedies", "/groups/4", "/groups/4/history",
+    "/groups/1", "/groups/1/history", "/groups/1/suggestions", "/groups/4", "/groups/4/history",
     "/views/1/influence", "/datasets/broadcast/policy", "/policies", "/datasets/broadcast/yield",
     "/datasets/broadcast/statistics", "/datasets/broadcast/versions", "/datasets/broadcast/pitches",
     "/datasets/broadcast/positions", "/datasets/broadcast/noise", "/datasets/broadcast/verdict-batches",

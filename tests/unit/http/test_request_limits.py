@@ -23,19 +23,19 @@ from app.http.request_limits import (
     CHANGES,
     EDITS,
     IMAGES,
-    LANES,
     LARGE,
     LOOKS,
     PAGES,
     PREVIEWS,
     QUESTIONS,
     READS,
+    REQUEST_CLASSES,
     STREAMS,
     UPLOADS,
     ZIPS,
-    Door,
-    Doors,
-    Lane,
+    ClassLimiter,
+    ClassLimiters,
+    RequestClass,
     turn,
 )
 from app.http.route import routes_of
@@ -117,9 +117,9 @@ class TestLaneOf:
         ],
     )
     def test_what_draws_hundreds_of_points_keeps_nobody_waiting_who_drags_one(
-        self, usual: Lane, large: Lane, headers: Any, is_large: bool
+        self, usual: RequestClass, large: RequestClass, headers: Any, is_large: bool
     ) -> None:
-        door = Doors().of(usual, {"headers": [*headers.items()]})
+        door = ClassLimiters().of(usual, {"headers": [*headers.items()]})
         assert door is not None
         assert door.lane == (large if is_large else usual)
 
@@ -159,13 +159,13 @@ class Service:
     """Requests that take turns, without a socket."""
 
     def __init__(self) -> None:
-        self.work, self.doors = Work(), Doors()
+        self.work, self.doors = Work(), ClassLimiters()
         self.app: Callable[[Scope], Awaitable[Response]] = self.work
         self.statuses: list[int] = []
         self.bodies: list[bytes] = []
         self.tasks: list[asyncio.Task[None]] = []
 
-    def ask(self, lane: Lane, path: str = "/1", accept: str = "*/*", who: str = "") -> None:
+    def ask(self, lane: RequestClass, path: str = "/1", accept: str = "*/*", who: str = "") -> None:
         headers = [(b"accept", accept.encode())]
         scope = {"type": "http", "path": path, "headers": headers}
         if who:
@@ -255,18 +255,18 @@ class TestLanes:
         ],
     )
     def test_more_are_let_in_where_what_takes_long_is_not_done_here(
-        self, lane: Lane, elsewhere: Any, people: tuple[str, ...], together: int
+        self, lane: RequestClass, elsewhere: Any, people: tuple[str, ...], together: int
     ) -> None:
-        async def let_in(door: Door | None) -> int:
+        async def let_in(door: ClassLimiter | None) -> int:
             assert door is not None
             return sum([await is_let_in(door, who) for who in people])
 
-        async def is_let_in(door: Door, who: str) -> bool:
+        async def is_let_in(door: ClassLimiter, who: str) -> bool:
             with anyio.move_on_after(0.01):
                 return await door.enter(who)
             return False
 
-        doors = Doors(), Doors(**elsewhere)
+        doors = ClassLimiters(), ClassLimiters(**elsewhere)
         assert [asyncio.run(let_in(one.of(lane, {"headers": []}))) for one in doors] == [
             1,
             together,
@@ -366,7 +366,7 @@ class TestLanes:
             service.work.may_answer.set()
             await service.settle()
             assert service.statuses == [200] * (3 * STREAMS.width)
-            assert [door.busy for door in service.doors.all] == [0] * len(LANES)
+            assert [door.busy for door in service.doors.all] == [0] * len(REQUEST_CLASSES)
             await service.end()
 
         run(test)
@@ -380,6 +380,6 @@ class TestLanes:
             service.ask(LOOKS, "/groups/1")
             with pytest.raises(KeyError):
                 await service.end()
-            assert [door.busy for door in service.doors.all] == [0] * len(LANES)
+            assert [door.busy for door in service.doors.all] == [0] * len(REQUEST_CLASSES)
 
         run(test)

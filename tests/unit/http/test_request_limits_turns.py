@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from app.http.request_limits import Turns
+from app.http.request_limits import FairLimiter
 from tests.waiting import SECONDS
 
 
@@ -13,7 +13,7 @@ class Waiting:
     """Requests that wait for a place, and the order in which they had one."""
 
     def __init__(self, width: int = 1, queue: int = 10, each: int | None = None):
-        self.turns = Turns(width, queue, each)
+        self.turns = FairLimiter(width, queue, each)
         self.at_work: list[str] = []
         self.served: list[str] = []
         self.refused: list[str] = []

@@ -14,7 +14,7 @@ from structlog.testing import capture_logs
 from app.db.session import Session, pending_response
 from app.db.store import Store
 from app.features.imports import upload_queries as uploads
-from app.features.independent_annotations.service import begin_take
+from app.features.independent_annotations.service import begin_annotation
 from app.http import idempotency
 from app.http.respond import no_content, responds
 from app.http.services import Services
@@ -31,8 +31,8 @@ KEPT: dict[str, Made] = {
     "addGuidelinePicture": dataset_requests.guideline_picture,
     "addPredictions": dataset_requests.predictions,
     "adjustRig": dataset_requests.rig,
-    "adoptTake": group_requests.adoption,
-    "beginTake": group_requests.take,
+    "adoptIndependentAnnotation": group_requests.adoption,
+    "beginIndependentAnnotation": group_requests.take,
     "beginThread": group_requests.thread,
     "cancelJob": dataset_requests.cancelled,
     "changeBatch": dataset_requests.batch_edited,
@@ -58,17 +58,17 @@ KEPT: dict[str, Made] = {
     "findShots": dataset_requests.found_shots,
     "forgetDatasetProposals": dataset_requests.no_proposals,
     "freezeVersion": dataset_requests.freeze,
-    "handBackAdjudicated": group_requests.adjudication_back,
-    "handBackGroup": group_requests.handed_back,
-    "handBackTake": group_requests.take_handed_back,
-    "handInGroup": group_requests.handed_in,
-    "handInTake": group_requests.take_handed_in,
+    "returnForCorrection": group_requests.adjudication_back,
+    "returnGroup": group_requests.handed_back,
+    "returnIndependentAnnotation": group_requests.take_handed_back,
+    "submitGroup": group_requests.handed_in,
+    "submitIndependentAnnotation": group_requests.take_handed_in,
     "makeBatch": dataset_requests.batch,
     "makeExport": dataset_requests.export,
     "changeGold": group_requests.gold_start,
     "markGold": group_requests.gold,
     "proposeDatasetLines": dataset_requests.proposals,
-    "readBell": dataset_requests.bell,
+    "markNotificationsRead": dataset_requests.bell,
     "readDatasetPaint": dataset_requests.paint,
     "redoGroup": group_requests.redo,
     "redoStation": group_requests.station_redo,
@@ -89,12 +89,12 @@ KEPT: dict[str, Made] = {
     "startEvaluation": dataset_requests.evaluation,
     "startImport": dataset_requests.data_import,
     "startPractice": dataset_requests.practice,
-    "takeDatasetPaintBack": dataset_requests.no_paint,
+    "revertDatasetPaint": dataset_requests.no_paint,
     "takeInstants": dataset_requests.instants,
-    "takeHandInBack": group_requests.hand_in_taken_back,
-    "takeNoiseBack": dataset_requests.no_noise,
-    "takePositionsBack": dataset_requests.no_positions,
-    "takeRigBack": dataset_requests.no_rig,
+    "withdrawSubmission": group_requests.hand_in_taken_back,
+    "revertNoise": dataset_requests.no_noise,
+    "revertPositions": dataset_requests.no_positions,
+    "revertRig": dataset_requests.no_rig,
     "undoGroup": group_requests.undo,
     "undoStation": group_requests.station_undo,
     "undoVerdictBatch": dataset_requests.bulk_undone,
@@ -109,14 +109,14 @@ HARMLESS = {
     "changeTeam": "The same setting once more changes nothing, and has the same answer.",
     "clearMaintenance": "A notice that is taken away is away.",
     "deleteUpload": "It is written down before what goes: the rest is done, and the answer the same.",
-    "giveGroupBack": "A lease that has ended is ended.",
+    "releaseGroup": "A lease that has ended is ended.",
     "previewGroup": "Saves nothing.",
     "proposeLines": "Saves nothing.",
     "readPaint": "Saves nothing.",
     "setMaintenance": "The same notice once more is the same notice.",
     "setMemberRole": "The same role once more changes nothing, and has the same answer.",
-    "takeGroup": "A lease that one has lasts on.",
-    "takeNextGroup": "A lease is a courtesy: one that nobody uses ends after three minutes.",
+    "openGroup": "A lease that one has lasts on.",
+    "openNextGroup": "A lease is a courtesy: one that nobody uses ends after three minutes.",
     "tryPolicy": "Saves nothing.",
     "uploadFile": "The same file again is the same upload.",
 }
@@ -268,7 +268,7 @@ def dataset_with_a_copy(api: Any) -> Request:
     request = dataset_requests.no_dataset(api)
     dataset = api.get(f"{API}/datasets/demo").json()["id"]
     (group,) = api.get(f"{API}/groups/ids", params={"dataset": dataset}).json()["ids"]
-    begin_take(store_of(api), group, person="ann")
+    begin_annotation(store_of(api), group, person="ann")
     return request
 
 

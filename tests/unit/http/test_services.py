@@ -24,13 +24,13 @@ class TestServices:
     ) -> None:
         tidying, told = Event(), []
 
-        def tidy(*_: object) -> upkeep.Tidied:
+        def tidy(*_: object) -> upkeep.CleanupCounts:
             tidying.set()
             told.append(services.jobs._closing.wait(20))
-            return upkeep.Tidied()
+            return upkeep.CleanupCounts()
 
         monkeypatch.setattr(upkeep, "FIRST_SECONDS", 0.0)
-        monkeypatch.setattr(upkeep, "tidy", tidy)
+        monkeypatch.setattr(upkeep, "clean_up", tidy)
         services = Services.open(Settings(home=tmp_path / "home"))
         services.jobs.start()
         services.upkeep.start()
@@ -66,7 +66,7 @@ class TestServices:
     ) -> None:
         made: set[str] = set()
         services = Services.open(Settings(home=tmp_path / "home"))
-        for name in ("makes", "resumes"):
+        for name in ("register_work", "register_resume"):
             monkeypatch.setattr(services.jobs, name, lambda kind, work_of: made.add(kind))
         services.start()
         services.close()

@@ -13,7 +13,7 @@ from app.paint.evidence import (
     trace,
 )
 from app.paint.profile_kernels import find_stripes
-from app.paint.tracing import Traced, painted_markings
+from app.paint.tracing import TracedPlaces, painted_markings
 from app.soccer.frames import Box
 from app.soccer.pitch import MARKINGS, Pitch
 from tests.unit.paint.test_grass import GRASS, picture
@@ -106,7 +106,7 @@ class TestShowsGrassBeside:
         reading = read_picture(image, np.ones(image.shape[:2], np.bool_))
         x = np.array([3.0, 60.0, 116.0, 130.0, 160.0, 195.0])
         none = np.zeros((len(x), 3))
-        traced = Traced(
+        traced = TracedPlaces(
             none, np.column_stack([x, np.full(len(x), 50.0)]), np.tile([1.0, 0.0], (len(x), 1)),
             np.ones(len(x)), np.zeros(len(x), np.int64), none, len(x),
         )  # fmt: skip

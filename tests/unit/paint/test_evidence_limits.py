@@ -22,7 +22,7 @@ from app.paint.evidence import (
     trace,
 )
 from app.paint.profile_kernels import find_stripes
-from app.paint.tracing import Traced, trace_places
+from app.paint.tracing import TracedPlaces, trace_places
 from app.soccer.frames import Box, ImageSize
 from app.soccer.pitch import MARKINGS, Pitch
 from tests.cameras import looking
@@ -38,12 +38,12 @@ def read(image: np.ndarray) -> Reading:
     return read_picture(image, np.ones(image.shape[:2], np.bool_))
 
 
-def upright(x: object, width: float = 5.0, marking: object = 0) -> Traced:
+def upright(x: object, width: float = 5.0, marking: object = 0) -> TracedPlaces:
     """Places down the middle of a picture, expected at these columns."""
     columns = np.asarray(x, np.float64)
     count = len(columns)
     pixels = np.column_stack([columns, np.linspace(20, HEIGHT - 20, count)])
-    return Traced(
+    return TracedPlaces(
         np.zeros((count, 3)), pixels, np.tile([1.0, 0.0], (count, 1)), np.full(count, width),
         np.broadcast_to(np.asarray(marking, np.int64), count), np.zeros((count, 8)), count,
     )  # fmt: skip
@@ -140,7 +140,7 @@ class TestTrace:
         assert 0 < len(traced.pixels) < traced.visible < len(every.pixels)
 
     @staticmethod
-    def whole_pitch(width: int) -> Traced:
+    def whole_pitch(width: int) -> TracedPlaces:
         size = ImageSize(width, width * 9 // 16)
         camera = looking((0.0, 20.0, -105.0), (0.0, 2.0, 0.0), 0.8 * width, size=size)
         return trace(read(picture(GRASS, size.height, size.width)), camera, Pitch())
@@ -351,7 +351,7 @@ def found_with(rendered, camera: Camera) -> Evidence:
     return seek(reading, trace(reading, camera, Pitch()), 6.0)
 
 
-def _sigma_of_one_level(reading: Reading, traced: Traced) -> float:
+def _sigma_of_one_level(reading: Reading, traced: TracedPlaces) -> float:
     """Standard deviation of a place, pixels, where the noise is one grey level."""
     offsets, sigmas, strengths = np.empty((3, len(traced.pixels)))
     find_stripes(

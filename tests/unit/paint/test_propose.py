@@ -12,7 +12,7 @@ from app.paint.agreement import PaintAgreement
 from app.paint.candidates import Library
 from app.paint.evidence import read_picture, seek, to_paint_evidence, trace
 from app.paint.propose import (
-    Ranked,
+    RankedCamera,
     SearchedFrame,
     propose,
     read_frame,
@@ -21,7 +21,7 @@ from app.paint.propose import (
     why_not_square,
     why_unsure,
 )
-from app.paint.snap import Snapped, snap_reading
+from app.paint.snap import SnappedCamera, snap_reading
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.sample.scenes import make_match
@@ -108,7 +108,7 @@ class TestPropose:
         aside = replace(TRUE, rotation=rotation_from_pan_tilt_roll(pan + 0.004, tilt, roll))
         seen = seek(reading, trace(reading, aside, PITCH), 12.0)
         assert np.median(np.abs(seen.offsets)) > 1.0
-        snapped = Snapped(aside, seen, 1.0, None, 0.5, None, (540, 960))
+        snapped = SnappedCamera(aside, seen, 1.0, None, 0.5, None, (540, 960))
         large = scaled(snapped, 1080, 1920)
         before, after = (to_paint_evidence(item.evidence, item.camera) for item in (snapped, large))
         for name, places in before.points.items():
@@ -185,7 +185,7 @@ class TestPropose:
         snapped = snap_reading(frame.reading, true, PITCH, (4.0, 3.0, 3.0), CalibrationPolicy())
         assert snapped.reason is None
         seen = PaintAgreement(0.9, 0.9, 400)
-        reason = why_unsure([Ranked(snapped, seen, 1.0)])
+        reason = why_unsure([RankedCamera(snapped, seen, 1.0)])
         assert reason is not None and "too few markings" in reason
 
     def test_a_marking_behind_people_is_not_missed(self):

@@ -12,7 +12,7 @@ from app.geometry.resection import parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.evidence import Evidence, to_paint_evidence
 from app.paint.snap import CURVED, _suffices, snap
-from app.paint.tracing import Traced
+from app.paint.tracing import TracedPlaces
 from app.soccer.frames import ImageSize
 from app.soccer.group import Station
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintReading
@@ -90,7 +90,7 @@ class TestCircle:
                 np.array([CURVED[0], MARKINGS.index("Middle line")]), (on_circle, 10)
             )
             none = np.zeros((len(marking), 2))
-            traced = Traced(none, none, none, none[:, 0], marking, none, len(marking))
+            traced = TracedPlaces(none, none, none, none[:, 0], marking, none, len(marking))
             seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0])
             return _suffices(seen, CURVED, spacing)
 

@@ -12,8 +12,8 @@ import pytest
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.evidence import Evidence, Reading, read_picture, trace
-from app.paint.snap import Snapped, _suffices, snap
-from app.paint.tracing import PAINTED, Traced
+from app.paint.snap import SnappedCamera, _suffices, snap
+from app.paint.tracing import PAINTED, TracedPlaces
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES
 from app.soccer.pitch import MARKINGS, Pitch
@@ -89,7 +89,7 @@ def known(camera: Camera, *, pan_px: float = 1e-5, tilt_px: float = 1e-5) -> np.
     return np.diag(np.square(sigma))
 
 
-def snapped(image: np.ndarray, start: Camera, **told: object) -> Snapped:
+def snapped(image: np.ndarray, start: Camera, **told: object) -> SnappedCamera:
     return snap(image, np.ones(image.shape[:2], np.bool_), start, **told)
 
 
@@ -125,7 +125,7 @@ class TestEnough:
     ) -> None:
         marking = np.repeat(np.arange(len(counts)), counts)
         none = np.zeros((len(marking), 2))
-        traced = Traced(none, none, none, none[:, 0], marking, none, 10 * len(marking))
+        traced = TracedPlaces(none, none, none, none[:, 0], marking, none, 10 * len(marking))
         seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0])
         assert _suffices(seen, []) == enough
 

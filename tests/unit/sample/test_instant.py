@@ -6,7 +6,7 @@ import pytest
 from app.sample.instant import (
     BALL_DIAMETER,
     PEOPLE,
-    clear_sight,
+    clear_view,
     later,
     make_instant,
     shirt_numbers,
@@ -59,6 +59,6 @@ class TestClearSight:
         feet = instant.feet.copy()
         feet[5] = ball[:2] + 2.0 * toward
         blocked = type(instant)(**{**vars(instant), "ball": ball, "feet": feet})
-        cleared = clear_sight(blocked, camera[None])
+        cleared = clear_view(blocked, camera[None])
         offset = cleared.feet[5] - ball[:2]
         assert abs(offset[0] * toward[1] - offset[1] * toward[0]) > 0.7

@@ -109,7 +109,9 @@ class TestThresholds:
         assert {threshold.name for threshold in THRESHOLDS} == own | inner
 
     def test_each_that_a_gate_compares_with_says_how_and_jac_alone_must_be_exceeded(self):
-        asks = {threshold.name: threshold.asks for threshold in THRESHOLDS if threshold.asks}
+        asks = {
+            threshold.name: threshold.comparison for threshold in THRESHOLDS if threshold.comparison
+        }
         compared = {item.name for item in THRESHOLDS if item.gate} - {"jac_gamma_percent"}
         assert set(asks) == compared
         assert [name for name, words in asks.items() if words == "more than"] == ["min_jac"]

@@ -29,7 +29,7 @@ from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 from app.solving.judgement import judge
 from app.solving.observations import principal_point
 from app.solving.picture_camera import picture_of, warp_of
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE, WIDE_LENSES, looking, wide
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.random_groups import random_policy, random_views
@@ -68,12 +68,14 @@ class TestCalibrationSpread:
         spread = calibration_covariance(calibration, SIZE, np.zeros(3))
         # 20 cm at 20 m are 10 px for 1000 px a radian.
         assert np.allclose(spread, [[100.0, 0.0], [0.0, 0.0]])
-        sight = Sighting("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
+        sight = BallObservation("a", calibration, ImagePoint(639.5, 359.5), 0.0, SIZE)
         noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
         assert np.allclose(pixel_covariance(sight, np.zeros(3), PAPER), spread + noise * np.eye(2))
 
     def test_a_given_camera_counts_as_exact_until_the_policy_knows_better(self):
-        sight = Sighting("a", Calibration("given", MAIN), ImagePoint(639.5, 359.5), 0.0, SIZE)
+        sight = BallObservation(
+            "a", Calibration("given", MAIN), ImagePoint(639.5, 359.5), 0.0, SIZE
+        )
         noise = (SIZE.diagonal / CLICK_DIAGONAL) ** 2
         blurred = replace(PAPER, given_sigma_px=7.0)
         assert np.allclose(pixel_covariance(sight, np.array(BALL), PAPER), noise * np.eye(2))

@@ -7,7 +7,7 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, Calibration
 from app.solving.ball_covariance import CLICK_DIAGONAL
 from app.solving.ball_noise import LIMIT, TRIMMED, Miss, estimate_ball_noise, misses_of
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE
 
@@ -20,7 +20,7 @@ def sights(noise_px, rng, source="lines", diameter=0.0):
     """A ball in three views, clicked with noise."""
     for key, camera in VIEWS.items():
         x, y = camera.project(np.array([POINT]))[0] + rng.normal(0, noise_px, 2)
-        yield Sighting(key, Calibration(source, camera), (x, y), diameter, SIZE)
+        yield BallObservation(key, Calibration(source, camera), (x, y), diameter, SIZE)
 
 
 def ball_in(views):

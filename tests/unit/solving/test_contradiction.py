@@ -22,7 +22,7 @@ from app.solving.contradiction import (
 )
 from app.solving.facts import facts_of
 from app.solving.judgement import judge
-from app.solving.triangulate import meet, sights_of
+from app.solving.triangulate import ball_observations, meet
 from tests.balls import seen
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
@@ -42,7 +42,7 @@ def torn(
         point = BallAnnotation(point=seen(CAMERAS[key], place))
         views.append(replace(given_view(key, CAMERAS[key], ball), balls=(point,)))
     calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in keys]
-    sights = sights_of(views, calibrations)
+    sights = ball_observations(views, calibrations)
     facts = facts_of(views, calibrations, meet(combinations(sights, 2)))
     judgement = judge(facts, policy, MeanCovariance(facts))
     chi_square = chi_square_of(keys, facts, judgement, policy)

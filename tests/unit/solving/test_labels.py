@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import MARKINGS
 from app.soccer.policy import CalibrationPolicy
-from app.solving.labels import GAMMA_SHARE, MISFIT, _by_suspicion, _half, _minority, find_suspects
+from app.solving.labels import (
+    GAMMA_SHARE,
+    MISFIT,
+    _by_suspicion,
+    _minority,
+    _pitch_half,
+    find_suspects,
+)
 from app.solving.observations import observe
 from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
@@ -70,10 +77,10 @@ class TestOrder:
     @given(st.lists(st.sampled_from(MARKINGS), unique=True))
     def test_the_minority_lies_on_one_half_and_is_no_more_than_the_other(self, markings):
         few = _minority(markings)
-        halves = {_half(name) for name in few}
+        halves = {_pitch_half(name) for name in few}
         assert len(halves) <= 1
         assert None not in halves
-        rest = [name for name in markings if _half(name) not in (None, *halves)]
+        rest = [name for name in markings if _pitch_half(name) not in (None, *halves)]
         assert len(few) <= len(rest) or not few
 
     @given(st.dictionaries(st.sampled_from(MARKINGS), st.floats(0, 100), min_size=1))
@@ -91,4 +98,4 @@ class TestOrder:
         [("Circle left", "left"), ("Big rect. right main", "right"), ("Middle line", None)],
     )
     def test_a_marking_belongs_to_the_half_that_its_name_says(self, marking, half):
-        assert _half(marking) == half
+        assert _pitch_half(marking) == half

@@ -12,7 +12,7 @@ from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import facts_of
 from app.solving.judgement import judge
 from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
-from app.solving.triangulate import meet, sights_of
+from app.solving.triangulate import ball_observations, meet
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.test_solve import shifted
 
@@ -28,7 +28,7 @@ def solved(*shifts: float, policy=PAPER):
         for key, camera, shift in zip(KEYS, cameras, shifts, strict=True)
     ]
     calibrations = [Calibration("given", camera) for camera in cameras]
-    meetings = meet(combinations(sights_of(views, calibrations), 2))
+    meetings = meet(combinations(ball_observations(views, calibrations), 2))
     facts = facts_of(views, calibrations, meetings)
     spread = MeanCovariance(facts)
     judgement = judge(facts, policy, spread)

@@ -20,7 +20,7 @@ from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading
 from app.soccer.picture import OPEN
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
-from app.solving.calibrate import calibrate_view, sought_key, view_key
+from app.solving.calibrate import calibrate_view, paint_search_key, view_key
 from app.solving.solve import solve
 from tests.balls import box_around
 from tests.cameras import SIZE
@@ -71,7 +71,7 @@ def clicked() -> Group:
 def read(group: Group, **changes) -> Group:
     """The group, the paint of whose first picture was read."""
     view = group.views[0]
-    key = sought_key(group, view, CLICKS)
+    key = paint_search_key(group, view, CLICKS)
     reading = PaintReading("f" * 32, key, painted(MAIN), None, 0.9, 0.8)
     return replace(group, paint={view.key: replace(reading, **changes)})
 
@@ -177,12 +177,12 @@ class TestKey:
         station = Station("a", ImageSize(960, 540), lines=make_lines(lines))
         group = Group("g", (View("a", station, ()),))
         before = replace(TOLD, goal="inner")
-        assert sought_key(group, group.views[0], before) == "5e1cff3d68f54b070aa1f12d1f685e29"
+        assert paint_search_key(group, group.views[0], before) == "5e1cff3d68f54b070aa1f12d1f685e29"
 
     def test_the_noise_that_a_dataset_shows_moves_no_camera_and_makes_no_reading_stale(self):
         group, noise = clicked(), {"line_sigma_px": 2.5, "line_share": 0.4}
-        quiet, noisy = sought_key(group, group.views[0], TOLD), replace(TOLD, **noise)
-        assert sought_key(group, group.views[0], noisy) == quiet
+        quiet, noisy = paint_search_key(group, group.views[0], TOLD), replace(TOLD, **noise)
+        assert paint_search_key(group, group.views[0], noisy) == quiet
         found, other = first(group, CLICKS), first(group, replace(CLICKS, **noise))
         assert found.camera == other.camera and found.covariance != other.covariance
 

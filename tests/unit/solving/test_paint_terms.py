@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.geometry.resection import Sightings, X, Z
+from app.geometry.resection import CurvePoints, X, Z
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.lone_frame import (
@@ -32,8 +32,8 @@ def seen_by(camera, pitch=PITCH):
     """Places on the grass markings of a pitch, and how they lie beside those of the plan."""
     grass = {name: at for name, at in click(camera, pitch=pitch).items() if name[:4] != "Goal"}
     observed = observe(grass, pitch, SIZE)
-    sightings = Sightings(observed.pixels, observed.marking, np.ones(len(observed.pixels)))
-    seen = offsets_of(PROBLEM, TRUE, sightings, np.full(len(observed.pixels), 0.1), PITCH)
+    curve_points = CurvePoints(observed.pixels, observed.marking, np.ones(len(observed.pixels)))
+    seen = offsets_of(PROBLEM, TRUE, curve_points, np.full(len(observed.pixels), 0.1), PITCH)
     places = MAIN.on_ground(observed.pixels + np.array(MAIN.principal_point))
     return seen, places
 

@@ -12,25 +12,29 @@ from app.soccer.frames import ImagePoint
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.sides import Swap, find_swaps, turned_camera
-from app.solving.triangulate import Sighting
+from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH
 
 BALL = (38.0, 2.0, -1.4)
 
 
-def sight(view: str, camera: Camera, *, labelled: Camera | None = None, source="lines") -> Sighting:
+def sight(
+    view: str, camera: Camera, *, labelled: Camera | None = None, source="lines"
+) -> BallObservation:
     """The ball as a camera sees it, calibrated as that camera or as another."""
     x, y = camera.project(np.array([BALL]))[0]
     calibration = Calibration(source, labelled or camera)
-    return Sighting(view, calibration, ImagePoint(float(x), float(y)), 9.0, SIZE)
+    return BallObservation(view, calibration, ImagePoint(float(x), float(y)), 9.0, SIZE)
 
 
 A, B, C = sight("a", MAIN), sight("b", BEHIND_GOAL), sight("c", OPPOSITE)
 TURNED = sight("b", BEHIND_GOAL, labelled=turned_camera(BEHIND_GOAL))
 
 
-def swaps(*sights: Sighting, first: Sighting | None = A, **changes: float) -> tuple[Swap, ...]:
+def swaps(
+    *sights: BallObservation, first: BallObservation | None = A, **changes: float
+) -> tuple[Swap, ...]:
     return find_swaps(first, sights, PITCH, replace(PAPER, **changes))
 
 

@@ -16,7 +16,7 @@ from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Station, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.triangulate import Sighting, lines_of_sight, meet, sights_of
+from app.solving.triangulate import BallObservation, ball_observations, meet, observation_pairs
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
@@ -36,18 +36,18 @@ ALONG_X = Camera(
 )
 
 
-def sight(key: str, camera: Camera, center: tuple[float, float]) -> Sighting:
-    return Sighting(
+def sight(key: str, camera: Camera, center: tuple[float, float]) -> BallObservation:
+    return BallObservation(
         key, Calibration("given", camera), ImagePoint(*center), 8.0, ImageSize(1001, 1001)
     )
 
 
-def looks_at(key: str, camera: Camera, point: tuple[float, float, float]) -> Sighting:
+def looks_at(key: str, camera: Camera, point: tuple[float, float, float]) -> BallObservation:
     return sight(key, camera, tuple(camera.project(np.array([point]))[0]))
 
 
-def sights(*views: View, cameras=(MAIN, BEHIND_GOAL)) -> list[Sighting]:
-    return sights_of(views, [Calibration("given", camera) for camera in cameras])
+def sights(*views: View, cameras=(MAIN, BEHIND_GOAL)) -> list[BallObservation]:
+    return ball_observations(views, [Calibration("given", camera) for camera in cameras])
 
 
 class TestSight:
@@ -101,13 +101,13 @@ class TestSightsOf:
 
     def test_a_point_has_no_diameter(self):
         a = replace(given_view("a", MAIN, BALL), balls=(BallAnnotation(point=ImagePoint(9, 8)),))
-        (found,) = sights_of([a], [Calibration("given", MAIN)])
+        (found,) = ball_observations([a], [Calibration("given", MAIN)])
         assert (found.diameter_px, found.center) == (0.0, (9, 8))
 
     def test_a_ball_where_the_lens_shows_nothing_is_none(self):
         barrel = replace(MAIN, distortion=np.array([-5.0, *np.zeros(11)]))
         a = View("a", Station("a", SIZE, given=barrel), (BallAnnotation(box=Box(0, 0, 9, 9)),))
-        assert sights_of([a], [Calibration("given", barrel)]) == []
+        assert ball_observations([a], [Calibration("given", barrel)]) == []
 
     def test_every_view_needs_its_calibration(self):
         with pytest.raises(ValueError, match="longer"):
@@ -221,7 +221,7 @@ class TestMeet:
 class TestLinesOfSight:
     def test_come_in_the_order_that_triangulation_takes(self):
         a, b = looks_at("a", MAIN, BALL), looks_at("b", OPPOSITE, BALL)
-        P_a, P_b, pixels_a, pixels_b = lines_of_sight([a, b], [b, a])
+        P_a, P_b, pixels_a, pixels_b = observation_pairs([a, b], [b, a])
         assert np.array_equal(P_a, [MAIN.P, OPPOSITE.P])
         assert np.array_equal(P_b, [OPPOSITE.P, MAIN.P])
         assert np.array_equal(pixels_a, [a.ideal_center, b.ideal_center])

@@ -24,7 +24,7 @@ from app.errors import InputError, UnsafePathError
 from app.features.batches.service import get_batch
 from app.features.imports.ingest import ingest
 from app.features.independent_annotations.gold_queries import mark_gold, unmark_gold
-from app.features.people.access_tokens import new_text
+from app.features.people.access_tokens import new_token_text
 from app.features.people.logins import Login
 from app.features.people.roles import DatasetRoles, Role, Scope
 from app.features.people.service import invite
@@ -380,7 +380,7 @@ class TestRefusals:
     def test_a_token_that_is_not_valid_is_told_so_once(self, place: Place, tmp_path: Path) -> None:
         path = tmp_path / "token"
         path.touch(0o600)
-        path.write_text(new_text())
+        path.write_text(new_token_text())
         for content, sentence in (
             (None, "is not valid (any more)"),
             ("tl_x", "holds no whole token"),
@@ -396,7 +396,7 @@ class TestRefusals:
         self, place: Place, tmp_path: Path, mode: int
     ) -> None:
         path = tmp_path / "token"
-        path.write_text(new_text())
+        path.write_text(new_token_text())
         path.chmod(mode)
         with (
             pytest.raises(InputError, match="other users can read"),

@@ -12,14 +12,14 @@ import pytest
 
 from app.terminal.terminal import (
     MAX_MISSING,
-    complain,
-    harmless,
+    allow_any_text,
+    escape_controls,
     held_interrupts,
+    print_error,
     print_export,
     print_import,
     print_json,
     show_progress,
-    spell_out,
 )
 
 STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
@@ -41,7 +41,7 @@ class TestHarmless:
             },
             False,
         )
-        complain(f"there is no {name}", f"Look for {name}")
+        print_error(f"there is no {name}", f"Look for {name}")
         found = capsys.readouterr()
         assert not STEERING.search(found.out + found.err)
         assert (
@@ -58,7 +58,7 @@ class TestHarmless:
 
     def test_lines_and_letters_of_the_world_stay(self) -> None:
         text = "Málaga 1 - 0 Эльче\n  足球 ⚽"
-        assert harmless(text) == text
+        assert escape_controls(text) == text
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ class TestSpellOut:
         raw = io.BytesIO()
         monkeypatch.setattr("sys.stdout", io.TextIOWrapper(raw, encoding="ascii"))
         value = {"file": "Málaga – 1° ⚽ \udcff"}
-        spell_out()
+        allow_any_text()
         print_json(value)
         assert json.loads(raw.getvalue()) == value
 

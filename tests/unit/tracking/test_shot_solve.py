@@ -18,7 +18,7 @@ from app.geometry.resection import (
     parameters_from_camera,
 )
 from app.paint.evidence import Evidence
-from app.paint.snap import Snapped
+from app.paint.snap import SnappedCamera
 from app.paint.tracing import trace_places
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -58,7 +58,7 @@ def shot(
         apart = truth.project(traced.places) - found.project(traced.places)
         offsets = (apart * traced.normals).sum(axis=1) + noise
         evidence = Evidence(traced, offsets, sigmas, np.full(len(sigmas), 50.0))
-        snapped = Snapped(found, evidence, 0.1, None, 0.0, None, (SMALL.height, SMALL.width))
+        snapped = SnappedCamera(found, evidence, 0.1, None, 0.0, None, (SMALL.height, SMALL.width))
         frames.append(TrackedFrame(number, number / 25, TRACKED, found, snapped))
         if number:
             here = rng.uniform((20, 20), (940, 520), (80, 2))

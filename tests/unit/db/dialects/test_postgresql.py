@@ -115,7 +115,7 @@ class TestWrite:
 class TestGlance:
     def test_each_statement_is_a_transaction(self, own_store: Store) -> None:
         began = text("SELECT now()")
-        with own_store.glance() as session:
+        with own_store.read_one() as session:
             assert session.scalar(began) < session.scalar(began)
         with own_store.read() as session:
             assert session.scalar(began) == session.scalar(began)

@@ -31,15 +31,15 @@ def other(own_store: Store) -> Iterator[Store]:
 def words(own_store: Store) -> queue.Queue[str]:
     """What a store hears from now on."""
     heard: queue.Queue[str] = queue.Queue()
-    own_store.sharing.hear(heard.put)
-    own_store.follow()
+    own_store.sharing.subscribe(heard.put)
+    own_store.subscribe()
     assert heard.get(timeout=SECONDS) == AGAIN
     return heard
 
 
 def end(own_store: Store, begins: str) -> None:
     """End the connections whose last statement begins so."""
-    with own_store.glance() as session:
+    with own_store.read_one() as session:
         assert all(session.scalars(text(OTHERS.format(begins))).all())
 
 
@@ -47,26 +47,26 @@ class TestClaims:
     def test_one_process_has_it_until_it_gives_it_back(
         self, own_store: Store, other: Store
     ) -> None:
-        assert (own_store.sharing.take("jobs"), other.sharing.take("jobs")) == (True, False)
-        assert other.sharing.take("something else")
+        assert (own_store.sharing.claim("jobs"), other.sharing.claim("jobs")) == (True, False)
+        assert other.sharing.claim("something else")
         # Nor has anybody else in the same process.
-        assert not own_store.sharing.take("jobs")
-        own_store.sharing.give_back("jobs")
-        assert (other.sharing.take("jobs"), other.sharing.holds("jobs")) == (True, True)
+        assert not own_store.sharing.claim("jobs")
+        own_store.sharing.release("jobs")
+        assert (other.sharing.claim("jobs"), other.sharing.holds("jobs")) == (True, True)
 
     def test_it_ends_with_its_connection(self, own_store: Store, other: Store) -> None:
-        assert own_store.sharing.take("jobs")
+        assert own_store.sharing.claim("jobs")
         end(other, "SELECT pg_try")
-        assert other.sharing.take("jobs")
+        assert other.sharing.claim("jobs")
         assert not own_store.sharing.holds("jobs")
-        own_store.sharing.give_back("jobs")
+        own_store.sharing.release("jobs")
         assert other.sharing.holds("jobs")
 
     def test_it_ends_with_its_store(self, own_store: Store, other: Store) -> None:
-        assert other.sharing.take("jobs")
+        assert other.sharing.claim("jobs")
         other.close()
         with closing(Store.open(own_store.settings)) as next_one:
-            assert next_one.sharing.take("jobs")
+            assert next_one.sharing.claim("jobs")
 
 
 class TestWords:
@@ -75,12 +75,12 @@ class TestWords:
     ) -> None:
         heard, own = words(other), words(own_store)
         with pytest.raises(KeyError), own_store.write() as session:
-            own_store.sharing.tell(session, "lost")
+            own_store.sharing.publish(session, "lost")
             raise KeyError
-        own_store.say("first")
+        own_store.publish("first")
         say(own_store)
         assert [heard.get(timeout=SECONDS) for _ in range(2)] == ["first", COMMITTED]
-        other.say("back")
+        other.publish("back")
         assert own.get(timeout=SECONDS) == "back"
 
     def test_who_listens_is_told_of_commits_of_others(self, own_store: Store, other: Store) -> None:
@@ -97,11 +97,11 @@ class TestWords:
         heard = words(other)
         end(own_store, "LISTEN")
         assert heard.get(timeout=SECONDS) == AGAIN
-        own_store.say("after")
+        own_store.publish("after")
         assert heard.get(timeout=SECONDS) == "after"
 
     def test_what_is_too_long_is_not_said(self, own_store: Store, other: Store) -> None:
         heard = words(other)
-        own_store.say("x" * 8000)
-        own_store.say("short")
+        own_store.publish("x" * 8000)
+        own_store.publish("short")
         assert heard.get(timeout=SECONDS) == "short"

@@ -8,17 +8,26 @@ from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, NotFoundError
 from app.evaluation.agreement_limits import AgreementLimits
 from app.features.agreement import service as weigh
-from app.features.agreement.adjudicate import decide, get_case, hand_back, list_waiting, take_over
+from app.features.agreement.adjudicate import (
+    adopt_into_group,
+    decide,
+    get_case,
+    list_waiting,
+    return_for_correction,
+)
 from app.features.agreement.compare import read_limits, set_limits
-from app.features.agreement.service import BY_ITSELF, after_hand_in
+from app.features.agreement.service import BY_ITSELF, after_submission
 from app.features.groups.edit import SetBall
 from app.features.groups.history import history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
-from app.features.independent_annotations.queries import Take
-from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import get_take, list_takes
+from app.features.independent_annotations.queries import IndependentAnnotation
+from app.features.independent_annotations.return_work import return_annotation
+from app.features.independent_annotations.service import (
+    get_annotation,
+    list_annotations,
+)
 from app.features.integrity.database import examine
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -27,7 +36,7 @@ from app.features.verdicts.service import set_verdict
 from tests.unit.features.independent_annotations.begun import begin_take
 
 
-def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> Take:
+def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> IndependentAnnotation:
     """The take of a person who moves the ball of the first view and accepts."""
     take = begin_take(store, group_id, person=person)
     state = load(store, take.copy_id)
@@ -39,7 +48,7 @@ def judged(store: Store, group_id: int, person: str, moved: float = 0.0) -> Take
             store, take.copy_id, SetBall(view.key, ball), if_match=state.etag, actor=person
         )
     set_verdict(store, take.copy_id, "accepted", None, "seen", if_match=state.etag, actor=person)
-    return get_take(store, take.id)
+    return get_annotation(store, take.id)
 
 
 def ball_x(state: GroupState) -> float:
@@ -55,14 +64,14 @@ def kinds(store: Store, group_id: int) -> list[tuple[str, str]]:
 class TestAfterHandIn:
     def test_two_who_agree_settle_the_group_by_themselves(self, store, state) -> None:
         first = judged(store, state.id, "ann", 1.0)
-        assert after_hand_in(store, first.copy_id) is None
+        assert after_submission(store, first.copy_id) is None
         second = judged(store, state.id, "ben", 2.0)
-        assert after_hand_in(store, second.copy_id) == "agreed"
+        assert after_submission(store, second.copy_id) == "agreed"
         after = load(store, state.id)
         assert ball_x(after) == ball_x(state) + 1
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
         assert ("agreement", BY_ITSELF) in kinds(store, state.id)
-        assert all(get_take(store, one.id).settled for one in (first, second))
+        assert all(get_annotation(store, one.id).settled for one in (first, second))
         assert list_waiting(store, state.dataset) == []
         assert [str(check) for check in examine(store) if not check.ok] == []
 
@@ -72,7 +81,7 @@ class TestAfterHandIn:
     ) -> None:
         judged(store, state.id, "ann", 1.0)
         second = judged(store, state.id, "ben", moved)
-        assert get_take(store, second.id).handed_in is not None
+        assert get_annotation(store, second.id).handed_in is not None
 
         def fail(*_: object) -> None:
             raise OSError("the power went")
@@ -80,10 +89,10 @@ class TestAfterHandIn:
         with monkeypatch.context() as broken:
             broken.setattr(weigh, "settle_rest" if comes_to == "agreed" else "_announce", fail)
             with pytest.raises(OSError, match="power"):
-                after_hand_in(store, second.copy_id)
+                after_submission(store, second.copy_id)
         assert load(store, state.id).etag == state.etag
         assert list_waiting(store, state.dataset) == []
-        assert (weigh.weigh_left(store), weigh.weigh_left(store)) == (1, 0)
+        assert (weigh.compare_left(store), weigh.compare_left(store)) == (1, 0)
         assert [one.group for one in list_waiting(store, state.dataset)] == (
             [state.id] if comes_to == "open" else []
         )
@@ -100,14 +109,14 @@ class TestAfterHandIn:
             raise ConflictError("somebody was faster")
 
         with monkeypatch.context() as broken:
-            broken.setattr(weigh, "adopt_take", faster)
-            assert after_hand_in(store, second.copy_id) == "open"
+            broken.setattr(weigh, "adopt_annotation", faster)
+            assert after_submission(store, second.copy_id) == "open"
         assert [one.group for one in list_waiting(store, state.dataset)] == [state.id]
 
     def test_two_who_do_not_wait_for_a_decision(self, store, state) -> None:
         judged(store, state.id, "ann")
         second = judged(store, state.id, "ben", 40.0)
-        assert after_hand_in(store, second.copy_id) == "open"
+        assert after_submission(store, second.copy_id) == "open"
         assert load(store, state.id).etag == state.etag
         (waiting,) = list_waiting(store, state.dataset)
         assert (waiting.group, waiting.people) == (state.id, ("ann", "ben"))
@@ -120,17 +129,17 @@ class TestAfterHandIn:
             assert read_limits(session, state.dataset_id) == wide
         judged(store, state.id, "ann")
         second = judged(store, state.id, "ben", 40.0)
-        assert after_hand_in(store, second.copy_id) == "agreed"
+        assert after_submission(store, second.copy_id) == "agreed"
 
     def test_handing_in_the_copy_of_an_ordinary_group_compares_nothing(self, store, state) -> None:
-        assert after_hand_in(store, state.id) is None
+        assert after_submission(store, state.id) is None
 
 
 class TestDecide:
     @pytest.fixture
-    def takes(self, store, state) -> tuple[Take, Take]:
+    def takes(self, store, state) -> tuple[IndependentAnnotation, IndependentAnnotation]:
         found = judged(store, state.id, "ann"), judged(store, state.id, "ben", 40.0)
-        assert after_hand_in(store, found[1].copy_id) == "open"
+        assert after_submission(store, found[1].copy_id) == "open"
         return found
 
     def test_takes_one_with_the_verdict_of_who_decided(self, store, state, takes) -> None:
@@ -158,7 +167,7 @@ class TestDecide:
                 decide(store, state.id, takes[1].id, actor="lea")
         assert load(store, state.id).etag == state.etag
         assert kinds(store, state.id) == before
-        assert not any(get_take(store, one.id).settled for one in takes)
+        assert not any(get_annotation(store, one.id).settled for one in takes)
         assert [one.group for one in list_waiting(store, state.dataset)] == [state.id]
         after = decide(store, state.id, takes[1].id, actor="lea")
         assert (ball_x(after), after.verdict.actor) == (ball_x(state) + 40, "lea")
@@ -187,26 +196,31 @@ class TestDecide:
 
 class TestHandBack:
     @pytest.fixture
-    def takes(self, store, state) -> tuple[Take, Take]:
+    def takes(self, store, state) -> tuple[IndependentAnnotation, IndependentAnnotation]:
         found = judged(store, state.id, "ann"), judged(store, state.id, "ben", 40.0)
-        assert after_hand_in(store, found[1].copy_id) == "open"
+        assert after_submission(store, found[1].copy_id) == "open"
         return found
 
     def test_tells_its_person_why_and_the_group_waits_for_them_alone(
         self, store, state, takes
     ) -> None:
-        assert hand_back(store, state.id, takes[1].id, " the  spot ", actor="lea").handed_in is None
+        assert (
+            return_for_correction(
+                store, state.id, takes[1].id, " the  spot ", actor="lea"
+            ).handed_in
+            is None
+        )
         assert list_waiting(store, state.dataset) == []
-        shown = list_takes(store, state.dataset, lambda _: True, person="lea")
+        shown = list_annotations(store, state.dataset, lambda _: True, person="lea")
         assert [one.handed_back and one.handed_back.reason for one in shown] == [None, "the spot"]
         again = load(store, takes[1].copy_id)
         set_verdict(
             store, takes[1].copy_id, "deferred", None, "x", if_match=again.etag, actor="ben"
         )
-        assert after_hand_in(store, takes[1].copy_id) == "open"
+        assert after_submission(store, takes[1].copy_id) == "open"
         (waiting,) = list_waiting(store, state.dataset)
         assert waiting.people == ("ann", "ben")
-        shown = list_takes(store, state.dataset, lambda _: True, person="lea")
+        shown = list_annotations(store, state.dataset, lambda _: True, person="lea")
         assert [one.handed_back for one in shown] == [None, None]
 
     def test_the_queue_finds_it_and_says_what_it_came_to(
@@ -232,19 +246,19 @@ class TestHandBack:
         assert list_groups(store, state.dataset_id, "takes:2").items[0].came_to == "decided"
 
     def test_what_a_lead_returned_leaves_nothing_that_waits(self, store, state, takes) -> None:
-        hand_back_take(store, takes[0].id, "the ball", actor="lea")
+        return_annotation(store, takes[0].id, "the ball", actor="lea")
         assert list_waiting(store, state.dataset) == []
 
     def test_nobody_hands_back_where_others_have_to_decide(self, store, state, takes) -> None:
         invite(store, "rob", Role.REVIEWER, actor="lea")
         with pytest.raises(ForbiddenError, match="rob can decide"):
-            hand_back(store, state.id, takes[1].id, actor="ann")
+            return_for_correction(store, state.id, takes[1].id, actor="ann")
         with pytest.raises(NotFoundError, match="annotation 99"):
-            hand_back(store, state.id, 99, actor="rob")
+            return_for_correction(store, state.id, 99, actor="rob")
 
     def test_a_lead_who_takes_one_over_has_decided(self, store, state, takes) -> None:
-        after = take_over(store, takes[1], actor="lea")
+        after = adopt_into_group(store, takes[1], actor="lea")
         assert ball_x(after) == ball_x(state) + 40
         assert list_waiting(store, state.dataset) == []
         assert ("agreement", "lea") in kinds(store, state.id)
-        assert get_take(store, takes[0].id).settled
+        assert get_annotation(store, takes[0].id).settled

@@ -8,13 +8,13 @@ import pytest
 
 from app.db.store import Store
 from app.features.agreement.adjudicate import decide, get_case, list_waiting
-from app.features.agreement.service import after_hand_in
-from app.features.batches.leases import Leases, Worker
+from app.features.agreement.service import after_submission
+from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.progress import my_work
 from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
-from app.features.notifications.queries import read_rings
+from app.features.notifications.queries import select_notifications
 from app.features.people.queries import person_by_name
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -35,7 +35,7 @@ def batch(store, fill, make_group) -> Batch:
 
 def annotate(store: Store, leases: Leases, batch: Batch, person: str, moved: float) -> int:
     """The copy that somebody gets next, its ball moved and the group accepted."""
-    copy = leases.next(batch.id, Worker(person)).group
+    copy = leases.next(batch.id, BatchMember(person)).group
     assert copy is not None
     state = load(store, copy)
     view = next(view for view in state.group.views if view.ball is not None)
@@ -48,7 +48,7 @@ def annotate(store: Store, leases: Leases, batch: Batch, person: str, moved: flo
 
 def left(store: Store, person: str) -> int:
     """How many groups somebody is told that they may still get."""
-    (mine,) = my_work(store, lambda _dataset: Worker(person))
+    (mine,) = my_work(store, lambda _dataset: BatchMember(person))
     return mine.left
 
 
@@ -57,16 +57,16 @@ def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> N
     assert left(store, "ada") == 2
     for moved in (1.0, 1.0):
         copy = annotate(store, leases, batch, "ada", moved)
-        assert after_hand_in(store, copy) is None
-    assert leases.next(batch.id, Worker("ada")).group is None
+        assert after_submission(store, copy) is None
+    assert leases.next(batch.id, BatchMember("ada")).group is None
     assert (left(store, "ada"), left(store, "bo")) == (0, 2)
     assert get_batch(store, batch.id).settled == 0
 
-    assert after_hand_in(store, annotate(store, leases, batch, "bo", 2.0)) == "agreed"
+    assert after_submission(store, annotate(store, leases, batch, "bo", 2.0)) == "agreed"
     assert get_batch(store, batch.id).settled == 1
-    assert after_hand_in(store, annotate(store, leases, batch, "bo", 30.0)) == "open"
-    assert leases.next(batch.id, Worker("bo")).group is None
-    assert leases.next(batch.id, Worker("cy")).group is None
+    assert after_submission(store, annotate(store, leases, batch, "bo", 30.0)) == "open"
+    assert leases.next(batch.id, BatchMember("bo")).group is None
+    assert leases.next(batch.id, BatchMember("cy")).group is None
 
     waiting = list_waiting(store, batch.dataset_id)
     assert len(waiting) == 1
@@ -84,5 +84,5 @@ def test_the_people_of_a_batch_are_told_of_it_once(store, batch) -> None:
     for name in ("ada", "bo", "cy"):
         with store.read() as session:
             person = person_by_name(session, name)
-            rings = read_rings(session, person.id, EVERYTHING, "", 10, None)
+            rings = select_notifications(session, person.id, EVERYTHING, "", 10, None)
         assert [ring.kind for ring in rings] == ["assigned"], name

@@ -7,14 +7,14 @@ import io
 
 import pytest
 
-from app.features.independent_annotations.service import begin_take
+from app.features.independent_annotations.service import begin_annotation
 
 DATASET = "/api/v1/datasets/broadcast"
 
 
 def annotated(api, group: int, person: str, moved: float) -> None:
     """The annotation of a person who moves a ball and accepts."""
-    take = begin_take(api.app.state.services.store, group, person=person)
+    take = begin_annotation(api.app.state.services.store, group, person=person)
     copy = api.get(f"/api/v1/groups/{take.group}").json()
     headers = {"If-Match": copy["etag"]}
     view = next(view for view in copy["views"] if view["balls"] and view["balls"][0]["box"])
@@ -64,8 +64,8 @@ class TestAdjudication:
     ) -> None:
         group = api.get("/api/v1/groups", params={"dataset": "broadcast"}).json()["items"][0]["id"]
         for person in ("ann", "ben"):
-            take = begin_take(api.app.state.services.store, group, person=person)
-            assert api.post(f"/api/v1/groups/{take.group}/hand-in").is_success
+            take = begin_annotation(api.app.state.services.store, group, person=person)
+            assert api.post(f"/api/v1/groups/{take.group}/submission").is_success
         (one,) = api.get(f"{DATASET}/agreement").json()["groups"]
         assert (one["state"], one["status"]) == ("agreed", "unreviewed")
         found = api.get(

@@ -9,7 +9,7 @@ from app.errors import ConflictError
 from app.features.audit.audit_events import adopt, adopted_by
 from app.features.groups.history import history
 from app.features.groups.replay import replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
 from app.features.jobs.queries import NewJob, insert_job, read_jobs
@@ -63,7 +63,7 @@ def test_the_work_of_before_is_shown_as_theirs_and_the_log_keeps_its_name(store:
     assert list_groups(store, 1, "reviewer:anna", 10, None, None).total == 1
 
     with store.read() as session:
-        assert replay(session) == read_ledger(session), "the log, its chain and the tables"
+        assert replay(session) == read_state_snapshot(session), "the log, its chain and the tables"
     with pytest.raises(ConflictError, match=r"shown as .* already"):
         adopt(store, anna, actor="ada")
     assert adopted_by(store) == "anna"

@@ -8,7 +8,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import InputError
-from app.features.audit.audit_events import record_deed
+from app.features.audit.audit_events import record_audit_event
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import KINDS, Family, every_entry, read_audit
 from app.features.batches.service import NewBatch, change_batch, make_batch, remove_batch
@@ -82,11 +82,11 @@ class TestAudit:
     def test_a_lead_reads_of_their_datasets_alone_rights_there_too(
         self, store: Store, said: int
     ) -> None:
-        lead = DatasetRoles(Role.NONE, {1: Role.LEAD}).led()
+        lead = DatasetRoles(Role.NONE, {1: Role.LEAD}).led_datasets()
         assert lines(store, sight=lead)[2] == "anna: bob: role in dataset (lead)"
         assert not any("logged in" in line for line in lines(store, sight=lead))
         for roles in (DatasetRoles(Role.REVIEWER), DatasetRoles(Role.LEAD, {1: Role.VIEWER})):
-            assert lines(store, sight=roles.led()) == []
+            assert lines(store, sight=roles.led_datasets()) == []
 
     def test_pages_follow_each_other_and_hold_each_entry_once(
         self, store: Store, said: int
@@ -169,5 +169,5 @@ class TestAudit:
         assert lines(store)[:3] == [f"bob: {verb} the batch “first look”" for verb in did]
 
     def test_what_has_no_words_of_its_own_names_its_person(self, store: Store, said: int) -> None:
-        record_deed(store, "bob", "webhook deleted", 1, url="https://hooks.example.org/")
+        record_audit_event(store, "bob", "webhook deleted", 1, url="https://hooks.example.org/")
         assert lines(store)[0] == "bob: webhook deleted: https://hooks.example.org/"

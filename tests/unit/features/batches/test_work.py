@@ -9,11 +9,11 @@ import pytest
 
 from app.db.session import Session
 from app.errors import ConflictError, HeldGroupError, InputError, NotFoundError
-from app.features.agreement.service import after_hand_in, weigh_left
+from app.features.agreement.service import after_submission, compare_left
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import read_audit
 from app.features.batches import leases as leases_module
-from app.features.batches.leases import LASTS, Lease, Leases, Worker
+from app.features.batches.leases import LASTS, BatchMember, Lease, Leases
 from app.features.batches.progress import my_work, team_work
 from app.features.batches.service import (
     NewBatch,
@@ -29,8 +29,8 @@ from app.features.batches.service import (
 from app.features.groups.replay import replay
 from app.features.groups.submit import load
 from app.features.independent_annotations.gold import mark, unmark
-from app.features.independent_annotations.queries import INDEPENDENT, take_of_copy
-from app.features.notifications.queries import read_rings
+from app.features.independent_annotations.queries import INDEPENDENT, annotation_of_copy
+from app.features.notifications.queries import select_notifications
 from app.features.people.queries import person_by_name
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -39,7 +39,7 @@ from app.features.queue.service import list_groups
 from app.features.verdicts.service import set_verdict
 from tests.unit.features.pending import stored_by
 
-ADA, BO, CY = (Worker(name) for name in ("ada", "bo", "cy"))
+ADA, BO, CY = (BatchMember(name) for name in ("ada", "bo", "cy"))
 NOTED = "looked at"
 
 
@@ -162,7 +162,9 @@ class TestGoldGroups:
         new = NewBatch("a", size=3, annotators=["ada"], gold_every=every)
         make_batch(store, dataset, new, actor="lead")
         with store.read() as session:
-            (ring,) = read_rings(session, person_by_name(session, "ada").id, EVERYTHING, "", 9)
+            (ring,) = select_notifications(
+                session, person_by_name(session, "ada").id, EVERYTHING, "", 9
+            )
         assert said in ring.sentence
 
 
@@ -186,7 +188,7 @@ class TestLeases:
 
     def test_no_group_is_given_to_two_of_many_who_ask_at_once(self, store, dataset, groups):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
-        people = [Worker(f"person{number}") for number in range(8)]
+        people = [BatchMember(f"person{number}") for number in range(8)]
         with ThreadPoolExecutor(8) as pool:
             given = list(pool.map(lambda one: Leases(store).next(batch, one).group, people))
         assert sorted(one for one in given if one) == sorted(groups)
@@ -249,17 +251,17 @@ class TestLeases:
         assert leases.next(batch, BO).group is None
         lease = leases.next(batch, ADA)
         assert (lease.group, lease.part) == (groups[0], Part.ANNOTATOR)
-        assert leases.hand_in(batch, groups[0], ADA, actor="ada").batch.handed_in == 1
+        assert leases.submit(batch, groups[0], ADA, actor="ada").batch.handed_in == 1
         assert leases.next(batch, ADA, after=groups[0]).group == groups[1]
         review = leases.next(batch, BO)
         assert (review.group, review.part) == (groups[0], Part.REVIEWER)
         with pytest.raises(ConflictError):
-            leases.hand_in(batch, groups[1], BO, actor="bo")
+            leases.submit(batch, groups[1], BO, actor="bo")
         with pytest.raises(ConflictError, match="given to others"):
             leases.next(batch, CY)
         with pytest.raises(NotFoundError):
             leases.take(batch, 99, BO)
-        leases.hand_in(batch, groups[0], ADA, actor="ada", done=False)
+        leases.submit(batch, groups[0], ADA, actor="ada", done=False)
         assert get_batch(store, batch).handed_in == 0
 
     @pytest.mark.parametrize("done", [True, False])
@@ -274,21 +276,21 @@ class TestLeases:
             kept.append((lease, read_batch(session, batch).handed_in))
 
         with stored_by(keep):
-            lease = leases.hand_in(batch, groups[0], ADA, actor="ada", done=done)
+            lease = leases.submit(batch, groups[0], ADA, actor="ada", done=done)
         assert kept == [(lease, int(done))]
 
     def test_what_is_handed_back_waits_for_its_annotator_first_and_says_why(
         self, store, dataset, groups, leases
     ):
         invite(store, "dan", Role.ANNOTATOR, actor="local")
-        dan = Worker("dan")
+        dan = BatchMember("dan")
         new = NewBatch("a", annotators=["ada", "dan"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
         with pytest.raises(ConflictError, match="is not submitted"):
-            leases.hand_back(batch, groups[3], BO, actor="bo")
-        leases.hand_in(batch, groups[3], ADA, actor="ada")
+            leases.return_group(batch, groups[3], BO, actor="bo")
+        leases.submit(batch, groups[3], ADA, actor="ada")
         assert leases.next(batch, BO).group == groups[3]
-        back = leases.hand_back(batch, groups[3], BO, "the far goal  line", actor="bo")
+        back = leases.return_group(batch, groups[3], BO, "the far goal  line", actor="bo")
         assert (back.batch.handed_in, back.here) == (0, ())
         (mine,) = my_work(store, lambda _: ADA)
         said = [(one.group, one.by, one.reason) for one in mine.handed_back]
@@ -296,7 +298,7 @@ class TestLeases:
         assert my_work(store, lambda _: dan)[0].handed_back == []
         with store.read() as session:
             person = person_by_name(session, "ada")
-            rings = read_rings(session, person.id, EVERYTHING, "", 9)
+            rings = select_notifications(session, person.id, EVERYTHING, "", 9)
         assert rings[0].sentence.endswith(" to you: the far goal line")
         told = read_audit(store, AuditQuery(), EVERYTHING).items[0]
         assert told.sentence == "returned to ada: the far goal line"
@@ -304,7 +306,7 @@ class TestLeases:
         assert leases.next(batch, dan, after=groups[2]).group == groups[4]
         lease = leases.next(batch, ADA)
         assert lease.group == groups[3] and lease.handed_back is not None
-        lease = leases.hand_in(batch, groups[3], ADA, actor="ada")
+        lease = leases.submit(batch, groups[3], ADA, actor="ada")
         assert lease.batch.handed_in == 1 and my_work(store, lambda _: ADA)[0].handed_back == []
         with store.read() as session:
             assert groups[3] in replay(session).groups
@@ -330,7 +332,7 @@ class TestLeases:
         while (copy := leases.next(batch, ADA).group) is not None:
             # What is left falls by one with each, whatever it is a copy of.
             assert [one.left for one in my_work(store, lambda _: ADA)] == [3 - had]
-            leases.hand_in(batch, copy, ADA, actor="ada")
+            leases.submit(batch, copy, ADA, actor="ada")
             had += 1
             (mine,) = my_work(store, lambda _: ADA)
             seen = mine.batch
@@ -344,13 +346,13 @@ class TestLeases:
         assert get_batch(store, batch).handed_in == 2
         found = leases.next(batch, BO)
         assert (found.group, found.part, found.handed_in_by) == (groups[0], Part.REVIEWER, "ada")
-        leases.hand_back(batch, groups[0], BO, "too wide", actor="bo")
+        leases.return_group(batch, groups[0], BO, "too wide", actor="bo")
         (mine,) = my_work(store, lambda _: ADA)
         assert (mine.left, [one.group for one in mine.handed_back]) == (1, [groups[0]])
         assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
         back = leases.next(batch, ADA)
         assert (back.group, back.handed_back.reason) == (groups[0], "too wide")
-        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        leases.submit(batch, groups[0], ADA, actor="ada")
         assert leases.next(batch, ADA).group is None
         judge(store, groups[0], "bo")
         assert leases.next(batch, BO).group == groups[1]
@@ -366,10 +368,10 @@ class TestLeases:
         while not ordinary:
             copy = leases.next(batch, ADA).group
             with store.read() as session:
-                ordinary = take_of_copy(session, copy).kind == INDEPENDENT
-            leases.hand_in(batch, copy, ADA, actor="ada")
+                ordinary = annotation_of_copy(session, copy).kind == INDEPENDENT
+            leases.submit(batch, copy, ADA, actor="ada")
         assert get_batch(store, batch).handed_in == 0
-        weigh_left(store)
+        compare_left(store)
         assert get_batch(store, batch).handed_in == 1
 
     def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, groups, leases):
@@ -394,25 +396,25 @@ class TestLeases:
 
         monkeypatch.setattr(leases_module, "own_of", closing)
         with pytest.raises(ConflictError, match="closed"):
-            leases.hand_in(batch, groups[0], ADA, actor="ada")
+            leases.submit(batch, groups[0], ADA, actor="ada")
 
     @pytest.mark.parametrize("done", [True, False])
     def test_what_somebody_else_handed_in_stays_theirs(self, store, dataset, groups, leases, done):
         new = NewBatch("a", annotators=["ada", "bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        leases.submit(batch, groups[0], ADA, actor="ada")
         with pytest.raises(ConflictError, match="ada has submitted this group"):
-            leases.hand_in(batch, groups[0], BO, actor="bo", done=done)
+            leases.submit(batch, groups[0], BO, actor="bo", done=done)
         (row,) = [one for one in list_batch_groups(store, batch) if one.group == groups[0]]
         assert row.handed_in_by == "ada"
 
     def test_a_group_that_was_judged_is_not_handed_back(self, store, dataset, groups, leases):
         new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        leases.submit(batch, groups[0], ADA, actor="ada")
         judge(store, groups[0], "bo")
         with pytest.raises(ConflictError, match="judged"):
-            leases.hand_back(batch, groups[0], BO, "once more", actor="bo")
+            leases.return_group(batch, groups[0], BO, "once more", actor="bo")
 
 
 class TestOwnPlace:
@@ -447,7 +449,7 @@ class TestProgress:
     def test_work_is_of_those_to_whom_it_is_given(self, store, dataset, groups, leases):
         new = NewBatch("a", size=3, annotators=["ada"], reviewers=["bo"])
         batch = make_batch(store, dataset, new, actor="lead").id
-        leases.hand_in(batch, groups[0], ADA, actor="ada")
+        leases.submit(batch, groups[0], ADA, actor="ada")
         left = {
             one.name: [(item.parts, item.left) for item in my_work(store, lambda _, one=one: one)]
             for one in (ADA, BO, CY)
@@ -461,7 +463,7 @@ class TestProgress:
         batch = make_batch(store, dataset, new, actor="lead").id
         for minutes, group in ((1, groups[0]), (4, groups[1]), (90, groups[2]), (96, groups[3])):
             at = clock.at + timedelta(minutes=minutes)
-            Leases(store, lambda at=at: at).hand_in(batch, group, ADA, actor="ada")
+            Leases(store, lambda at=at: at).submit(batch, group, ADA, actor="ada")
         (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
         (pace,) = team.people
         assert (pace.name, pace.handed_in, pace.minutes) == ("ada", 4, pytest.approx(9))
@@ -493,7 +495,7 @@ class TestProgress:
             "app.features.independent_annotations.adopt.now",
             lambda: (clock.at + timedelta(minutes=9)).isoformat(),
         )
-        assert after_hand_in(store, copies[20]) == "agreed"
+        assert after_submission(store, copies[20]) == "agreed"
         (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
         assert (team.people[0].groups, team.people[0].minutes) == (2, pytest.approx(4))
         (later,) = team_work(store, dataset, at=clock.at + timedelta(hours=25))

@@ -12,8 +12,8 @@ from app.features.comments import service as comments
 from app.features.groups.history import history
 from app.features.groups.replay import rebuild
 from app.features.groups.state import read_etags
-from app.features.notifications.queries import RingKind
-from app.features.notifications.service import read_all, read_bell, tell
+from app.features.notifications.queries import NotificationKind
+from app.features.notifications.service import notify, read_all, read_notifications
 from app.features.people.logins import Login, read_roles
 from app.features.people.members import give_role
 from app.features.people.queries import person_by_name
@@ -44,7 +44,7 @@ def login(store: Store, name: str) -> Login:
 
 def told(store: Store, name: str) -> list[str]:
     """Why somebody was told something, the newest first."""
-    return [ring.kind for ring in read_bell(store, login(store, name)).items]
+    return [ring.kind for ring in read_notifications(store, login(store, name)).items]
 
 
 def found(store: Store, query: str) -> int:
@@ -219,21 +219,21 @@ class TestBell:
     ) -> None:
         comments.begin_thread(store, group, "@bob look", actor="anna")
         bob = login(store, "bob")
-        assert read_bell(store, bob).unread == 1
+        assert read_notifications(store, bob).unread == 1
         give_role(store, "demo", bob.person_id, Role.NONE, actor="local")
-        bell = read_bell(store, login(store, "bob"))
+        bell = read_notifications(store, login(store, "bob"))
         assert (bell.items, bell.unread) == ([], 0)
 
     def test_it_is_ones_own_and_what_is_read_stays_read(self, store: Store, group: int) -> None:
         comments.begin_thread(store, group, "@bob @anna look", actor="local")
         bob, anna = login(store, "bob"), login(store, "anna")
-        (ring,) = read_bell(store, bob).items
+        (ring,) = read_notifications(store, bob).items
         assert ring.sentence.startswith("local mentioned you in ")
         assert ring.address.startswith(f"/review/{group}?thread=")
         read_all(store, anna, [ring.id])
-        assert read_bell(store, bob).unread == 1
+        assert read_notifications(store, bob).unread == 1
         assert read_all(store, bob, [ring.id]).unread == 0
-        assert read_bell(store, anna).unread == 1
+        assert read_notifications(store, anna).unread == 1
 
     def test_nobody_is_told_who_is_disabled_or_did_it_themselves(
         self, store: Store, group: int
@@ -242,7 +242,7 @@ class TestBell:
         change_person(store, bob, actor="local", disabled=True)
 
         def ring(session: Session, person: str, actor: str) -> bool:
-            return tell(session, person, RingKind.ASSIGNED, "x", actor=actor, address="/")
+            return notify(session, person, NotificationKind.ASSIGNED, "x", actor=actor, address="/")
 
         with store.write() as session:
             assert not ring(session, "bob", "local")

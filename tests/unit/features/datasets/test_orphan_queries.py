@@ -4,7 +4,7 @@ import pytest
 from sqlalchemy import insert, text
 
 from app.db.store import Store
-from app.features.datasets.orphan_queries import delete_calibrations, spare_calibrations
+from app.features.datasets.orphan_queries import delete_calibrations, unused_calibrations
 from app.features.datasets.queries import delete_solutions, solutions_of
 from app.features.solutions.queries import known_calibrations
 from app.features.solutions.tables import CalibrationModel, SolutionModel
@@ -28,11 +28,11 @@ def solved(filled: Store) -> Store:
 class TestSpareCalibrations:
     def test_a_calibration_stays_while_a_solution_names_it(self, solved: Store) -> None:
         with solved.write() as session:
-            assert spare_calibrations(session) == []
+            assert unused_calibrations(session) == []
             found = [sorted(solutions_of(session, group)) for group in (1, 2)]
             assert found == [[1, 2], []]
             delete_solutions(session, [1])
-            assert spare_calibrations(session) == ["a"]
+            assert unused_calibrations(session) == ["a"]
             assert delete_calibrations(session, KEYS[:2]) == 1
             assert known_calibrations(session, KEYS) == {"b", "c"}
 
@@ -46,4 +46,4 @@ class TestSpareCalibrations:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
             session.execute(text("UPDATE queue SET solved = false"))
-            assert (spare_calibrations(session), delete_calibrations(session, KEYS)) == ([], 0)
+            assert (unused_calibrations(session), delete_calibrations(session, KEYS)) == ([], 0)

@@ -14,10 +14,10 @@ from app.features.datasets.service import delete_dataset, get_dataset, list_data
 from app.features.groups.edit import SetBall
 from app.features.groups.history import history
 from app.features.groups.replay import rebuild, replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
-from app.features.imports.spare import SpareFrame, ingest_spare
+from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins, read_roles
 from app.features.people.members import give_role
@@ -51,8 +51,8 @@ def two(store: Store, once, fill, make_group, make_static) -> Store:
         ingest(
             store, "demo", [replace(make_group(7), label="new"), changed], source="b", actor="ann"
         )
-        spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-        ingest_spare(store, "demo", spare, source="spare", actor="ann")
+        spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+        ingest_unassigned(store, "demo", spare, source="spare", actor="ann")
         give_verdicts(store, 1, "", "deferred", actor="ben")
         save_view(store, 1, "All", "", actor="ben")
         ingest(store, "other", [make_group(7), make_group(9)], source="test", actor="ann")
@@ -107,7 +107,7 @@ class TestDeleteDataset:
         assert log_entries(two) == [*before, ("dataset_deleted", 1)]
         with two.read() as session:
             assert verify_chain(session) == len(before) + 1
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
         assert rebuild(two) == 2
 
     def test_no_id_is_given_again(self, two: Store, make_group) -> None:
@@ -123,7 +123,7 @@ class TestDeleteDataset:
         with pytest.raises(NotFoundError):
             load(two, old[0])
         with two.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_calibrations_that_the_other_dataset_uses_stay(self, two: Store) -> None:
         assert rows(two, "calibration") == 3
@@ -159,7 +159,7 @@ class TestDeleteDataset:
             delete_dataset(two, "demo", confirm="demo", actor="eve")
         monkeypatch.undo()
         with two.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
         solve_dataset(two, "demo")
         assert get_dataset(two, "demo").solved == 3
         delete_dataset(two, "demo", confirm="demo", actor="eve")
@@ -180,7 +180,7 @@ class TestDeleteDataset:
             assert [row.url for row in webhooks_of(session, made.id)] == ["https://a.example"]
         with two.read() as session:
             assert read_roles(session, person.id, Role.VIEWER).single == {3: Role.NONE}
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
             assert dialect_in(session).count_lost_references(session) == 0
         assert [one.dataset for one in AccessTokens(two).of_person(person.id)] == ["demo"]
 

@@ -6,7 +6,7 @@ from sqlalchemy import insert, literal, select, update
 from app.db.log import Entry, append
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel, GroupModel
-from app.features.exports.queries import exported_groups, left_out_groups, newest_word
+from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
 from app.features.queue.tables import QueueModel
 from app.features.solutions.tables import SolutionModel
 from app.soccer.solution import SOLVER_VERSION
@@ -68,7 +68,7 @@ class TestExportedGroups:
 class TestNewestWord:
     def test_freezing_does_not_count_as_a_change(self, filled) -> None:
         with filled.write() as session:
-            assert newest_word(session, 1) is None
+            assert newest_entry_time(session, 1) is None
             append(session, [Entry("edit", "ann", "2026-01-02", {}, 1)])
             append(session, [Entry("freeze", "ann", "2026-01-03", {}, 1)])
-            assert newest_word(session, 1) == "2026-01-02"
+            assert newest_entry_time(session, 1) == "2026-01-02"

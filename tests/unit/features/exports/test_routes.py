@@ -19,7 +19,7 @@ from app.features.imports.ingest import ingest
 from app.features.jobs import run as job_run
 from app.features.jobs.service import Jobs
 from app.features.solutions.service import solve_dataset
-from app.features.upkeep.service import tidy
+from app.features.upkeep.service import clean_up
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.formats.export_formats import FORMATS
 from app.media.frames import SentPicture
@@ -266,7 +266,7 @@ class TestExpiry:
     def test_they_stay_where_nothing_is_set(self, app, api) -> None:
         job = api.post(API, json=ORDER).json()
         assert api.get(f"{API}/{job['id']}").json()["expires"] is None
-        assert tidy(app.state.services.store).expired_exports == 0
+        assert clean_up(app.state.services.store).expired_exports == 0
         assert api.get(job["content"]).status_code == 200
 
     def test_an_expired_export_stays_listed_says_so_and_can_be_made_again(
@@ -284,7 +284,7 @@ class TestExpiry:
         record = exports.folder / f"{job['id']}.json"
         values = {**json.loads(record.read_bytes()), "created": "2020-01-01T00:00:00.000+00:00"}
         record.write_text(json.dumps(values))
-        assert tidy(app.state.services.store).expired_exports == 1
+        assert clean_up(app.state.services.store).expired_exports == 1
         (row,) = api.get(API).json()["items"]
         assert (row["state"], row["status"]) == ("expired", "expired")
         assert (row["content"], row["expires"]) == (None, None)

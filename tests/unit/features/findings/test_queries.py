@@ -3,7 +3,7 @@ from __future__ import annotations
 from app.features.findings.queries import (
     add_group_findings,
     group_findings,
-    groups_told,
+    groups_with_finding,
     replace_group_findings,
     replace_station_finding,
     station_finding,
@@ -29,10 +29,10 @@ class TestGroupsTold:
     def test_a_sentence_about_one_view_is_not_about_the_group(self, filled) -> None:
         with filled.write() as session:
             add_group_findings(session, "upstream", [(1, "7.png", "gone")])
-            assert groups_told(session, [1, 2], "gone") == set()
+            assert groups_with_finding(session, [1, 2], "gone") == set()
             add_group_findings(session, "upstream", [(1, None, "gone")])
-            assert groups_told(session, [1, 2], "gone") == {1}
-            assert groups_told(session, [2], "gone") == set()
+            assert groups_with_finding(session, [1, 2], "gone") == {1}
+            assert groups_with_finding(session, [2], "gone") == set()
 
 
 class TestStationFinding:

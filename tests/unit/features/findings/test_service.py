@@ -22,7 +22,7 @@ from app.features.groups.history import history
 from app.features.groups.replay import rebuild
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
-from app.features.queue.queries import rows_apart
+from app.features.queue.queries import differing_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
@@ -136,7 +136,7 @@ class TestSetDismissal:
         assert rebuild(store) == 1
         assert list_groups(store, found.dataset_id, "finding:none dismissed:any").total == 1
         with store.read() as session:
-            assert rows_apart(session)[1] == []
+            assert differing_rows(session)[1] == []
 
     def test_an_edit_that_changes_what_it_says_opens_it_again(self, store, found) -> None:
         after = all_of(store, found)
@@ -149,7 +149,7 @@ class TestSetDismissal:
         (row,) = list_groups(store, found.dataset_id, "finding:any").items
         assert row.findings
         with store.read() as session:
-            assert rows_apart(session)[1] == []
+            assert differing_rows(session)[1] == []
 
     def test_who_saw_another_state_is_refused(self, store, found) -> None:
         dismiss(store, found, first(found))

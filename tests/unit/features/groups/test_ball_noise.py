@@ -10,11 +10,11 @@ from app.db.log import read_log
 from app.db.store import Store
 from app.features.groups import group_edits
 from app.features.groups.ball_noise import give_factors, read_placed, with_noise
-from app.features.groups.edit import SetBall, SetBalls, Several
+from app.features.groups.edit import CompositeEdit, SetBall, SetBalls
 from app.features.groups.history import history
 from app.features.groups.submit import load, preview, solved, submit, submit_all
 from app.features.groups.undo import undo
-from app.features.imports.edits_export import carried_group
+from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import ingest
 from app.features.match_estimates.queries import (
     NOISE,
@@ -98,7 +98,7 @@ class TestGiveFactors:
         ingest(store, "demo", [replace(group, views=views, label="again")], source="b", actor="ann")
         assert load(store, static).group.label == "again"
         assert set(noise(store, static).values()) == {2.0}
-        assert "noise" not in str(carried_group(load(store, static).group)["views"])
+        assert "noise" not in str(group_to_merge(load(store, static).group)["views"])
 
     def test_who_placed_a_ball_last_counts_and_a_prediction_is_nobodys(
         self, store: Store, static: int
@@ -153,7 +153,7 @@ class TestWithNoise:
         group = make_static(10)
         one, two = SetBall("cam2", BALL), SetBalls("cam1", (BALL,))
         assert with_noise(FACTORS, group, one, "ann") == replace(one, noise=4.0)
-        assert with_noise(FACTORS, group, Several((one, two)), "ann") == Several(
+        assert with_noise(FACTORS, group, CompositeEdit((one, two)), "ann") == CompositeEdit(
             (replace(one, noise=4.0), replace(two, noise=1.5))
         )
         moving = group.view("cam2")

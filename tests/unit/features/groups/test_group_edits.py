@@ -44,7 +44,7 @@ class TestGiveEdits:
 
     def test_what_changes_nothing_leaves_no_trace_but_where_more_is_said(self, store, ids) -> None:
         before = {number: (load(store, number).etag, len(history(store, number))) for number in ids}
-        assert give(store, ids, lambda some: dict.fromkeys(some, USUAL), told=ids[1]) == 1
+        assert give(store, ids, lambda some: dict.fromkeys(some, USUAL), always_logged=ids[1]) == 1
         for number in ids:
             etag, entries = before[number]
             assert len(history(store, number)) == entries + (number == ids[1])

@@ -12,17 +12,17 @@ from app.features.groups.digest import group_inputs_hash, source_hash
 from app.features.groups.edit import IncludeView, SetBall, SetLines
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.replay import rebuild, replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import redo, undo
 from app.features.imports.ingest import ingest
-from app.features.imports.merge import carry_in
+from app.features.imports.merge import merge_edits
 from app.features.queue.queries import refresh_queue
 from app.features.queue.service import list_groups
 from app.features.verdicts.bulk import give_verdicts
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze
-from app.features.versions.frozen_queries import freeze_said
+from app.features.versions.frozen_queries import freeze_annotations
 from app.features.versions.verify import verify
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
@@ -106,7 +106,7 @@ class TestUndo:
     def test_the_log_alone_gives_it_again(self, store, state) -> None:
         change(store, LEAVE)
         with store.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
         rebuild(store)
         assert why(store) == WHY
 
@@ -129,7 +129,7 @@ class TestDigests:
 
     def test_groups_without_a_reason_are_frozen_without_that_field(self, make_group) -> None:
         group = IncludeView("7_1.png", False).apply(make_group(7))
-        assert "left_out" not in "".join(freeze_said(group).texts.values())
+        assert "left_out" not in "".join(freeze_annotations(group).texts.values())
         assert source_hash(group) != source_hash(LEAVE.apply(make_group(7)))
 
 
@@ -216,5 +216,5 @@ class TestCarried:
         export(store, "demo", "touchline", tmp_path / "carried.zip")
         report = Report()
         carried = tmp_path / "carried.zip"
-        carry_in(there, "demo", carried, report, DEFAULT_LIMITS, source="here", actor="zoe")
+        merge_edits(there, "demo", carried, report, DEFAULT_LIMITS, source="here", actor="zoe")
         assert (why(there), report.problems) == (WHY, [])

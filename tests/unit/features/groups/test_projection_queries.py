@@ -8,12 +8,12 @@ from app.features.datasets.tables import GroupModel, ImportFindingModel, Station
 from app.features.groups.projection_queries import (
     all_groups,
     all_noticed,
-    all_spare,
     all_stations,
+    all_unassigned,
     all_verdicts,
     rewrite,
 )
-from app.features.groups.queries import put_spare
+from app.features.groups.queries import put_unassigned
 from app.features.paint.proposal_queries import Proposal, read_proposals, save_proposals
 from app.features.predictions.tables import PredictionModel, PredictionSetModel
 from app.features.verdicts.queries import StoredVerdict, insert_verdicts
@@ -29,7 +29,7 @@ class TestAll:
     def test_everything_that_the_log_can_make_anew_is_read(self, filled: Store, full_group) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
-            put_spare(session, 1, {("cam1", "99"): b"x"})
+            put_unassigned(session, 1, {("cam1", "99"): b"x"})
             said = {"group_id": 1, "kind": "edited", "sentence": "kept"}
             session.execute(insert(ImportFindingModel), [said])
         with filled.read() as session:
@@ -38,7 +38,7 @@ class TestAll:
             assert [item.group for item in all_groups(session)] == [full_group]
             (verdict,) = all_verdicts(session)
             assert {**verdict, "id": 7} == vars(VERDICT)
-            assert [(row.camera, row.frame) for row in all_spare(session)] == [("cam1", "99")]
+            assert [(row.camera, row.frame) for row in all_unassigned(session)] == [("cam1", "99")]
             assert [row.sentence for row in all_noticed(session)] == ["kept"]
 
 
@@ -54,13 +54,15 @@ class TestRewrite:
     def test_rows_are_replaced_while_verdicts_refer_to_them(self, filled: Store) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
-            put_spare(session, 1, {("cam1", "99"): b"x"})
+            put_unassigned(session, 1, {("cam1", "99"): b"x"})
             stations, groups, views = whole(session)
             label = [{**row, "label": "anew"} for row in groups]
-            rewrite(session, stations=stations, groups=label, views=views, noticed=[], spare=[])
+            rewrite(
+                session, stations=stations, groups=label, views=views, noticed=[], unassigned=[]
+            )
         with filled.read() as session:
             assert [item.group.label for item in all_groups(session)] == ["anew"]
-            assert list(all_spare(session)) == []
+            assert list(all_unassigned(session)) == []
             assert len(list(all_verdicts(session))) == 1
             assert dialect_in(session).count_lost_references(session) == 0
 
@@ -80,7 +82,12 @@ class TestRewrite:
             session.execute(insert(PredictionModel), [{**box, "view_id": item} for item in ids])
             before = session.execute(select(*PredictionModel.__table__.columns)).all()
             rewrite(
-                session, stations=stations, groups=groups, views=views[1:], noticed=[], spare=[]
+                session,
+                stations=stations,
+                groups=groups,
+                views=views[1:],
+                noticed=[],
+                unassigned=[],
             )
         with filled.read() as session:
             assert read_proposals(session, ids) == {item: proposal(item) for item in ids[1:]}

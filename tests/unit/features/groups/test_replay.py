@@ -10,12 +10,12 @@ from app.errors import StorageError
 from app.features.groups.ball_noise import give_factors
 from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.features.groups.replay import rebuild, replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import redo, undo
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import ingest
-from app.features.imports.spare import SpareFrame, ingest_spare
+from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.features.match_estimates.queries import Factor
 from app.features.policies.service import change_policy
 from app.features.stations.service import load_station, submit_station, undo_station
@@ -60,8 +60,8 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
     ingest_cameras(
         store, "demo", {"8_1": opposite, "cam2": opposite}, source="cameras", actor="ann"
     )
-    spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-    ingest_spare(store, "demo", spare, source="spare", actor="ann")
+    spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+    ingest_unassigned(store, "demo", spare, source="spare", actor="ann")
     change_policy(store, "demo", STRICT, if_match=None, actor="ann")
     return store
 
@@ -85,7 +85,7 @@ def _import_changed(store: Store, make_group, make_static) -> None:
 class TestReplay:
     def test_the_log_alone_gives_the_state_of_the_tables(self, busy: Store) -> None:
         with busy.read() as session:
-            replayed, present = replay(session), read_ledger(session)
+            replayed, present = replay(session), read_state_snapshot(session)
         assert replayed.groups == present.groups
         assert replayed.stations == present.stations
         assert replayed.verdicts == present.verdicts
@@ -103,7 +103,7 @@ class TestReplay:
         with busy.write() as session:
             session.execute(text("UPDATE view SET included = NOT included WHERE key = '8.png'"))
         with busy.read() as session:
-            assert replay(session) != read_ledger(session)
+            assert replay(session) != read_state_snapshot(session)
 
     def test_a_log_that_was_tampered_with_is_refused(self, busy: Store) -> None:
         with busy.write() as session, said_for_sqlite(session):
@@ -116,7 +116,7 @@ class TestReplay:
 class TestRebuild:
     def test_lost_tables_come_back(self, busy: Store) -> None:
         with busy.read() as session:
-            before = read_ledger(session)
+            before = read_state_snapshot(session)
             queue = session.execute(text("SELECT * FROM queue ORDER BY group_id")).all()
         with busy.write() as session:
             session.execute(text("DELETE FROM queue"))
@@ -124,6 +124,6 @@ class TestRebuild:
             session.execute(text("UPDATE station SET lines = '{}'"))
         assert rebuild(busy) == 4
         with busy.read() as session:
-            assert read_ledger(session) == before
+            assert read_state_snapshot(session) == before
             again = session.execute(text("SELECT * FROM queue ORDER BY group_id")).all()
         assert again == queue

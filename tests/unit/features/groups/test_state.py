@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from app.db.store import Store
 from app.features.groups.edit import IncludeView, SetStationLines
-from app.features.groups.state import GroupState, Head, group_etag, read_etags, read_head, said_of
+from app.features.groups.state import (
+    GroupState,
+    Head,
+    content_tag_of,
+    group_etag,
+    read_etags,
+    read_head,
+)
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
 from app.features.imports.ingest import ingest
@@ -51,7 +58,7 @@ class TestReadEtags:
         after = load(store, one)
         assert etags_of(store, one) == {one: after.etag} != {one: before.etag}
         # What was said is the same: an edit of another view still goes through.
-        assert said_of(after.etag) == said_of(before.etag)
+        assert content_tag_of(after.etag) == content_tag_of(before.etag)
 
     def test_other_thresholds_under_the_same_name_are_another(self) -> None:
         etags = {group_etag("said", policy, "custom", (), 0) for policy in ("one", "two")}

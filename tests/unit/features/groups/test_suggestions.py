@@ -4,7 +4,7 @@ import numpy as np
 
 from app.features.groups import suggestions as remedies
 from app.features.groups.suggested_edits import edit_of_fix, influences
-from app.features.groups.suggestions import find_remedies
+from app.features.groups.suggestions import find_suggestions
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.finding import Finding, Fix
 from app.soccer.frames import ImagePoint
@@ -32,7 +32,7 @@ class TestFindRemedies:
         good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
         solution = solve(good, PAPER)
         assert solution.passes
-        assert find_remedies(good, PAPER, solution) == []
+        assert find_suggestions(good, PAPER, solution) == []
 
     def bad_point(self):
         """A group that one bad point keeps from passing, and the policy that asks for more."""
@@ -45,7 +45,7 @@ class TestFindRemedies:
         bad, policy = self.bad_point()
         solution = solve(bad, policy)
         assert solution.first_failing.name == "jac"
-        remedies = find_remedies(bad, policy, solution)
+        remedies = find_suggestions(bad, policy, solution)
         assert remedies[0].passes
         assert remedies[0].fix.action == "move_point"
         for remedy in remedies:
@@ -56,7 +56,7 @@ class TestFindRemedies:
 
     def test_the_sentence_names_the_point_and_how_far_it_moves(self):
         bad, policy = self.bad_point()
-        best = find_remedies(bad, policy, solve(bad, policy))[0]
+        best = find_suggestions(bad, policy, solve(bad, policy))[0]
         marking = sorted(bad.views[1].station.lines)[0]
         assert best.sentence.startswith(f"point 2 of {marking} in B moved ")
 
@@ -70,14 +70,14 @@ class TestFindRemedies:
         bad = self.with_ball_off(38.0)
         solution = solve(bad, PAPER)
         assert solution.first_failing.name == "reprojection"
-        remedies = find_remedies(bad, PAPER, solution)
+        remedies = find_suggestions(bad, PAPER, solution)
         assert remedies
         assert {remedy.fix.action for remedy in remedies} == {"look_ball"}
         assert all(remedy.passes for remedy in remedies)
 
     def test_no_remedy_puts_a_ball_onto_the_ray_that_would_then_confirm_it(self):
         bad = self.with_ball_off(40.0)
-        (remedy,) = find_remedies(bad, PAPER, solve(bad, PAPER))
+        (remedy,) = find_suggestions(bad, PAPER, solve(bad, PAPER))
         assert (remedy.fix.action, remedy.passes) == ("look_ball", True)
         assert edit_of_fix(bad, remedy.fix, remedy.point) is None
 
@@ -85,14 +85,14 @@ class TestFindRemedies:
         bad = self.with_ball_off(440.0)
         solution = solve(bad, PAPER)
         assert solution.first_failing.name == "reprojection"
-        assert find_remedies(bad, PAPER, solution) == []
+        assert find_suggestions(bad, PAPER, solution) == []
 
     def test_no_ball_is_looked_for_where_a_better_cause_is_known(self):
         bad = self.with_ball_off(40.0)
         solution = solve(bad, PAPER)
         swapped = Finding("sides_swapped", "Left is right.", "b", fix=Fix("swap_sides", "b"))
         known = replace(solution, findings=(swapped,))
-        actions = {remedy.fix.action for remedy in find_remedies(bad, PAPER, known)}
+        actions = {remedy.fix.action for remedy in find_suggestions(bad, PAPER, known)}
         assert "look_ball" not in actions
 
     def undrawn(self):
@@ -111,7 +111,7 @@ class TestFindRemedies:
         bad, policy, missing = self.undrawn()
         solution = solve(bad, policy)
         assert solution.first_failing.name == "jac"
-        best = find_remedies(bad, policy, solution)[0]
+        best = find_suggestions(bad, policy, solution)[0]
         assert (best.fix.action, best.fix.view, best.passes) == ("draw_marking", "b", True)
         assert all(marking in best.sentence for marking in missing)
         assert "visible over" in best.sentence
@@ -127,7 +127,7 @@ class TestFindRemedies:
         """Two clicks anywhere on a stub of a pixel would pass as well."""
         bad, policy, missing = self.undrawn()
         monkeypatch.setattr(remedies, "STUB_PX", 2000.0)
-        found = find_remedies(bad, policy, solve(bad, policy))
+        found = find_suggestions(bad, policy, solve(bad, policy))
         hides = [remedy for remedy in found if remedy.fix.action == "hide_marking"]
         hidden = sorted(remedy.fix.marking for remedy in hides)
         assert hidden == sorted(self.lengths(bad, policy)) and {*missing} <= {*hidden}
@@ -142,7 +142,7 @@ class TestFindRemedies:
 
     def test_stubs_are_those_of_less_than_five_pixels(self):
         bad, policy, _ = self.undrawn()
-        found = find_remedies(bad, policy, solve(bad, policy))
+        found = find_suggestions(bad, policy, solve(bad, policy))
         hidden = {one.fix.marking for one in found if one.fix.action == "hide_marking"}
         short = {name for name, length in self.lengths(bad, policy).items() if length < 5.0}
         assert hidden == short != set()
@@ -155,7 +155,7 @@ class TestFindRemedies:
         suspects = tuple(Suspect("Middle line", name, 0.9, 50.0) for name in missing)
         doubted = replace(seen, calibration=replace(seen.calibration, suspects=suspects))
         views = tuple(doubted if one is seen else one for one in solution.views)
-        remedies = find_remedies(bad, policy, replace(solution, views=views))
+        remedies = find_suggestions(bad, policy, replace(solution, views=views))
         sentences = " ".join(remedy.sentence for remedy in remedies)
         assert not any(f"{marking} (visible" in sentences for marking in missing)
 
@@ -164,7 +164,7 @@ class TestFindRemedies:
         bad = good.with_view(replace(good.views[1], included=False))
         solution = solve(bad, PAPER)
         assert solution.first_failing.name == "two_views"
-        (remedy,) = find_remedies(bad, PAPER, solution)
+        (remedy,) = find_suggestions(bad, PAPER, solution)
         assert (remedy.fix, remedy.passes) == (Fix("include_view", "b"), True)
         assert "B left out by a person" in solution.first_failing.sentence
 

@@ -7,12 +7,12 @@ from functools import reduce
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.features.groups.undo_stacks import Stacks, _stacks_of, _upper_part
+from app.features.groups.undo_stacks import UndoStacks, _stacks_of, _stacks_of_newest
 
 
 def possible(kinds: list[str]) -> list[tuple[str, int]]:
     """The steps of some kinds that can follow each other, under the ids of their entries."""
-    stacks, steps = Stacks(), []
+    stacks, steps = UndoStacks(), []
     for number, kind in enumerate(kinds, start=1):
         if (kind == "undo" and not stacks.can_undo) or (kind == "redo" and not stacks.can_redo):
             continue
@@ -25,11 +25,13 @@ class TestStacksOf:
     @settings(deadline=None, derandomize=True)
     @given(st.lists(st.sampled_from(["edit", "undo", "redo"])).map(possible))
     def test_is_one_step_after_the_other(self, steps: list[tuple[str, int]]) -> None:
-        one_by_one = reduce(lambda stacks, step: stacks.then(*step), steps, Stacks())
+        one_by_one = reduce(lambda stacks, step: stacks.then(*step), steps, UndoStacks())
         assert _stacks_of(steps) == one_by_one
 
     def test_a_fresh_edit_clears_what_was_undone(self) -> None:
-        assert _stacks_of([("edit", 1), ("edit", 2), ("undo", 3), ("edit", 4)]) == Stacks((1, 4))
+        assert _stacks_of([("edit", 1), ("edit", 2), ("undo", 3), ("edit", 4)]) == UndoStacks(
+            (1, 4)
+        )
 
 
 class TestUpperPart:
@@ -41,15 +43,15 @@ class TestUpperPart:
     def test_the_newest_steps_tell_the_same_as_all_or_nothing(
         self, steps: list[tuple[str, int]], count: int
     ) -> None:
-        whole, upper = _stacks_of(steps), _upper_part(steps[-count:])
+        whole, upper = _stacks_of(steps), _stacks_of_newest(steps[-count:])
         if upper is not None:
             assert upper.undone == whole.undone
             assert upper.done == whole.done[-len(upper.done) :]
             assert len(upper.done) > 1
 
     def test_two_edits_suffice(self) -> None:
-        assert _upper_part([("redo", 7), ("edit", 8), ("edit", 9)]) == Stacks((8, 9))
+        assert _stacks_of_newest([("redo", 7), ("edit", 8), ("edit", 9)]) == UndoStacks((8, 9))
 
     def test_what_an_undo_reached_below_is_not_guessed(self) -> None:
-        assert _upper_part([("edit", 8), ("undo", 9), ("undo", 10)]) is None
-        assert _upper_part([("undo", 9), ("undo", 10)]) is None
+        assert _stacks_of_newest([("edit", 8), ("undo", 9), ("undo", 10)]) is None
+        assert _stacks_of_newest([("undo", 9), ("undo", 10)]) is None

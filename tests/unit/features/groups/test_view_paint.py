@@ -12,7 +12,7 @@ from app.errors import OverloadedError
 from app.features.groups.edit import SetBall, SetLines
 from app.features.groups.history import history
 from app.features.groups.replay import rebuild, replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, preview, submit
 from app.features.groups.undo import redo, undo
 from app.features.groups.view_paint import PaintFollower
@@ -98,7 +98,7 @@ class TestFollow:
     def test_the_log_tells_it_again(self, painted, paint):
         change(painted, paint, without_a_line(painted))
         with painted.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
         before = load(painted, 1).stored
         rebuild(painted)
         assert load(painted, 1).stored == before

@@ -4,7 +4,7 @@ import pytest
 
 from app.features.groups.edit import SetBall
 from app.features.groups.replay import replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.body import GONE
 from app.features.imports.ingest import ingest
@@ -65,4 +65,4 @@ class TestNoteGone:
         state = load(store, three[1])
         assert (state.group.view("8.png").ball, state.stored.edited_views) == (ball, {"8.png"})
         with store.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)

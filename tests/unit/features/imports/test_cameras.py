@@ -11,7 +11,7 @@ from app.features.datasets.service import get_dataset
 from app.features.exports.service import export
 from app.features.groups.edit import SetLines, SetStationCamera
 from app.features.groups.replay import replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import ingest
@@ -86,7 +86,7 @@ class TestIngestCameras:
             station = after.group.view("7_1.png").station
             assert station.given_covariance == pytest.approx(known, rel=1e-9)
             with store.read() as session:
-                assert replay(session) == read_ledger(session)
+                assert replay(session) == read_state_snapshot(session)
             sigmas.append(after.solution.ball.sigma_m)
         assert sigmas[1] > 2 * sigmas[0]
         export(store, "demo", "cameras", tmp_path / "out", everything=True)

@@ -24,14 +24,14 @@ from app.features.groups.edit import (
 )
 from app.features.groups.history import history
 from app.features.groups.replay import replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.edits_export import GROUPS, STATIONS
 from app.features.imports.ingest import ingest
-from app.features.imports.merge import carry_in
-from app.features.imports.spare import SpareFrame, ingest_spare, spare_frames
+from app.features.imports.merge import merge_edits
+from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned, unassigned_frames
 from app.features.pitches.service import change_pitches, read_pitches
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -61,7 +61,7 @@ def bring(tmp_path: Path) -> Callable:
 
 def bring_file(store: Store, path: Path, dry_run: bool = False):
     report = Report()
-    result = carry_in(
+    result = merge_edits(
         store, "demo", path, report, DEFAULT_LIMITS, source="there", actor="zoe", dry_run=dry_run
     )
     result.problems += [str(problem) for problem in report.problems]
@@ -85,7 +85,7 @@ def entries(store: Store) -> int:
 def assert_replays(store: Store) -> None:
     """The log still rebuilds the tables."""
     with store.read() as session:
-        assert replay(session) == read_ledger(session)
+        assert replay(session) == read_state_snapshot(session)
 
 
 def findings(store: Store, group_id: int) -> list[str]:
@@ -115,8 +115,8 @@ def busy(store, once, fill, make_group, make_static, opposite):
         lines = SetStationLines({"Side line left": (ImagePoint(1.0, 2.0), ImagePoint(30.0, 40.0))})
         submit_station(store, station.id, lines, if_match=station.etag, actor="ann")
         ingest_cameras(store, "demo", {"8_1": opposite}, source="cameras", actor="ann")
-        spare = [SpareFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
-        ingest_spare(store, "demo", spare, source="spare", actor="ann")
+        spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
+        ingest_unassigned(store, "demo", spare, source="spare", actor="ann")
         change_policy(store, "demo", replace(STRICT, min_jac=0.5), if_match=None, actor="ann")
         solve_dataset(store, "demo")
         return ids
@@ -138,7 +138,7 @@ class TestRoundTrip:
         kept = []
         for home in (there, store):
             with home.read() as session:
-                kept.append(list(spare_frames(session, get_dataset(home, "demo").id)))
+                kept.append(list(unassigned_frames(session, get_dataset(home, "demo").id)))
         assert kept[0] == kept[1]
         assert_replays(there)
 

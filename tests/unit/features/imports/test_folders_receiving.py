@@ -10,9 +10,9 @@ from app.config import Settings
 from app.errors import TooLargeError
 from app.features.imports.folders import begin_upload, finish_upload, own_uploads
 from app.features.imports.upload_queries import Upload
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 
-ANN, BEN = (Sight(all_but=False, name=name) for name in ("ann", "ben"))
+ANN, BEN = (Visibility(all_but=False, name=name) for name in ("ann", "ben"))
 
 
 @pytest.fixture

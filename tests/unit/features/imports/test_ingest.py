@@ -150,7 +150,7 @@ class TestIngest:
         one = replace(make_group(9), views=make_group(9).views[:1])
         told = Report()
         groups = [make_group(7), make_group(8), one]
-        report = ingest(store, "demo", groups, source="test", actor="ann", told=told)
+        report = ingest(store, "demo", groups, source="test", actor="ann", limit_report=told)
         assert (report.new, report.missing) == (1, 0)
         assert [problem.record for problem in told.problems] == [
             make_group(7).key,

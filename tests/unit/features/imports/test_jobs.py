@@ -19,7 +19,7 @@ from app.features.imports import jobs as imports
 from app.features.imports.jobs import Outcome, import_in_worker
 from app.features.imports.sources import Source, import_source
 from app.formats.soccernet_v3_writer import write_soccernet_v3
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group
 from app.worker_process import COUNTS
 from tests.waiting import SECONDS
@@ -35,7 +35,7 @@ def apart(
     dataset: str = "apart",
     *,
     dry_run: bool = False,
-    progress: TellProgress = lambda *told: None,
+    progress: ReportProgress = lambda *told: None,
     stop: Callable[[], None] = wanted,
 ) -> Outcome:
     source = Source("soccernet-v3", path, name="data")

@@ -11,7 +11,7 @@ import pytest
 from app.errors import DatasetFormatError, InputError
 from app.features.groups.codecs import policy_to_json, station_to_json
 from app.features.imports.body import MAX_POINTS
-from app.features.imports.edits_export import carried_group
+from app.features.imports.edits_export import group_to_merge
 from app.features.imports.merge_parse import (
     FORMAT,
     FORMAT_VERSION,
@@ -85,7 +85,7 @@ class TestParseGroup:
     def test_a_static_camera_is_named_by_a_view_and_never_stands_in_it(
         self, shared: Any, said: str
     ) -> None:
-        group = carried_group(make_scenes(groups=1, seed=3, faults=False)[0].group)
+        group = group_to_merge(make_scenes(groups=1, seed=3, faults=False)[0].group)
         more = {"base": None, "views": {}, "stations": {}, "log": [], "verdicts": []}
         value = {"group": group, "pitches": [], "bases": [], **more}
         assert len(parse_group(value, {}).group.views) == 2

@@ -21,7 +21,7 @@ from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.imports.sources import FORMATS, USERS, Source, import_source
-from app.features.imports.spare import SpareFrame, ingest_spare, spare_frames
+from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned, unassigned_frames
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.formats import issia_people
@@ -152,11 +152,11 @@ class TestThereAndBack:
         group = make_static(10)
         first = replace(group.views[0], extras=Extras((person,), (), {"ball": {"SHOT": "true"}}))
         fill(replace(group, views=(first, *group.views[1:])), make_static(-3))
-        spare = SpareFrame("cam2", "99", Extras(boxes=(person,)))
-        ingest_spare(store, "demo", [spare], source="test", actor="ann")
+        spare = UnassignedFrame("cam2", "99", Extras(boxes=(person,)))
+        ingest_unassigned(store, "demo", [spare], source="test", actor="ann")
         again = there_and_back(store, "issia", tmp_path / out)
         with store.read() as session:
-            assert list(spare_frames(session, dataset_id(store, "again"))) == [spare]
+            assert list(unassigned_frames(session, dataset_id(store, "again"))) == [spare]
         for key, group in groups_of(store, "demo").items():
             views = [replace(view, media=None) for view in group.views]
             assert list(again[key].views) == views
@@ -195,7 +195,7 @@ class TestImportSource:
                 continue
             imported = import_source(store, "demo", Source(form, tmp_path), store.settings)
             assert len(imported.report.problems) == 1, form
-            assert not imported.something
+            assert not imported.imported_anything
         assert list_datasets(store) == []
 
     @pytest.mark.parametrize(
@@ -219,7 +219,7 @@ class TestImportSource:
                 continue
             for path in (tmp_path, tmp_path / name):
                 imported = import_source(store, "demo", Source(form, path), store.settings)
-                sentence, advice = imported.nothing_read()
+                sentence, advice = imported.nothing_read_error()
                 assert sentence == f"nothing could be imported: {path} {problem}", form
                 assert advice.startswith(hint)
                 (skipped,) = imported.values()["skipped"]
@@ -387,7 +387,7 @@ class TestRemarks:
     ) -> None:
         (tmp_path / "a.json").write_text(json.dumps({"shapes": [], "imagePath": "a.jpg"}))
         imported = import_source(store, "x", Source("coco", tmp_path), store.settings)
-        assert imported.nothing_read()[1].startswith("It looks like LabelMe")
+        assert imported.nothing_read_error()[1].startswith("It looks like LabelMe")
 
     @pytest.mark.parametrize(
         ("value", "advice"),
@@ -405,7 +405,7 @@ class TestRemarks:
     ) -> None:
         (tmp_path / "x.json").write_text(json.dumps(value))
         imported = import_source(store, "x", Source("sn-calibration", tmp_path), store.settings)
-        sentence, hint = imported.nothing_read()
+        sentence, hint = imported.nothing_read_error()
         assert (advice in sentence, "looks like" in hint) == (True, False)
 
 
@@ -534,7 +534,7 @@ class TestMirroredPeople:
             assert view is not None
             dataset = get_dataset(store, "old").id
             with store.read() as session:
-                spare = [one for one in spare_frames(session, dataset) if one.camera == "cam2"]
+                spare = [one for one in unassigned_frames(session, dataset) if one.camera == "cam2"]
             every = (view.extras, *(one.extras for one in spare))
             return [[box["points"]["x1"] for box in extras.boxes] for extras in every]
 

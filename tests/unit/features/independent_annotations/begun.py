@@ -7,11 +7,13 @@ from typing import Any
 from app.db.store import Store
 from app.features.groups.submit import solved
 from app.features.independent_annotations import service as take
-from app.features.independent_annotations.queries import Take
-from app.features.independent_annotations.service import begin, get_take
+from app.features.independent_annotations.queries import IndependentAnnotation
+from app.features.independent_annotations.service import begin, get_annotation
 
 
-def begin_for_batch(store: Store, group_id: int, person: str, **terms: Any) -> Take:
+def begin_for_batch(
+    store: Store, group_id: int, person: str, **terms: Any
+) -> IndependentAnnotation:
     """Let a person begin a group on a batch's terms, and solve their copy."""
     with store.write() as session:
         begun = begin(session, group_id, person=person, **terms)
@@ -19,6 +21,6 @@ def begin_for_batch(store: Store, group_id: int, person: str, **terms: Any) -> T
     return begun
 
 
-def begin_take(store: Store, group_id: int, *, person: str) -> Take:
+def begin_take(store: Store, group_id: int, *, person: str) -> IndependentAnnotation:
     """The take that a person begins of a group."""
-    return get_take(store, take.begin_take(store, group_id, person=person).id)
+    return get_annotation(store, take.begin_annotation(store, group_id, person=person).id)

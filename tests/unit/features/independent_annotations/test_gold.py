@@ -13,7 +13,7 @@ from app.features.groups.submit import load, submit
 from app.features.independent_annotations.errors import polyline_distance
 from app.features.independent_annotations.gold import (
     mark,
-    middle_of,
+    median_interval,
     read_report,
     start_with,
     unmark,
@@ -21,8 +21,8 @@ from app.features.independent_annotations.gold import (
 )
 from app.features.independent_annotations.gold_queries import gold_truth
 from app.features.independent_annotations.known_truth import Terms, begin_next
-from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import hand_in
+from app.features.independent_annotations.return_work import return_annotation
+from app.features.independent_annotations.service import submit_annotation
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
@@ -160,16 +160,16 @@ class TestReadReport:
         take = next(
             one
             for one in iter(lambda: begin_next(store, terms, person="ann", chance=Random(1)), None)
-            if one.kind == "gold" or not hand_in(store, one.id, actor="ann")
+            if one.kind == "gold" or not submit_annotation(store, one.id, actor="ann")
         )
         view = load(store, take.copy_id).group.views[0]
         box = view.balls[0].box
         wrong = BallAnnotation(box=Box(box.x + 30.0, box.y, box.width, box.height))
         change(store, take.copy_id, SetBall(view.key, wrong), "ann")
-        hand_in(store, take.id, actor="ann")
+        submit_annotation(store, take.id, actor="ann")
         (first,) = read_report(store, terms.dataset_id).people[0].results
         assert (first.error.ball_px, first.submissions) == (pytest.approx(30.0), 1)
-        hand_back_take(store, take.id, "look again", actor="lea")
+        return_annotation(store, take.id, "look again", actor="lea")
         assert read_report(store, terms.dataset_id).people[0].results == (first,)
         change(store, take.copy_id, SetBall(view.key, view.balls[0]), "ann")
         judge(store, take.copy_id, actor="ann")
@@ -190,10 +190,10 @@ class TestNumbers:
         chance = np.random.default_rng(5)
         held = 0
         for _ in range(400):
-            found = middle_of([float(x) for x in chance.exponential(1.0, 9)])
+            found = median_interval([float(x) for x in chance.exponential(1.0, 9)])
             held += found.low <= np.log(2.0) <= found.high
         assert held >= 0.95 * 400
-        assert middle_of([1.0] * 5).low is None
+        assert median_interval([1.0] * 5).low is None
 
     def test_of_nothing_there_is_no_share(self) -> None:
         assert wilson(0, 0) == (None, None)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.db.store import Store
-from app.features.batches.leases import Leases, Worker
+from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, get_batch, make_batch
 from app.features.datasets.service import get_dataset
 from app.features.groups.edit import SetBall
@@ -16,7 +16,7 @@ from app.features.groups.history import history
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.independent_annotations.gold import mark, read_report
-from app.features.independent_annotations.service import get_take_of
+from app.features.independent_annotations.service import get_annotation_of_copy
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.queue.service import list_groups
@@ -31,7 +31,7 @@ from tests.e2e.film import write_film
 
 FIRST, GOLD = 100, 110
 """Frames of the batch's first group and of the gold one."""
-ANN = Worker("ann", may_review=False)
+ANN = BatchMember("ann", may_review=False)
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ class TestGoldInAFilm:
         batch = make_batch(store, "film", new, actor="lea").id
         leases, kinds, shapes = Leases(store), [], set()
         while (copy := leases.next(batch, ANN).group) is not None:
-            take, state = get_take_of(store, copy), load(store, copy)
+            take, state = get_annotation_of_copy(store, copy), load(store, copy)
             kinds.append(take.kind)
             assert all(view.media is not None for view in state.group.views)
             shapes.add(
@@ -89,7 +89,7 @@ class TestGoldInAFilm:
             )
             assert state.solution is not None and state.solution.ball is not None
             annotate(store, copy, 3.0, 4.0)
-            leases.hand_in(batch, copy, ANN, actor="ann")
+            leases.submit(batch, copy, ANN, actor="ann")
         assert (kinds.count("gold"), kinds.count("independent")) == (1, 3)
         assert len(shapes) == 1
         assert get_batch(store, batch).handed_in == 3
@@ -108,11 +108,11 @@ class TestGoldInAFilm:
         new = NewBatch("film", f"id:{film[FIRST]}", annotators=["ann"], gold_every=1)
         batch = make_batch(store, "film", new, actor="lea").id
         copy = Leases(store).next(batch, ANN).group
-        assert get_take_of(store, copy).kind == "gold"
+        assert get_annotation_of_copy(store, copy).kind == "gold"
         views = load(store, copy).group.views
         assert [view.balls for view in views] == [()] * 6
         # Static cameras are everybody's: their lines are not those of this picture.
         assert all(view.station.lines for view in views)
-        Leases(store).hand_in(batch, copy, ANN, actor="ann")
+        Leases(store).submit(batch, copy, ANN, actor="ann")
         ((result,),) = [one.results for one in read_report(store, "film").people]
         assert (result.error.ball_px, result.error.balls_missing) == (None, 6)

@@ -10,10 +10,10 @@ import pytest
 
 from app.db.store import Store
 from app.errors import InputError
-from app.features.agreement.service import after_hand_in
+from app.features.agreement.service import after_submission
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import read_audit
-from app.features.batches.leases import Leases, Worker
+from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.progress import my_work
 from app.features.batches.service import NewBatch, change_batch, make_batch
 from app.features.groups.edit import SetBall, SetLines
@@ -27,7 +27,7 @@ from app.features.independent_annotations.known_truth import (
     mark_known,
 )
 from app.features.independent_annotations.queries import GOLD
-from app.features.independent_annotations.service import get_take_of
+from app.features.independent_annotations.service import get_annotation_of_copy
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.people.visibility_queries import EVERYTHING
@@ -145,13 +145,13 @@ class TestVersion:
         for person in ("ann", "bo"):
             copy = begin_take(store, 2, person=person).copy_id
             judge(store, copy, person)
-        assert after_hand_in(store, copy) == "agreed"
+        assert after_submission(store, copy) == "agreed"
         judge(store, 1, "ann")
         for person, moved in (("ann", 0.0), ("bo", 40.0)):
             copy = begin_take(store, 3, person=person).copy_id
             drawn_as_it_is(store, copy, scenes[2], moved)
             judge(store, copy, person)
-        assert after_hand_in(store, copy) == "open"
+        assert after_submission(store, copy) == "open"
         judge(store, 3, "cy")
         freeze(store, "demo", FreezeRequest("v1"), actor="lea")
         key = load(store, 2).group.views[0].key
@@ -175,9 +175,9 @@ class TestRunningBatch:
         invite(store, "ada", Role.ANNOTATOR, actor="local")
         new = NewBatch("a", query="number>=2", annotators=["ada"])
         batch = make_batch(store, "demo", new, actor="lea")
-        leases, ada = Leases(store), Worker("ada")
+        leases, ada = Leases(store), BatchMember("ada")
         first = leases.next(batch.id, ada).group
-        leases.hand_in(batch.id, first, ada, actor="ada")
+        leases.submit(batch.id, first, ada, actor="ada")
         mark_known(store, "demo", replace(SAMPLE, query="number<=1"), actor="lea")
         change_batch(store, batch.id, actor="lea", gold_every=1)
         copy = leases.next(batch.id, ada).group
@@ -185,6 +185,6 @@ class TestRunningBatch:
         judge(store, copy, "ada")
         assert [one.person for one in read_report(store, "demo").people] == ["ada"]
         assert my_work(store, lambda _: ada)[0].left == 2
-        second = get_take_of(store, leases.next(batch.id, ada).group).group_id
+        second = get_annotation_of_copy(store, leases.next(batch.id, ada).group).group_id
         change_batch(store, batch.id, actor="lea", no_gold=True)
         assert {first, second, leases.next(batch.id, ada).group} <= {2, 3, 4} and first != second

@@ -7,7 +7,7 @@ import pytest
 
 from app.db.log import newest_entry, verify_chain
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
-from app.features.batches.own import own_left
+from app.features.batches.own_annotations import own_left
 from app.features.batches.service import NewBatch, make_batch
 from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
@@ -16,7 +16,7 @@ from app.features.groups.replay import rebuild
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, solved, submit
 from app.features.groups.undo import undo
-from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.gold import mark
 from app.features.independent_annotations.known_truth import (
     Terms,
@@ -25,14 +25,19 @@ from app.features.independent_annotations.known_truth import (
     is_gold_turn,
 )
 from app.features.independent_annotations.queries import GOLD, INDEPENDENT
-from app.features.independent_annotations.return_work import hand_back_take
-from app.features.independent_annotations.service import get_take, get_take_of, hand_in, list_takes
+from app.features.independent_annotations.return_work import return_annotation
+from app.features.independent_annotations.service import (
+    get_annotation,
+    get_annotation_of_copy,
+    list_annotations,
+    submit_annotation,
+)
 from app.features.integrity.database import examine
 from app.features.people.logins import read_roles
 from app.features.people.members import give_role
 from app.features.people.roles import Role
 from app.features.people.service import invite
-from app.features.people.visibility_queries import COPIES, READER, Reader, Sight
+from app.features.people.visibility_queries import COPIES, READER, RestrictedReader, Visibility
 from app.features.policies.service import change_policy
 from app.features.queue.changes import read_news
 from app.features.stations.service import load_station, submit_station
@@ -97,8 +102,8 @@ class TestBeginTake:
         assert faults(store) == []
         assert load(store, second).group.views[0].station.lines[line] != HERE
         assert load(store, first).group.views[0].station.lines[line] != HERE
-        hand_in(store, one.id, actor="ann")
-        adopt_take(store, one.id, actor="lea")
+        submit_annotation(store, one.id, actor="ann")
+        adopt_annotation(store, one.id, actor="lea")
         assert load(store, second).group.views[0].station.lines[line] == HERE
         assert faults(store) == []
 
@@ -145,7 +150,7 @@ class TestBeginTake:
         view = state.group.views[0].key
         first = begin_for_batch(store, state.id, "ann", batch_id=1)
         change(store, first.copy_id, SetBall(view, BALL))
-        hand_in(store, first.id, actor="ann")
+        submit_annotation(store, first.id, actor="ann")
         blind = begin_for_batch(store, state.id, "ben", batch_id=1)
         assert load(store, blind.copy_id).group == state.group
         seeing = begin_for_batch(store, state.id, "cleo", batch_id=1, blind=False)
@@ -159,8 +164,8 @@ class TestBeginTake:
         for word in ("north", "Alder", ".png"):
             assert word not in said
         change(store, take.copy_id, SetBall("view 1", BALL))
-        hand_in(store, take.id, actor="ann")
-        adopted = adopt_take(store, take.id, actor="lea")
+        submit_annotation(store, take.id, actor="ann")
+        adopted = adopt_annotation(store, take.id, actor="lea")
         assert adopted.group.views[0].balls == (BALL,)
 
     @pytest.mark.parametrize("kind", [INDEPENDENT, GOLD])
@@ -168,9 +173,9 @@ class TestBeginTake:
         self, store, state, kind
     ) -> None:
         take = begin_for_batch(store, state.id, "ann", batch_id=3, nameless=True, kind=kind)
-        hand_in(store, take.id, actor="ann")
+        submit_annotation(store, take.id, actor="ann")
         if kind == INDEPENDENT:
-            adopt_take(store, take.id, actor="lea")
+            adopt_annotation(store, take.id, actor="lea")
         own, leads = (told_to(store, state, take, name) for name in ("ann", "lea"))
         # The batch is closed: nothing is hidden blind any more.
         assert (own.of, own.number, own.title, own.settled) == (None, None, "Group 1", None)
@@ -180,9 +185,9 @@ class TestBeginTake:
 
 def told_to(store, state, take, name):
     """A take as somebody sees it who works in no open batch."""
-    token = READER.set(Reader(name, {}, lambda _dataset: True))
+    token = READER.set(RestrictedReader(name, {}, lambda _dataset: True))
     try:
-        (view,) = list_takes(store, state.dataset_id, lambda _dataset: True, person=name)
+        (view,) = list_annotations(store, state.dataset_id, lambda _dataset: True, person=name)
     finally:
         READER.reset(token)
     assert view.id == take.id
@@ -212,33 +217,33 @@ class TestStart:
             copy = load(store, take.copy_id).group
             assert [bool(view.balls) for view in copy.views] == [balls] * len(copy.views)
             assert [bool(view.station.lines) for view in copy.views] == [lines] * len(copy.views)
-            hand_in(store, take.id, actor="ann")
+            submit_annotation(store, take.id, actor="ann")
         assert sorted(kinds) == ["gold", "gold", "independent", "independent", "independent"]
 
 
 class TestHandIn:
     def test_it_changes_no_more(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
-        assert hand_in(store, take.id, actor="ann").handed_in is not None
+        assert submit_annotation(store, take.id, actor="ann").handed_in is not None
         with pytest.raises(ConflictError):
             change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
-        hand_back_take(store, take.id, "the ball", actor="lea")
+        return_annotation(store, take.id, "the ball", actor="lea")
         change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
 
     def test_nobody_hands_in_the_copy_of_somebody_else(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         with pytest.raises(ForbiddenError):
-            hand_in(store, take.id, actor="ben")
+            submit_annotation(store, take.id, actor="ben")
 
     def test_a_verdict_does_it_and_is_not_taken_back(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         judge(store, take.copy_id, "rejected", reason="other")
-        found = get_take_of(store, take.copy_id)
+        found = get_annotation_of_copy(store, take.copy_id)
         assert (found.verdict, found.handed_in is not None) == ("rejected", True)
         for verdict in ("unreviewed", "accepted", "deferred"):
             with pytest.raises(ConflictError, match="submitted"):
                 judge(store, take.copy_id, verdict)
-        assert get_take(store, take.id) == found
+        assert get_annotation(store, take.id) == found
 
     def test_only_its_person_judges_it(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
@@ -251,19 +256,19 @@ class TestHandIn:
         (batch,) = list_batches(store, dataset)
         with pytest.raises(ConflictError, match="submitted"):
             undo_batch(store, batch.id, actor="ann")
-        assert get_take(store, take.id).verdict == "deferred"
+        assert get_annotation(store, take.id).verdict == "deferred"
 
     def test_nobody_else_takes_back_the_verdict_of_a_copy_that_was_returned(
         self, store, state
     ) -> None:
         take = begin_take(store, state.id, person="ann")
         judge(store, take.copy_id, "rejected", reason="other")
-        hand_back_take(store, take.id, "the ball", actor="lea")
+        return_annotation(store, take.id, "the ball", actor="lea")
         with pytest.raises(ForbiddenError, match="only ann"):
             judge(store, take.copy_id, "unreviewed", actor="lea")
-        assert get_take(store, take.id).verdict == "rejected"
+        assert get_annotation(store, take.id).verdict == "rejected"
         judge(store, take.copy_id, "unreviewed")
-        assert get_take(store, take.id).verdict is None
+        assert get_annotation(store, take.id).verdict is None
 
     def test_a_submitted_one_among_many_is_counted_and_the_others_are_judged(
         self, store, fill, make_group
@@ -272,7 +277,7 @@ class TestHandIn:
             begin_take(store, number, person="ann")
             for number in fill(make_group(7), make_group(8), make_group(9))
         ]
-        hand_in(store, takes[1].id, actor="ann")
+        submit_annotation(store, takes[1].id, actor="ann")
         dataset = load(store, takes[0].copy_id).dataset_id
         refused = [("submitted", 1)]
         for verdict in ("deferred", "accepted"):
@@ -282,21 +287,21 @@ class TestHandIn:
         report = give_verdicts(store, dataset, "", "deferred", actor="ann", expected=2)
         assert report.changed == 2
         assert [(item.reason, item.groups) for item in report.refused] == refused
-        said = [get_take(store, take.id).verdict for take in takes]
+        said = [get_annotation(store, take.id).verdict for take in takes]
         assert said == ["deferred", None, "deferred"]
 
     def test_a_lead_returns_it_with_a_reason_and_each_step_is_in_the_log(
         self, store, state
     ) -> None:
         take = begin_take(store, state.id, person="ann")
-        hand_in(store, take.id, actor="ann")
+        submit_annotation(store, take.id, actor="ann")
         with pytest.raises(ConflictError, match="submitted"):
-            hand_in(store, take.id, actor="ann")
+            submit_annotation(store, take.id, actor="ann")
         with pytest.raises(InputError) as refused:
-            hand_back_take(store, take.id, "  ", actor="lea")
+            return_annotation(store, take.id, "  ", actor="lea")
         assert refused.value.pointer == "/reason"
-        hand_back_take(store, take.id, "the ball", actor="lea")
-        hand_in(store, take.id, actor="ann")
+        return_annotation(store, take.id, "the ball", actor="lea")
+        submit_annotation(store, take.id, actor="ann")
         said = [(one.actor, one.body["did"]) for one in history(store, take.copy_id)[1:]]
         assert said == [("ann", "handed in"), ("lea", "handed back"), ("ann", "handed in")]
         assert faults(store) == []
@@ -310,15 +315,15 @@ class TestAdoptTake:
         change(store, take.copy_id, SetBall(views[0], BALL))
         change(store, take.copy_id, SetLines(views[1], {line: HERE}))
         judge(store, take.copy_id)
-        after = adopt_take(store, take.id, actor="lea")
+        after = adopt_annotation(store, take.id, actor="lea")
         copy = load(store, take.copy_id)
         assert after.group == copy.group
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
         said = [(entry.kind, entry.actor) for entry in history(store, state.id)][1:]
         assert said == [("edit", "ann"), ("verdict", "ann"), ("take", "lea")]
-        assert get_take(store, take.id).settled is not None
+        assert get_annotation(store, take.id).settled is not None
         with pytest.raises(ConflictError):
-            adopt_take(store, take.id, actor="lea")
+            adopt_annotation(store, take.id, actor="lea")
         with pytest.raises(ConflictError):
             judge(store, take.copy_id, "deferred")
         assert faults(store) == []
@@ -329,25 +334,25 @@ class TestAdoptTake:
         take = begin_take(store, state.id, person="ann")
         view = state.group.views[0].key
         change(store, take.copy_id, IncludeView(view, False))
-        hand_in(store, take.id, actor="ann")
-        after = adopt_take(store, take.id, actor="lea")
+        submit_annotation(store, take.id, actor="ann")
+        after = adopt_annotation(store, take.id, actor="lea")
         assert [one.key for one in after.group.views if not one.included] == [view]
 
     def test_a_gold_group_whose_truth_is_known_adopts_no_gold_copy(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         gold = begin_for_batch(store, state.id, "ben", kind=GOLD)
         for one in (take, gold):
-            hand_in(store, one.id, actor=one.person)
+            submit_annotation(store, one.id, actor=one.person)
         with pytest.raises(ConflictError, match="gold"):
-            adopt_take(store, gold.id, actor="lea")
-        assert adopt_take(store, take.id, actor="lea").id == state.id
+            adopt_annotation(store, gold.id, actor="lea")
+        assert adopt_annotation(store, take.id, actor="lea").id == state.id
 
     def test_only_a_copy_that_was_handed_in_is_adopted(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
         with pytest.raises(ConflictError):
-            adopt_take(store, take.id, actor="lea")
-        hand_in(store, take.id, actor="ann")
-        after = adopt_take(store, take.id, actor="lea")
+            adopt_annotation(store, take.id, actor="lea")
+        submit_annotation(store, take.id, actor="ann")
+        after = adopt_annotation(store, take.id, actor="lea")
         assert after.group == state.group and after.verdict.state == "unreviewed"
 
 
@@ -392,7 +397,7 @@ class TestCopies:
         }
 
     def test_one_that_is_made_later_is_hidden_from_the_first_entry_on(self, store, state) -> None:
-        reader = Sight(True, frozenset(), "ben", frozenset())
+        reader = Visibility(True, frozenset(), "ben", frozenset())
         with store.read() as session:
             last = newest_entry(session)
         begin_take(store, state.id, person="ann")
@@ -416,7 +421,7 @@ class TestBeginNext:
             for rest in range(comes, 0, -1):
                 take = begin_next(store, terms, person=person)
                 assert left(person) == rest
-                hand_in(store, take.id, actor=person)
+                submit_annotation(store, take.id, actor=person)
             assert left(person) == 0
 
     def test_each_group_as_often_as_the_batch_asks(self, store, fill, make_group) -> None:
@@ -427,10 +432,10 @@ class TestBeginNext:
             while (take := begin_next(store, terms, person=person)) is not None:
                 had.append((person, take.group_id))
                 assert begin_next(store, terms, person=person) == take
-                hand_in(store, take.id, actor=person)
+                submit_annotation(store, take.id, actor=person)
         assert had == [(name, group) for name in ("ann", "ben") for group in groups]
-        assert len(list_takes(store, terms.dataset_id, lambda _: False, person="ann")) == 2
-        assert len(list_takes(store, terms.dataset_id, lambda _: True, person="ann")) == 4
+        assert len(list_annotations(store, terms.dataset_id, lambda _: False, person="ann")) == 2
+        assert len(list_annotations(store, terms.dataset_id, lambda _: True, person="ann")) == 4
 
     def test_one_of_each_block_is_gold_and_nobody_knows_which(self) -> None:
         every, chance, kinds = 5, Random(4), list[str]()

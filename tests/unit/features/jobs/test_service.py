@@ -27,7 +27,7 @@ from app.features.jobs import service as module
 from app.features.jobs.queries import Job, NewJob, insert_job
 from app.features.jobs.run import JobProgress
 from app.features.jobs.service import Jobs
-from app.features.people.visibility_queries import EVERYTHING, Sight
+from app.features.people.visibility_queries import EVERYTHING, Visibility
 from tests.unit.features.jobs.steps import Gate, submit
 from tests.waiting import SECONDS
 
@@ -282,7 +282,7 @@ def job_that_servers_died_at(store: Store, deaths: int) -> int:
         job = insert_job(session, NewJob("import", "Import", "ann"))
     for _ in range(deaths):
         jobs, gate = Jobs(store), Gate()
-        jobs.resumes("import", gate)
+        jobs.register_resume("import", gate)
         jobs.start()
         assert gate.started.wait(SECONDS)
         # What a server says that is killed: nothing any more.
@@ -314,7 +314,7 @@ class TestRestart:
         assert gate.started.wait(SECONDS)
         first.close()
         second = Jobs(store)
-        second.resumes("import", lambda progress: progress.job.request["source"] + 1)
+        second.register_resume("import", lambda progress: progress.job.request["source"] + 1)
         second.start()
         done = second.wait(job.id, SECONDS)
         assert (done.state, done.result, second.find()) == ("done", 6, [done])
@@ -326,7 +326,7 @@ class TestRestart:
     ) -> None:
         job = job_that_servers_died_at(store, deaths)
         later = Jobs(store)
-        later.resumes("import", lambda progress: 7)
+        later.register_resume("import", lambda progress: 7)
         later.start()
         found = later.wait(job, SECONDS)
         assert found.state == state
@@ -344,7 +344,7 @@ class TestRestart:
             first.close()
             assert first.get(job.id).tries == 0
             first, gate = Jobs(store), Gate(9)
-            first.resumes("import", gate)
+            first.register_resume("import", gate)
             first.start()
         gate.finish.set()
         assert first.wait(job.id, SECONDS).result == 9
@@ -434,6 +434,6 @@ class TestUnderWay:
             last = submit(jobs, lambda _: None, dataset_id=other).id
             assert [job.id for job in jobs.under_way(None, EVERYTHING)] == [*made, last]
             assert [job.id for job in jobs.under_way(one, EVERYTHING)] == made
-            assert jobs.under_way(None, Sight(all_but=False)) == []
+            assert jobs.under_way(None, Visibility(all_but=False)) == []
         finally:
             held.set()

@@ -24,19 +24,19 @@ class Claims:
         self.free = True
         self.words: list[str] = []
 
-    def take(self, name: str) -> bool:
+    def claim(self, name: str) -> bool:
         return self.free
 
     def holds(self, name: str) -> bool:
         return self.free
 
-    def give_back(self, name: str) -> None:
+    def release(self, name: str) -> None:
         """It is free."""
 
-    def tell(self, session: object, word: str) -> None:
+    def publish(self, session: object, word: str) -> None:
         self.words.append(word)
 
-    def hear(self, hearer: Callable[[str], None]) -> None:
+    def subscribe(self, hearer: Callable[[str], None]) -> None:
         """Nobody says anything: what a row says must be enough."""
 
     def listen(self) -> None:
@@ -89,7 +89,7 @@ def opened(store: Store, claims: Claims, work: Work) -> Iterator[Open]:
         jobs = SharedJobs(store)
         # As if it had been started when another one led.
         jobs._alone = False
-        jobs.resumes("solve", own)
+        jobs.register_resume("solve", own)
         opened.append(jobs)
         return jobs
 
@@ -110,7 +110,7 @@ class TestSharedJobs:
         job = ask(asked)
         leads.start()
         work.go_on.release()
-        assert (asked.wait(job.id, SECONDS).result, asked.leads()) == ("done", False)
+        assert (asked.wait(job.id, SECONDS).result, asked.is_leader()) == ("done", False)
         # Whoever has read it when it waited may not begin it again.
         leads._join(job)
         work.go_on.release()
@@ -153,7 +153,7 @@ class TestSharedJobs:
         assert unaware.begun.acquire(timeout=SECONDS)
         claims.free = False
         first._attempt()
-        assert not first.leads()
+        assert not first.is_leader()
         first._ended.set()
         claims.free = True
         second.start()
@@ -191,7 +191,7 @@ class TestSharedJobs:
         self, opened: Open, work: Work
     ) -> None:
         jobs = opened()
-        jobs.makes("bulk", lambda progress: progress.job.request["nothing of the kind"])
+        jobs.register_work("bulk", lambda progress: progress.job.request["nothing of the kind"])
         spoiled = jobs.submit("bulk", "Accept", lambda _: None, actor="ann")
         jobs.start()
         work.go_on.release()

@@ -22,7 +22,7 @@ from app.errors import StorageError
 from app.http.services import Services
 
 API = "/api/v1"
-SLOW = ("/events", "/remedies", "/influence", "/yield")
+SLOW = ("/events", "/suggestions", "/influence", "/yield")
 """What has no end, or solves."""
 KEY = {"Idempotency-Key": "once"}
 

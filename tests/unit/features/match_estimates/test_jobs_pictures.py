@@ -20,7 +20,7 @@ from app.features.match_estimates.jobs import PICTURES
 from app.features.match_estimates.pictures import change_pictures, read_pictures
 from app.features.solutions.service import stale_groups
 from app.features.solve.jobs import change_and_solve
-from app.progress import TellProgress
+from app.progress import ReportProgress
 from app.soccer.group import Group, Station, View
 from app.soccer.picture import PictureGeometry
 from tests.cameras import SIZE, looking
@@ -149,7 +149,7 @@ def test_a_server_that_stops_leaves_an_estimate_to_the_next_one(
     started = threading.Event()
 
     def endless(
-        _store: Store, _dataset: int, _pool: object, told: TellProgress, _only: object
+        _store: Store, _dataset: int, _pool: object, told: ReportProgress, _only: object
     ) -> NoReturn:
         started.set()
         while True:

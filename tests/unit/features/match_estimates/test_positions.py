@@ -10,7 +10,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import SetLines, SetPicture
 from app.features.groups.history import history
 from app.features.groups.replay import rebuild, replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
 from app.features.imports.ingest import ingest
@@ -170,7 +170,7 @@ class TestSharePositions:
 
     def test_the_log_tells_it_again(self, shared):
         with shared.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
         before = [load(shared, number).stored for number in (1, 4)]
         rebuild(shared)
         assert [load(shared, number).stored for number in (1, 4)] == before
@@ -189,7 +189,7 @@ class TestSharePositions:
         assert load(shared, 1).group.label == changed.label
         assert len(load(shared, 1).group.positions) == 1
         with shared.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_off_it_is_kept_not_used_and_as_current_as_before(self, shared):
         change_policy(shared, "demo", PAPER, if_match=None, actor="ann")

@@ -26,7 +26,7 @@ from app.features.match_estimates.rig import (
 from app.features.pitches.service import change_pitches, read_pitches
 from app.features.solutions.service import stale_groups
 from app.features.stations.service import load_station, submit_station
-from app.features.versions.frozen_queries import freeze_said, thaw_group
+from app.features.versions.frozen_queries import freeze_annotations, thaw_group
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
@@ -162,7 +162,7 @@ class TestAccept:
     def test_a_frozen_group_has_the_covariance_of_its_cameras(self, store, ids, proposed) -> None:
         accept(store, proposed, SIGMA, actor="ann")
         group = load(store, ids[0]).group
-        said = freeze_said(group)
+        said = freeze_annotations(group)
         texts = {key: json.loads(text) for key, text in said.texts.items()}
         assert group.views[0].station.given_covariance is not None
         assert thaw_group(texts[said.key], texts) == group

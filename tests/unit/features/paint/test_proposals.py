@@ -20,10 +20,10 @@ from app.features.groups.edit import SetLines
 from app.features.groups.history import history
 from app.features.groups.pictures import MISSING
 from app.features.groups.replay import replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
-from app.features.imports.edits_export import carried_group
+from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import ingest
 from app.features.paint import proposals as editing
 from app.features.paint.proposals import (
@@ -35,7 +35,7 @@ from app.features.paint.proposals import (
 )
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
-from app.features.versions.frozen_queries import freeze_said, thaw_group
+from app.features.versions.frozen_queries import freeze_annotations, thaw_group
 from app.media.files import has_index
 from app.paint.view_proposal import ViewProposal
 from app.soccer.group import Group, Station, View
@@ -266,7 +266,7 @@ class TestAccepting:
         assert station.proposed == tuple(station.lines)
         edit = history(filled, 2)[-1].body["edit"]
         assert set(edit["source"].values()) == {"proposed"} and edit["edit"] == "set_lines"
-        said = freeze_said(state.group)
+        said = freeze_annotations(state.group)
         assert '"proposed":["' in said.texts[said.key]
         back = undo(filled, 2, if_match=state.etag, actor="bob")
         assert back.group == before.group and back.group.view(key).station.proposed == ()
@@ -281,12 +281,12 @@ class TestAccepting:
         propose_views(filled, "demo")
         key = accept(filled)
         group = load(filled, 2).group
-        said = freeze_said(group)
+        said = freeze_annotations(group)
         texts = {name: json.loads(text) for name, text in said.texts.items()}
         thawed = thaw_group(texts[said.key], texts)
         assert thawed.view(key).station.proposed == group.view(key).station.proposed
-        assert Station("x", SIZE).with_said(group.view(key).station).proposed
-        assert carried_group(group)["views"][0]["station"]["proposed"] == [
+        assert Station("x", SIZE).with_annotations_of(group.view(key).station).proposed
+        assert group_to_merge(group)["views"][0]["station"]["proposed"] == [
             *thawed.view(key).station.proposed
         ]
 
@@ -295,7 +295,7 @@ class TestAccepting:
         accept(filled)
         with filled.read() as session:
             verify_chain(session)
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_a_marking_that_is_moved_is_a_person_s_again(self, filled, asked):
         propose_views(filled, "demo")

@@ -18,10 +18,10 @@ from app.features.groups.edit import SetBall, SetLines
 from app.features.groups.history import history
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild, replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
-from app.features.imports.edits_export import carried_group
+from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import ingest
 from app.features.paint import service as editing
 from app.features.paint.service import get_paint, read_paint, take_back_paint
@@ -287,7 +287,7 @@ class TestReadPaint:
         assert [view.calibration.source for view in again.solution.views] == ["paint", "paint"]
         assert again.group.paint[key].people not in ("", before.group.paint[key].people)
         with painted.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_what_was_read_while_an_import_brought_other_people_is_old(
         self, painted, pictures, looked
@@ -313,7 +313,7 @@ class TestReadPaint:
             solve_dataset(painted, "demo")
             assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
         with painted.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_a_picture_that_changed_is_read_again(self, painted, pictures, tmp_path, looked):
         changed = groups(pictures)[0]
@@ -403,7 +403,7 @@ class TestReadPaint:
 class TestKept:
     def test_the_log_tells_it_again(self, painted):
         with painted.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
         before = load(painted, 1).stored
         rebuild(painted)
         assert load(painted, 1).stored == before
@@ -429,14 +429,14 @@ class TestKept:
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
 
     def test_it_does_not_go_to_another_installation(self, painted):
-        assert "paint" not in carried_group(load(painted, 1).group)
+        assert "paint" not in group_to_merge(load(painted, 1).group)
 
     def test_an_import_keeps_it(self, painted, pictures):
         changed = replace(groups(pictures)[0], label="the source says more of it now")
         ingest(painted, "demo", [changed], source="files", actor="ann")
         assert len(load(painted, 1).group.paint) == 2
         with painted.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
 
 def take_back(store):

@@ -15,7 +15,13 @@ from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError,
 from app.features.datasets.service import dataset_id, delete_dataset
 from app.features.imports.ingest import ensure_dataset
 from app.features.people import access_tokens
-from app.features.people.access_tokens import CUT, INVALID, AccessTokens, is_whole, new_text
+from app.features.people.access_tokens import (
+    CUT,
+    INVALID,
+    AccessTokens,
+    has_valid_checksum,
+    new_token_text,
+)
 from app.features.people.logins import Login
 from app.features.people.queries import update_person
 from app.features.people.roles import SCOPES, Action, DatasetRoles, Role, Scope, require_scope
@@ -58,19 +64,19 @@ def anna(home, clock) -> Login:
 
 class TestText:
     def test_a_token_with_a_wrong_missing_or_swapped_letter_is_not_whole(self) -> None:
-        text = new_text()
-        assert is_whole(text)
-        assert not is_whole(text + "\n")
+        text = new_token_text()
+        assert has_valid_checksum(text)
+        assert not has_valid_checksum(text + "\n")
         for place in range(len(text)):
             other = "a" if text[place] != "a" else "b"
-            assert not is_whole(text[:place] + other + text[place + 1 :])
-            assert not is_whole(text[:place] + text[place + 1 :])
+            assert not has_valid_checksum(text[:place] + other + text[place + 1 :])
+            assert not has_valid_checksum(text[:place] + text[place + 1 :])
         swapped = [text[:i] + text[i + 1] + text[i] + text[i + 2 :] for i in range(3, 50)]
-        assert not [one for one in swapped if one != text and is_whole(one)]
+        assert not [one for one in swapped if one != text and has_valid_checksum(one)]
 
     @pytest.mark.parametrize("text", ["", "tl_", "x" * 57, "tl_" + "é" * 54])
     def test_a_text_of_another_shape_is_no_token(self, text: str) -> None:
-        assert not is_whole(text)
+        assert not has_valid_checksum(text)
 
 
 class TestFind:
@@ -96,16 +102,16 @@ class TestFind:
 
     def test_its_use_is_noted_at_once_and_then_seldom(self, tokens, anna, clock) -> None:
         _, text = tokens.make(anna, "used", READ)
-        assert tokens.is_stale(tokens.find(text))
+        assert tokens.is_use_unlogged(tokens.find(text))
         tokens.touch(tokens.find(text))
         assert tokens.of_person(anna.person_id)[0].used is not None
-        assert not tokens.is_stale(tokens.find(text))
+        assert not tokens.is_use_unlogged(tokens.find(text))
         clock.at += timedelta(minutes=6)
-        assert tokens.is_stale(tokens.find(text))
+        assert tokens.is_use_unlogged(tokens.find(text))
 
     def test_one_that_was_not_copied_whole_is_told_so(self, tokens) -> None:
         with pytest.raises(NotLoggedInError) as refused:
-            tokens.find(new_text()[:-1])
+            tokens.find(new_token_text()[:-1])
         assert refused.value.message == CUT
 
     def test_who_is_disabled_is_refused_whatever_tokens_there_are(self, home, tokens, anna) -> None:

@@ -8,7 +8,7 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import Attempts, Challenges, Written
+from app.features.people.devices import Attempts, Challenges, StoredPending
 
 
 class TestAttempts:
@@ -34,7 +34,9 @@ class TestAttempts:
 class TestWritten:
     def test_another_process_takes_what_was_begun_once(self, store: Store) -> None:
         at = [datetime.now(UTC)]
-        one, other = (Challenges(Written(store, lambda: at[0], LASTS, "passkey")) for _ in range(2))
+        one, other = (
+            Challenges(StoredPending(store, lambda: at[0], LASTS, "passkey")) for _ in range(2)
+        )
         made = one.make("ann")
         assert (other.take("ann"), one.take("ann")) == (made, None)
         one.make("ann")
@@ -45,7 +47,7 @@ class TestWritten:
         assert other.take("late") is None
 
     def test_the_database_shows_neither_who_nor_what(self, store: Store) -> None:
-        begun = Written(store, lambda: datetime.now(UTC), LASTS, "sign-on")
+        begun = StoredPending(store, lambda: datetime.now(UTC), LASTS, "sign-on")
         begun.put("ann", b"the secret")
         with store.read() as session:
             name, value = session.execute(text("SELECT name, value FROM begun")).one()

@@ -14,8 +14,8 @@ from app.features.people import links
 from app.features.people.invitations import (
     NO_MAIL,
     NO_URL,
-    Post,
-    Wanted,
+    InvitationRow,
+    LinkMailer,
     invite_many,
     invite_one,
     read_list,
@@ -29,13 +29,13 @@ from tests.smtp import MailBox, serving
 
 URL = "https://touchline.example.org"
 ROWS = [
-    Wanted(1, "Anna", "Lead", "anna@example.org"),
-    Wanted(2, "ben", "annotator"),
-    Wanted(3, "carl", "boss"),
-    Wanted(4, "local", "viewer"),
-    Wanted(5, "anna", "viewer"),
-    Wanted(6, "dora", "viewer", "dora at home"),
-    Wanted(7, "emil", ""),
+    InvitationRow(1, "Anna", "Lead", "anna@example.org"),
+    InvitationRow(2, "ben", "annotator"),
+    InvitationRow(3, "carl", "boss"),
+    InvitationRow(4, "local", "viewer"),
+    InvitationRow(5, "anna", "viewer"),
+    InvitationRow(6, "dora", "viewer", "dora at home"),
+    InvitationRow(7, "emil", ""),
 ]
 
 
@@ -58,7 +58,7 @@ def token_of(text: str) -> str:
 
 class TestInviteMany:
     def test_says_of_each_row_what_became_of_it(self, store: Store) -> None:
-        report = invite_many(store, ROWS, Post(None, None, URL), actor="local", dry_run=False)
+        report = invite_many(store, ROWS, LinkMailer(None, None, URL), actor="local", dry_run=False)
         assert [(row.row, row.name, row.state) for row in report] == [
             (1, "anna", "invited"),
             (2, "ben", "invited"),
@@ -84,7 +84,7 @@ class TestInviteMany:
 
     def test_a_dry_run_says_the_same_and_makes_nobody(self, store: Store) -> None:
         with serving(MailBox()) as box:
-            post = Post(mail_server(store.settings.home, box), URL, URL)
+            post = LinkMailer(mail_server(store.settings.home, box), URL, URL)
             report = invite_many(store, ROWS, post, actor="local", dry_run=True)
         assert [row.state for row in report] == ["possible"] * 2 + ["refused"] * 5
         assert {row.link for row in report} == {None}
@@ -92,26 +92,28 @@ class TestInviteMany:
         assert box.connections == 0
 
     def test_whoever_is_there_already_is_refused(self, store: Store) -> None:
-        post = Post(None, None, URL)
+        post = LinkMailer(None, None, URL)
         invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         (row,) = invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         assert (row.state, row.problem) == ("refused", "there is a anna already")
 
     def test_tokens_invite_nobody(self, store: Store) -> None:
         with pytest.raises(ForbiddenError):
-            invite_many(store, ROWS, Post(None, None, URL), actor="anna (token x)", dry_run=True)
+            invite_many(
+                store, ROWS, LinkMailer(None, None, URL), actor="anna (token x)", dry_run=True
+            )
 
     @pytest.mark.parametrize("count", [0, 501])
     def test_lists_have_an_end(self, store: Store, count: int) -> None:
-        rows = [Wanted(n, f"p{n}", "viewer") for n in range(count)]
+        rows = [InvitationRow(n, f"p{n}", "viewer") for n in range(count)]
         with pytest.raises(InputError, match="1 to 500 people"):
-            invite_many(store, rows, Post(None, None, URL), actor="local", dry_run=False)
+            invite_many(store, rows, LinkMailer(None, None, URL), actor="local", dry_run=False)
 
 
 class TestPost:
     def test_a_link_that_went_by_mail_is_shown_to_nobody_else(self, store: Store) -> None:
         with serving(MailBox()) as box:
-            post = Post(mail_server(store.settings.home, box), URL, URL)
+            post = LinkMailer(mail_server(store.settings.home, box), URL, URL)
             report = invite_many(store, ROWS[:2], post, actor="berta", dry_run=False)
         anna, ben = report
         assert (anna.mailed, anna.link, anna.problem) == (True, None, None)
@@ -126,7 +128,7 @@ class TestPost:
 
     def test_a_letter_that_is_refused_shows_its_link_and_why(self, store: Store) -> None:
         with serving(MailBox(refuses=frozenset({"anna@example.org"}))) as box:
-            post = Post(mail_server(store.settings.home, box), URL, URL)
+            post = LinkMailer(mail_server(store.settings.home, box), URL, URL)
             (row,) = invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         assert (row.state, row.mailed) == ("invited", False)
         assert row.problem == "the mail server refuses the letter (550: 5.1.1 no such box)"
@@ -134,13 +136,13 @@ class TestPost:
 
     def test_a_server_that_does_not_know_its_address_sends_no_link(self, store: Store) -> None:
         with serving(MailBox()) as box:
-            post = Post(mail_server(store.settings.home, box), None, "http://evil.example")
+            post = LinkMailer(mail_server(store.settings.home, box), None, "http://evil.example")
             (row,) = invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         assert (row.mailed, row.problem, box.letters) == (False, NO_URL, [])
 
     def test_another_link_says_what_it_is_for(self, store: Store) -> None:
         with serving(MailBox()) as box:
-            post = Post(mail_server(store.settings.home, box), URL, URL)
+            post = LinkMailer(mail_server(store.settings.home, box), URL, URL)
             person, first = invite_one(store, "anna", Role.LEAD, None, post, actor="berta")
             address = "anna@example.org"
             renew_one(store, person.id, address, post, actor="berta")
@@ -157,7 +159,7 @@ class TestPost:
 
     def test_addresses_stand_in_no_table(self, store: Store) -> None:
         with serving(MailBox()) as box:
-            post = Post(mail_server(store.settings.home, box), URL, URL)
+            post = LinkMailer(mail_server(store.settings.home, box), URL, URL)
             invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         files = store.settings.home.glob("touchline.db*")
         assert not any(b"anna@example.org" in file.read_bytes() for file in files)
@@ -166,7 +168,9 @@ class TestPost:
 class TestInviteOne:
     def test_an_address_that_is_none_makes_nobody(self, store: Store) -> None:
         with pytest.raises(InputError, match="is no mail address") as caught:
-            invite_one(store, "anna", Role.VIEWER, "anna", Post(None, None, URL), actor="local")
+            invite_one(
+                store, "anna", Role.VIEWER, "anna", LinkMailer(None, None, URL), actor="local"
+            )
         assert caught.value.pointer == "/email"
         assert names(store) == []
 
@@ -175,9 +179,9 @@ class TestReadList:
     def test_reads_a_line_for_each_person(self) -> None:
         text = "\ufeff# the new ones\nanna,reviewer,anna@example.org\n\n ben , annotator \ncarl\n"
         assert read_list(text) == [
-            Wanted(2, "anna", "reviewer", "anna@example.org"),
-            Wanted(4, "ben", "annotator"),
-            Wanted(5, "carl", ""),
+            InvitationRow(2, "anna", "reviewer", "anna@example.org"),
+            InvitationRow(4, "ben", "annotator"),
+            InvitationRow(5, "carl", ""),
         ]
 
     @pytest.mark.parametrize("divider", [",", ";", "\t"])
@@ -185,8 +189,8 @@ class TestReadList:
         lines = [("E-Mail", "Name", "Role"), ("a@b.org", "anna", "lead"), ("", "ben", "viewer")]
         text = "\r\n".join(divider.join(line) for line in lines)
         assert read_list(text) == [
-            Wanted(2, "anna", "lead", "a@b.org"),
-            Wanted(3, "ben", "viewer"),
+            InvitationRow(2, "anna", "lead", "a@b.org"),
+            InvitationRow(3, "ben", "viewer"),
         ]
 
     def test_an_unknown_column_is_refused(self) -> None:

@@ -37,7 +37,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hash that takes no time."""
     cheap = Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1)
     monkeypatch.setattr(passwords, "HASHER", PasswordHash((cheap,)))
-    passwords._nobodys.cache_clear()
+    passwords._placeholder_hash.cache_clear()
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ class TestNames:
 class TestLinks:
     def test_a_link_is_good_once(self, home, logins) -> None:
         _, link = invite(home, "anna", Role.VIEWER, actor="local")
-        assert links.look(home, link.token) == links.Meant("anna", False)
+        assert links.look(home, link.token) == links.LinkHolder("anna", False)
         assert links.use(home, link.token, SECRET) == "anna"
         with pytest.raises(NotFoundError, match="not good any more"):
             links.use(home, link.token, SECRET)
@@ -197,10 +197,10 @@ class TestLogins:
         token = logins.log_in("anna", SECRET)
         clock.at += IDLE - timedelta(seconds=1)
         login = found(logins, token)
-        assert logins.is_stale(login)
+        assert logins.is_use_unlogged(login)
         logins.touch(login)
         clock.at += IDLE - timedelta(seconds=1)
-        assert not logins.is_stale(login) or logins.find(token)
+        assert not logins.is_use_unlogged(login) or logins.find(token)
         clock.at += timedelta(seconds=2)
         assert logins.find(token) is None
 
@@ -336,6 +336,6 @@ class TestDatasetRoles:
         ],
     )
     def test_what_somebody_sees(self, everywhere: Role, single: dict, seen: list[bool]) -> None:
-        sight = DatasetRoles(everywhere, single).sight("anna")
+        sight = DatasetRoles(everywhere, single).visibility("anna")
         assert [sight.sees(key) for key in (1, 2)] == seen
         assert [sight.sees(None, name) for name in ("anna", "bob")] == [True, False]

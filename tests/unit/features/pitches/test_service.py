@@ -12,7 +12,7 @@ from app.features.findings.service import finding_values
 from app.features.groups.edit import SetLines
 from app.features.groups.history import history
 from app.features.groups.replay import rebuild, replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
 from app.features.imports.ingest import ingest
@@ -212,7 +212,7 @@ class TestChangePitches:
     def test_the_log_tells_it_again(self, solved):
         accept(solved)
         with solved.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
         before = [load(solved, number).stored for number in (1, 7)]
         rebuild(solved)
         assert [load(solved, number).stored for number in (1, 7)] == before
@@ -260,7 +260,7 @@ class TestChangePitches:
         assert [load(store, number).group.pitch for number in (1, 2, 3)] == [TRUE] * 3
         assert load(store, 2).group.label == changed.label
         with store.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_an_import_keeps_it_for_groups_that_came_later(self, store):
         first, second, third, *_ = season()
@@ -347,7 +347,7 @@ def questions(store):
 
 def assert_replays(store):
     with store.read() as session:
-        assert replay(session) == read_ledger(session)
+        assert replay(session) == read_state_snapshot(session)
 
 
 class TestParsePitch:

@@ -33,7 +33,7 @@ class TestListPolicies:
             "maximum": 5.0,
             "choices": [],
             "gate": "reprojection",
-            "asks": "at most",
+            "comparison": "at most",
             "optional": False,
         }
         assert fields["calibration.check_labels"]["default"] is True

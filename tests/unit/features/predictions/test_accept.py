@@ -9,7 +9,7 @@ from app.evaluation.frame import Detection
 from app.features.groups.edit import SetBall
 from app.features.groups.history import history
 from app.features.groups.replay import replay
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
 from app.features.predictions.accept import AcceptRequest, accept, accept_box, plan_accept
@@ -138,7 +138,7 @@ class TestAccept:
     def test_the_log_alone_rebuilds_it(self, store, cleared, predictions) -> None:
         accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
         with store.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_a_group_that_changed_meanwhile_is_left_alone(
         self, store, cleared, predictions, monkeypatch

@@ -11,8 +11,8 @@ from app.features.queue.service import (
     COLUMNS,
     ERROR_PERCENT,
     SIGMA_M,
-    decades,
     list_groups,
+    logarithmic_bins,
     places,
     summary,
 )
@@ -22,7 +22,7 @@ from app.features.queue.tables import QueueModel
 
 class TestDecades:
     def test_the_powers_of_ten_are_edges_and_nothing_lies_before_zero(self):
-        assert decades(-2, 1, 3) == (0.0, 0.01, 0.0215, 0.0464, 0.1, 0.215, 0.464, 1.0, 2.15,
+        assert logarithmic_bins(-2, 1, 3) == (0.0, 0.01, 0.0215, 0.0464, 0.1, 0.215, 0.464, 1.0, 2.15,
                                      4.64, 10.0)  # fmt: skip
 
     def test_bars_are_equally_wide_on_a_logarithmic_scale(self):

@@ -75,7 +75,7 @@ class TestRetell:
             session.execute(
                 text("DELETE FROM solution WHERE policy_hash = :policy"), {"policy": TIGHT.hash}
             )
-        monkeypatch.setattr(recompute, "retell_tasks", lambda *_: iter(()))
+        monkeypatch.setattr(recompute, "rethreshold_tasks", lambda *_: iter(()))
         assert solve_dataset(store, "demo").solved == 4
         assert rows(store, TIGHT.hash) == told
         assert list_groups(store, load(store, ids[0]).dataset_id, "").items == listed

@@ -10,7 +10,7 @@ from app.db.store import Store
 from app.features.pitches.service import stale_matches
 from app.features.solutions.service import stale_groups
 from app.features.solve import jobs as full_solve
-from app.features.solve.jobs import count_yield, left_undone, solve_fully
+from app.features.solve.jobs import count_yield, pending_work, solve_fully
 from app.features.what_if import blocks as gathered
 
 
@@ -53,11 +53,11 @@ def test_stopped_between_two_matches_it_keeps_the_first(two: Store) -> None:
 
 
 def test_what_is_left_is_said_as_long_as_something_is(two: Store) -> None:
-    assert left_undone(two, "demo") == "2 are left to do"
+    assert pending_work(two, "demo") == "2 are left to do"
     solve_fully(two, "demo", None, Told(), lambda: not stale_groups(two, "demo"))
-    assert left_undone(two, "demo") == "the pitch of 2 matches is left to estimate"
+    assert pending_work(two, "demo") == "the pitch of 2 matches is left to estimate"
     solve_fully(two, "demo", None, Told())
-    assert left_undone(two, "demo") is None
+    assert pending_work(two, "demo") is None
 
 
 @pytest.mark.parametrize(("at_once", "counted"), [(1, True), (2, False)])

@@ -24,7 +24,7 @@ from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.jobs.service import Jobs
 from app.features.jobs.tables import JobModel
 from app.features.upkeep import service as module
-from app.features.upkeep.service import Tidied, Upkeep, tidy
+from app.features.upkeep.service import CleanupCounts, Upkeep, clean_up
 
 OLD = time.time() - 40 * 86_400
 
@@ -50,7 +50,7 @@ def killed_deletion(store: Store, fill, make_group, monkeypatch: pytest.MonkeyPa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("app.features.datasets.service.delete_spare_calibrations", kill)
+        patch.setattr("app.features.datasets.service.delete_unused_calibrations", kill)
         with suppress(KeyboardInterrupt):
             delete_dataset(store, "demo", confirm="demo", actor="a")
     return store
@@ -61,13 +61,13 @@ class TestCalibrations:
         assert list_datasets(killed_deletion) == []
         left = keys(killed_deletion)
         assert left > 0
-        assert tidy(killed_deletion).calibrations == left
+        assert clean_up(killed_deletion).calibrations == left
         assert keys(killed_deletion) == 0
 
     def test_those_of_present_solutions_stay(self, store: Store, fill, make_group) -> None:
         fill(make_group(7))
         before = keys(store)
-        assert tidy(store) == Tidied()
+        assert clean_up(store) == CleanupCounts()
         assert keys(store) == before > 0
 
     def test_none_go_while_groups_wait_to_be_solved(
@@ -75,7 +75,7 @@ class TestCalibrations:
     ) -> None:
         before = keys(killed_deletion)
         fill(make_group(9), solved=False)
-        assert tidy(killed_deletion).calibrations == 0
+        assert clean_up(killed_deletion).calibrations == 0
         assert keys(killed_deletion) == before > 0
 
 
@@ -93,7 +93,7 @@ class TestAnswers:
         monkeypatch.setattr(
             store, "settings", store.settings.model_copy(update={"answer_bytes": 2100})
         )
-        assert tidy(store).answers == 3
+        assert clean_up(store).answers == 3
         with store.read() as session:
             found = [find_response(session, f"k{number}", "ann") for number in range(5)]
         assert [answer and answer.body for answer in found] == [None, None, None, body, body]
@@ -108,7 +108,7 @@ class TestJobs:
             session.execute(update(JobModel).values(state="done", ended="2020-01-01T00:00:00"))
             update_job(session, 2, ended="9999-01-01T00:00:00")
             update_job(session, 3, state="waiting", ended=None)
-        assert tidy(store).jobs == 1
+        assert clean_up(store).jobs == 1
         with store.read() as session:
             assert list(session.scalars(text("SELECT id FROM job ORDER BY id"))) == [2, 3, 4]
 
@@ -117,7 +117,7 @@ class TestJobs:
             for state in ("failed", "cancelled", "done"):
                 job = insert_job(session, NewJob("export", "t", "ann"))
                 update_job(session, job, state=state, ended="2020-01-01T00:00:00")
-        assert tidy(store).jobs == 2
+        assert clean_up(store).jobs == 2
         with store.read() as session:
             assert list(session.scalars(text("SELECT state FROM job"))) == ["done"]
 
@@ -130,7 +130,7 @@ class TestExports:
         for name in ("1.zip", "2.zip", "2.json", "mine.zip", "f" * 32 + ".zip"):
             place(folder / name, OLD)
         place(folder / "3.zip", time.time())
-        assert tidy(store).exports == 2
+        assert clean_up(store).exports == 2
         left = {path.name for path in folder.iterdir()}
         assert left == {"2.zip", "2.json", "3.zip", "mine.zip"}
 
@@ -153,7 +153,7 @@ class TestFiles:
             place(home / "exports" / "8.zip", OLD),
             place(home / "exports" / "8.json", OLD),
         ]
-        tidied = tidy(store)
+        tidied = clean_up(store)
         assert (tidied.cached, tidied.uploads, tidied.leftovers) == (1, 0, 4)
         assert not any(path.exists() for path in gone)
         assert all(path.exists() for path in stay)
@@ -182,7 +182,7 @@ class TestUpkeep:
         old = place(store.settings.home / "cache" / "frames" / "ab" / "c.jpg", OLD)
         monkeypatch.setattr(module, "delete_old_responses", fail)
         with capture_logs() as logs:
-            assert tidy(store).cached == 1
+            assert clean_up(store).cached == 1
         assert [(entry["event"], entry["step"]) for entry in logs] == [("upkeep failed", "answers")]
         assert not old.exists()
 

@@ -16,7 +16,7 @@ from app.features.datasets.tables import GroupModel
 from app.features.groups.edit import SetBall
 from app.features.groups.replay import replay
 from app.features.groups.state import VerdictState
-from app.features.groups.state_snapshot import read_ledger
+from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
 from app.features.queue.queries import refresh_queue
@@ -149,7 +149,7 @@ class TestGiveVerdicts:
         assert (report.changed, report.refused) == (3, ())
         assert statuses(store) == ["accepted", "accepted", "unreviewed", "accepted"]
         with store.read() as session:
-            replayed, present = replay(session), read_ledger(session)
+            replayed, present = replay(session), read_state_snapshot(session)
             kinds = session.execute(text("SELECT kind FROM log ORDER BY id DESC LIMIT 4")).all()
         assert replayed == present
         assert [kind for (kind,) in kinds] == ["verdict_batch", *["verdict"] * 3]
@@ -196,7 +196,7 @@ class TestGiveVerdicts:
         assert batch.query == f"id:{named}"
         assert undo_batch(store, report.batch, actor="ben").restored == 3
         with store.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_an_etag_of_before_is_stale(self, store, ids) -> None:
         etag = load(store, ids[0]).etag
@@ -306,7 +306,7 @@ class TestUndoBatch:
             "ben": "accepted",
         }
         with store.read() as session:
-            assert replay(session) == read_ledger(session)
+            assert replay(session) == read_state_snapshot(session)
 
     def test_a_group_that_was_judged_since_keeps_its_verdict(self, store, ids) -> None:
         report = give_verdicts(store, 1, "", "deferred", actor="ben")

@@ -9,9 +9,9 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.agreement.adjudicate import decide, get_case, hand_back
-from app.features.agreement.service import after_hand_in, weigh
-from app.features.batches.leases import Leases, Worker
+from app.features.agreement.adjudicate import decide, get_case, return_for_correction
+from app.features.agreement.service import after_submission, compare_submitted
+from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, change_batch, make_batch
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
@@ -70,7 +70,7 @@ def judge(store: Store, group: int, state: str, actor: str) -> None:
 
 
 def annotate(store: Store, batch: int, person: str, moved: float) -> int:
-    copy = Leases(store).next(batch, Worker(person)).group
+    copy = Leases(store).next(batch, BatchMember(person)).group
     assert copy is not None
     state = load(store, copy)
     view = next(view for view in state.group.views if view.ball is not None)
@@ -93,8 +93,8 @@ def test_a_batch_is_told_of_from_giving_out_until_it_is_done(allowed, told, grou
     assert made[1] == {"dataset": "demo", "actor": "lea", "batch": {**said, **counts}}
     assert handed_on["batch"]["annotators"] == ["bo"] and handed_on["batch"]["name"] == "Derby day"
 
-    Leases(allowed).hand_in(batch, groups[0], Worker("bo"), actor="bo")
-    Leases(allowed).hand_back(batch, groups[0], Worker("cy"), "no ball", actor="cy")
+    Leases(allowed).submit(batch, groups[0], BatchMember("bo"), actor="bo")
+    Leases(allowed).return_group(batch, groups[0], BatchMember("cy"), "no ball", actor="cy")
     ((kind, back),) = told.new()
     assert (kind, back["actor"], back["person"]) == (Kind.HANDED_BACK, "cy", "bo")
     assert (back["group"], back["batch"]["id"]) == (groups[0], batch) and "no ball" not in str(back)
@@ -114,20 +114,20 @@ def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, to
     batch = make_batch(allowed, "demo", new, actor="lea").id
     annotate(allowed, batch, "ada", 0.0)
     copy = annotate(allowed, batch, "bo", 40.0)
-    assert after_hand_in(allowed, copy) == "open"
-    assert weigh(allowed, groups[0], batch) == "open"
+    assert after_submission(allowed, copy) == "open"
+    assert compare_submitted(allowed, groups[0], batch) == "open"
     (_, (kind, case)) = told.new()
     assert (kind, case["group"], case["people"]) == (Kind.DISPUTED, groups[0], ["ada", "bo"])
     assert case["batch"]["id"] == batch and case["disagreements"] > 0 and case["worst"] > 1
     bo = next(
         take for take in get_case(allowed, groups[0], actor="cy").takes if take.person == "bo"
     )
-    hand_back(allowed, groups[0], bo.id, "look again", actor="cy")
+    return_for_correction(allowed, groups[0], bo.id, "look again", actor="cy")
     ((kind, back),) = told.new()
     assert (kind, back["group"], back["copy"]) == (Kind.HANDED_BACK, groups[0], copy)
 
     judge(allowed, copy, "accepted", "bo")
-    assert after_hand_in(allowed, copy) == "open"
+    assert after_submission(allowed, copy) == "open"
     decide(allowed, groups[0], bo.id, actor="cy")
     assert [kind for kind, _ in told.new()] == [Kind.DISPUTED, Kind.DONE]
 

@@ -20,7 +20,7 @@ from app.features.groups.undo import undo
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.what_if import blocks as gathered
-from app.features.what_if.blocks import Gathered
+from app.features.what_if.blocks import DatasetBlocks
 from app.features.what_if.funnel import get_yield
 from app.features.what_if.service import YieldStore
 from app.soccer.policy import PAPER, CalibrationPolicy
@@ -161,11 +161,11 @@ class TestAfterARestart:
         path = folder(store) / "table.json"
         kept = json.loads(path.read_text())
         with store.read() as session:
-            assert Gathered.load(session, folder(store), 1, kept["calibration"]) is not None
+            assert DatasetBlocks.load(session, folder(store), 1, kept["calibration"]) is not None
             path.write_text(json.dumps({**kept, "entry": [kept["entry"][0], "0" * 64]}))
-            assert Gathered.load(session, folder(store), 1, kept["calibration"]) is None
+            assert DatasetBlocks.load(session, folder(store), 1, kept["calibration"]) is None
             path.write_text(json.dumps({**kept, "mark": kept["mark"] + 1}))
-            assert Gathered.load(session, folder(store), 1, kept["calibration"]) is None
+            assert DatasetBlocks.load(session, folder(store), 1, kept["calibration"]) is None
 
     def test_a_full_disk_costs_no_answer(self, store, fill, make_group) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
@@ -220,7 +220,7 @@ class TestHowFarItIs:
 
         monkeypatch.setattr(gathered, "read_tables", killed)
         with pytest.raises(KeyboardInterrupt):
-            YieldStore(store).keep_up(1)
+            YieldStore(store).update_table(1)
         monkeypatch.setattr(
             gathered,
             "read_tables",

@@ -8,8 +8,8 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, Policy
 from app.soccer.solution import Solution
-from app.solving.another_tau import alike_under, has_smaller_tau, retold
 from app.solving.facts import Facts
+from app.solving.rethreshold import differs_in_smaller_tau, rethreshold, unchanged_under
 from app.solving.solve import solve, solve_with_facts
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group, view
@@ -44,25 +44,25 @@ def again(found: Group, before: Policy, policy: Policy) -> tuple[Solution | None
     """Retold under a policy, and solved."""
     then, facts = solve_with_facts(found, before, {})
     now = solve(found, policy)
-    if not alike_under(facts, before, policy)[0]:
+    if not unchanged_under(facts, before, policy)[0]:
         return None, now
-    return retold(then, facts.view_diagonal.tolist(), policy), now
+    return rethreshold(then, facts.view_diagonal.tolist(), policy), now
 
 
 class TestHasSmallerTau:
     def test_nothing_else_may_differ_but_the_name(self):
-        assert has_smaller_tau(with_tau(0.9), PAPER)
-        assert not has_smaller_tau(PAPER, PAPER)
-        assert not has_smaller_tau(with_tau(1.1), PAPER)
-        assert not has_smaller_tau(replace(with_tau(0.9), min_jac=0.8), PAPER)
+        assert differs_in_smaller_tau(with_tau(0.9), PAPER)
+        assert not differs_in_smaller_tau(PAPER, PAPER)
+        assert not differs_in_smaller_tau(with_tau(1.1), PAPER)
+        assert not differs_in_smaller_tau(replace(with_tau(0.9), min_jac=0.8), PAPER)
 
 
 class TestUndecided:
     def test_a_pair_between_the_two_taus_is_decided_anew(self):
         facts: Facts = solve_with_facts(apart(0.0, 0.8 * TAU_PX), PAPER, {})[1]
         error = facts.pair_errors.max() / SIZE.diagonal * 100
-        assert not alike_under(facts, PAPER, with_tau(0.99 * error))[0]
-        assert alike_under(facts, PAPER, with_tau(1.01 * error))[0]
+        assert not unchanged_under(facts, PAPER, with_tau(0.99 * error))[0]
+        assert unchanged_under(facts, PAPER, with_tau(1.01 * error))[0]
 
 
 class TestRetold:
@@ -95,12 +95,12 @@ class TestRetold:
         assert told is None or told == solved
         then, facts = solve_with_facts(of, PAPER, {})
         least = with_tau(0.99 * max(errors))
-        assert retold(then, facts.view_diagonal.tolist(), least) is None
+        assert rethreshold(then, facts.view_diagonal.tolist(), least) is None
 
     def test_leaves_turned_views_to_the_solver(self):
         then, facts = solve_with_facts(apart(0.0, 0.0), PAPER, {})
         turned = replace(then, findings=(replace(PLAIN, kind="sides_swapped"), *then.findings))
-        assert retold(turned, facts.view_diagonal.tolist(), with_tau(0.9)) is None
+        assert rethreshold(turned, facts.view_diagonal.tolist(), with_tau(0.9)) is None
 
 
 PLAIN = solve(apart(0.0, 8 * TAU_PX), PAPER).findings[0]

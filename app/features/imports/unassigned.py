@@ -1,4 +1,4 @@
-"""Spare frames: what a dataset knows of images that are no view of a group (persons only)."""
+"""Unassigned frames: what a dataset knows of images that are no view of a group (persons only)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import read_dataset_head
 from app.features.groups.codecs import extras_from_json
-from app.features.groups.queries import known_spare, put_spare, spare_rows
+from app.features.groups.queries import known_unassigned, put_unassigned, unassigned_rows
 from app.features.imports.ingest import IngestReport, ensure_dataset
 from app.formats.issia import FramePersons
 from app.soccer.annotation import Extras
@@ -25,7 +25,7 @@ _CAMERA = re.compile(r"cam[1-6]", re.ASCII)
 
 
 @dataclass(frozen=True)
-class SpareFrame:
+class UnassignedFrame:
     """One image: the camera that took it, its frame, and what is known of it."""
 
     camera: str
@@ -33,10 +33,10 @@ class SpareFrame:
     extras: Extras
 
 
-def ingest_spare(
-    store: Store, dataset: str, frames: Iterable[SpareFrame], *, source: str, actor: str
+def ingest_unassigned(
+    store: Store, dataset: str, frames: Iterable[UnassignedFrame], *, source: str, actor: str
 ) -> IngestReport:
-    """Keep spare frames with a dataset; keeping them again changes nothing.
+    """Keep unassigned frames with a dataset; keeping them again changes nothing.
 
     People do not edit them, so they follow whatever the dataset brings.
     """
@@ -44,32 +44,32 @@ def ingest_spare(
     while batch := list(islice(items, BATCH)):
         dataset_id = ensure_dataset(store, dataset, actor)
         with store.write() as session:
-            _keep(session, dataset_id, batch, source, actor, report)
+            _save_batch(session, dataset_id, batch, source, actor, report)
     return report
 
 
-def spare_frames(session: Session, dataset_id: int) -> Iterator[SpareFrame]:
-    """The spare frames of a dataset, by camera and frame as texts."""
-    for row in spare_rows(session, dataset_id):
-        yield SpareFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
+def unassigned_frames(session: Session, dataset_id: int) -> Iterator[UnassignedFrame]:
+    """The unassigned frames of a dataset, by camera and frame as texts."""
+    for row in unassigned_rows(session, dataset_id):
+        yield UnassignedFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
 
 
-def spare_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
-    """People of the spare frames of a dataset of ISSIA, for its original shape."""
-    for item in spare_frames(session, read_dataset_head(session, dataset).id):
+def unassigned_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
+    """People of the unassigned frames of a dataset of ISSIA, for its original shape."""
+    for item in unassigned_frames(session, read_dataset_head(session, dataset).id):
         if _NUMBER.fullmatch(item.frame) and _CAMERA.fullmatch(item.camera):
             yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
 
 
-def _keep(
+def _save_batch(
     session: Session,
     dataset_id: int,
-    batch: Sequence[SpareFrame],
+    batch: Sequence[UnassignedFrame],
     source: str,
     actor: str,
     report: IngestReport,
 ) -> None:
-    known = known_spare(session, dataset_id, {item.frame for item in batch})
+    known = known_unassigned(session, dataset_id, {item.frame for item in batch})
     fresh = {}
     for item in batch:
         place, body = (item.camera, item.frame), pack(item.extras.values())
@@ -91,7 +91,7 @@ def _write(
 ) -> None:
     if not fresh:
         return
-    put_spare(session, dataset_id, fresh)
+    put_unassigned(session, dataset_id, fresh)
     frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
     body = {"source": source, "frames": frames}
     append(session, [Entry("spare", actor, now(), body, dataset_id)])

@@ -5,33 +5,33 @@ import { request } from './client.js';
 
 /** @import {GroupDocument} from './types.js' */
 
-/** @typedef {{id: number, batch: number | null, group: number, dataset: number, of: number | null, number: number | null, title: string, person: string, place: number, begun: string, handed_in: string | null, verdict: string | null, settled: string | null, handed_back: HandedBackJson | null}} TakeJson */
-/** @typedef {{group: number, title: string, by: string, at: string, reason: string}} HandedBackJson */
-/** @typedef {{count: number, median: number | null, low: number | null, high: number | null}} MiddleJson */
+/** @typedef {{id: number, batch: number | null, group: number, dataset: number, of: number | null, number: number | null, title: string, person: string, place: number, begun: string, handed_in: string | null, verdict: string | null, settled: string | null, handed_back: ReturnedJson | null}} IndependentAnnotationJson */
+/** @typedef {{group: number, title: string, by: string, at: string, reason: string}} ReturnedJson */
+/** @typedef {{count: number, median: number | null, low: number | null, high: number | null}} MedianIntervalJson */
 /** @typedef {{line_px: number | null, lines_missing: number, ball_px: number | null, balls_missing: number, ball_m: number | null}} ErrorJson */
 /** @typedef {{group: number, label: string, handed_in: string, verdict: string | null, true_verdict: string, right: boolean | null, error: ErrorJson, submissions: number}} GoldResultJson */
-/** @typedef {{person: string, results: GoldResultJson[], line_px: MiddleJson, ball_px: MiddleJson, ball_m: MiddleJson, judged: number, right: number, right_low: number | null, right_high: number | null}} PersonResultsJson */
+/** @typedef {{person: string, results: GoldResultJson[], line_px: MedianIntervalJson, ball_px: MedianIntervalJson, ball_m: MedianIntervalJson, judged: number, right: number, right_low: number | null, right_high: number | null}} PersonResultsJson */
 /** @typedef {{group: number, label: string, start: string, marked: string, marked_by: string, source: 'verdict' | 'sample' | 'version'}} GoldGroupJson */
 /** @typedef {{groups: GoldGroupJson[], people: PersonResultsJson[]}} GoldReportJson */
 /** @typedef {{dataset: number, number: number, text: string, versions: {number: number, written: string, written_by: string}[]}} GuidelinesJson */
 
-/** @param {number} group @returns {Promise<TakeJson>} */
-export const postTake = (group) => request(`/groups/${group}/takes`, { method: 'POST' });
+/** @param {number} group @returns {Promise<IndependentAnnotationJson>} */
+export const postIndependentAnnotation = (group) => request(`/groups/${group}/independent-annotations`, { method: 'POST' });
 
-/** @param {number} group a copy @param {AbortSignal} [signal] @returns {Promise<TakeJson>} */
-export const getTake = (group, signal) => request(`/groups/${group}/take`, { signal });
+/** @param {number} group a copy @param {AbortSignal} [signal] @returns {Promise<IndependentAnnotationJson>} */
+export const getIndependentAnnotation = (group, signal) => request(`/groups/${group}/independent-annotation`, { signal });
 
-/** @param {number} group a copy @returns {Promise<TakeJson>} */
-export const postHandIn = (group) => request(`/groups/${group}/hand-in`, { method: 'POST' });
+/** @param {number} group a copy @returns {Promise<IndependentAnnotationJson>} */
+export const postSubmission = (group) => request(`/groups/${group}/submission`, { method: 'POST' });
 
-/** @param {number} group a copy @param {string} reason @returns {Promise<TakeJson>} */
-export const postTakeBack = (group, reason) => request(`/groups/${group}/hand-back`, { method: 'POST', body: { reason } });
+/** @param {number} group a copy @param {string} reason @returns {Promise<IndependentAnnotationJson>} */
+export const postAnnotationReturn = (group, reason) => request(`/groups/${group}/return`, { method: 'POST', body: { reason } });
 
 /** @param {number} group a copy @returns {Promise<GroupDocument>} the group that it is of */
 export const postAdoption = (group) => request(`/groups/${group}/adoption`, { method: 'POST' });
 
-/** @param {string} dataset @param {AbortSignal} [signal] @returns {Promise<{items: TakeJson[]}>} */
-export const getTakes = (dataset, signal) => request(`/datasets/${encodeURIComponent(dataset)}/takes`, { signal });
+/** @param {string} dataset @param {AbortSignal} [signal] @returns {Promise<{items: IndependentAnnotationJson[]}>} */
+export const getIndependentAnnotations = (dataset, signal) => request(`/datasets/${encodeURIComponent(dataset)}/independent-annotations`, { signal });
 
 /** @param {number} group @param {string} start @returns {Promise<GoldGroupJson>} */
 export const putGold = (group, start) => request(`/groups/${group}/gold`, { method: 'PUT', body: { start } });

@@ -3,7 +3,7 @@
 
 import { nearestOfPieces, piecesOf } from '../geometry/polyline.js';
 import { gradeOfResidual } from '../geometry/residual.js';
-import { drawWhisker } from './points.js';
+import { drawResidualLine } from './points.js';
 
 /** @import {PaintJson} from '../api/paint.js' */
 /** @import {ImagePoint} from '../geometry/camera.js' */
@@ -24,7 +24,7 @@ export function viewPaint(picture, paint) {
 		found: paint,
 		draw: (context, scene) => {
 			for (const { point, nearest, distance } of whiskers) {
-				drawWhisker(context, scene, point, nearest, distance, gradeOfResidual(distance, picture.gamma));
+				drawResidualLine(context, scene, point, nearest, distance, gradeOfResidual(distance, picture.gamma));
 			}
 		},
 		places: (marking) => (paint.points[marking] ?? []).map(([x, y]) => ({ x, y })),

@@ -3,7 +3,7 @@ import { describe, it } from 'node:test';
 
 import { groupDocument } from '../../static/state/group.js';
 import { remedies } from '../../static/state/insight.js';
-import { isHeld, mend, mends } from '../../static/state/mends.js';
+import { isHeld, suggestion, suggestions } from '../../static/state/suggestions.js';
 import { openProposals, settledState, stateOf } from '../../static/state/proposal_lines.js';
 
 const view = (key, lines) => ({ key, letter: key, included: true, image: '/i', station: { has_given: false }, lines, balls: [] });
@@ -19,13 +19,13 @@ function show(lines, etag) {
 	groupDocument.value = { id: 7, etag, views, solution: own };
 }
 
-const offered = () => mend.value?.label;
+const offered = () => suggestion.value?.label;
 
 describe('what the card offers', () => {
 	it('waits until it is known whether lines are proposed, and never changes after that', () => {
 		show({}, 'a');
-		assert.deepEqual([isHeld.value, mend.value], [true, null]);
-		assert.ok(mends.value.length > 0);
+		assert.deepEqual([isHeld.value, suggestion.value], [true, null]);
+		assert.ok(suggestions.value.length > 0);
 		openProposals.value = new Map([['A', proposal]]);
 		settledState.value = stateOf(groupDocument.value);
 		assert.equal(offered(), 'Accept the lines');
@@ -33,10 +33,10 @@ describe('what the card offers', () => {
 		show({}, 'b');
 		assert.equal(offered(), 'Accept the lines');
 		openProposals.value = new Map();
-		assert.equal(mend.value, null);
+		assert.equal(suggestion.value, null);
 		settledState.value = stateOf(groupDocument.value);
 		// Nobody has looked at the picture of A, which has no lines.
-		assert.deepEqual(mends.value.map(({ label }) => label), ['Propose lines', 'Draw it']);
+		assert.deepEqual(suggestions.value.map(({ label }) => label), ['Propose lines', 'Draw it']);
 		openProposals.value = new Map([['A', { ...proposal, outcome: 'nothing', lines: {} }]]);
 		assert.equal(offered(), 'Draw it');
 		openProposals.value = new Map();
@@ -59,7 +59,7 @@ describe('a kind of fix that nobody here has heard of', () => {
 		show(LINES, 'd');
 		groupDocument.value = { ...groupDocument.value, solution: { ...groupDocument.value.solution, first_failing: null, passes: true, findings } };
 		remedies.value = { key: 'remedies 7 d', id: 7, items };
-		return mends.value;
+		return suggestions.value;
 	};
 
 	it('is carried out and pointed at as the server says', () => {

@@ -4,14 +4,14 @@
 import { html } from 'htm/preact';
 
 import { useAttempt } from '../lib/attempt.js';
-import { question } from '../state/hand_back.js';
+import { question } from '../state/return_group.js';
 import { FormDialog } from './dialog.js';
 import { FormError } from './form_error.js';
 
 /** As the server has it (app/features/independent_annotations/return_work.py). */
 const MAX_REASON = 500;
 
-export function HandBackDialog() {
+export function ReturnDialog() {
 	const asked = question.value;
 	const { error, busy, attempt } = useAttempt();
 	if (!asked) return null;

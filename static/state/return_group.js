@@ -3,20 +3,20 @@
 
 import { computed, signal } from '@preact/signals';
 
-import { postAdoption, postTakeBack } from '../api/takes.js';
-import { postHandBack } from '../api/work.js';
+import { postAdoption, postAnnotationReturn } from '../api/independent_annotations.js';
+import { postReturn } from '../api/work.js';
 import { navigate } from '../lib/router.js';
 import { groupDocument } from './group.js';
-import { handInAndNext, lease, nextOfBatch } from './leases.js';
+import { submitAndOpenNext, lease, nextOfBatch } from './leases.js';
 import { isTeam, myName } from './me.js';
 import { currentId, reviewAddress } from './navigation.js';
 import { announce, complain, inform } from './notice.js';
 import { whyNot } from './rights.js';
 
-/** @import {TakeJson} from '../api/takes.js' */
+/** @import {IndependentAnnotationJson} from '../api/independent_annotations.js' */
 
 /** The group on screen as somebody's own annotation; null: it is none, or nobody knows yet. */
-export const take = signal(/** @type {TakeJson | null} */ (null));
+export const take = signal(/** @type {IndependentAnnotationJson | null} */ (null));
 
 /**
  * What is asked before it is done; null: nothing.
@@ -45,37 +45,37 @@ export const frozen = computed(() => {
 /** Submit the group and go on, unless it was submitted already. */
 export async function submitAndNext() {
 	if (frozen.value) complain(frozen.value);
-	else await handInAndNext();
+	else await submitAndOpenNext();
 }
 
 /** Whether it can be taken over into the group that it is of. */
 export const canTakeOver = computed(() => isReady.value);
 
 /** Whether what is on screen can be handed back. */
-export const canHandBack = computed(() => {
+export const canReturn = computed(() => {
 	const held = lease.value;
-	return isReady.value || (held?.state === 'mine' && held.part === 'reviewer' && Boolean(held.handedInBy) && held.handedInBy !== myName.value);
+	return isReady.value || (held?.state === 'mine' && held.part === 'reviewer' && Boolean(held.submittedBy) && held.submittedBy !== myName.value);
 });
 
 /** Ask why the group on screen goes back to its annotator. */
-export function askHandBack() {
+export function askReturn() {
 	const [one, held] = [take.value, lease.value];
-	if (!canHandBack.value) return;
+	if (!canReturn.value) return;
 	if (isReady.value && one) {
 		question.value = {
 			kind: 'back', person: one.person,
 			says: `${one.person} sees the reason, can change this annotation, and submits it again. If others annotated the group too, nothing is decided until then.`,
 			send: async (reason) => {
-				take.value = await postTakeBack(one.group, reason);
+				take.value = await postAnnotationReturn(one.group, reason);
 				announce(`Returned to ${one.person}.`);
 			},
 		};
-	} else if (held?.handedInBy) {
-		const person = held.handedInBy;
+	} else if (held?.submittedBy) {
+		const person = held.submittedBy;
 		question.value = {
 			kind: 'back', person, says: `${person} sees the reason and gets this group next; you go to your next group.`,
 			send: async (reason) => {
-				await postHandBack(held.batch, held.group, reason);
+				await postReturn(held.batch, held.group, reason);
 				announce(`Returned to ${person}.`);
 				await nextOfBatch();
 				// Who stays would have open what the annotator gets next.

@@ -4,7 +4,7 @@
 import { capital, words } from '../lib/format.js';
 import { REASONS } from './reasons.js';
 
-/** @import {LogEntryJson} from '../api/past.js' */
+/** @import {LogEntryJson} from '../api/history.js' */
 
 const MOST_NAMES = 3;
 const TOLD = { said: 'Commented', edited: 'Changed a comment', deleted: 'Deleted a comment', resolved: 'Resolved a thread', reopened: 'Reopened a thread' };

@@ -3,13 +3,13 @@
 
 import { html } from 'htm/preact';
 
-import { getStep } from '../../api/past.js';
+import { getStep } from '../../api/history.js';
 import { sentenceOf } from '../../api/problem.js';
 import { ballsChanged, changedMarkings, changeWindow } from '../../geometry/change_window.js';
 import { useResource } from '../../lib/resource.js';
 import { Letter } from '../letter.js';
 
-/** @import {ChangedView, PastView, StepJson} from '../../api/past.js' */
+/** @import {ChangedView, PastView, StepJson} from '../../api/history.js' */
 /** @import {BallJson, PointJson} from '../../api/types.js' */
 
 /** @param {PointJson[]} points */

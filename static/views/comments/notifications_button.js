@@ -4,24 +4,24 @@
 import { html } from 'htm/preact';
 import { useRef } from 'preact/hooks';
 
-import { bell, seen } from '../../state/bell.js';
+import { bell, seen } from '../../state/notifications.js';
 import { isTeam, myName } from '../../state/me.js';
 import { Popover } from '../popover.js';
 import { When } from '../when.js';
 
-/** @import {RingJson} from '../../api/bell.js' */
+/** @import {NotificationJson} from '../../api/notifications.js' */
 
 const KINDS = { mention: '@', reply: '↩', job: '✓', assigned: '→', returned: '↶' };
 const ID = 'bell';
 
 /** Show what one is told. */
-export function openBell() {
+export function openNotifications() {
 	// As the button does it, so that it opens below that.
 	const button = /** @type {HTMLElement | null} */ (document.querySelector(`[popovertarget="${ID}"]`));
 	button?.click();
 }
 
-/** @param {{items: RingJson[], unread: number, close: () => void}} props */
+/** @param {{items: NotificationJson[], unread: number, close: () => void}} props */
 function Rings({ items, unread, close }) {
 	const list = useRef(/** @type {HTMLUListElement | null} */ (null));
 	/** @param {KeyboardEvent} event */
@@ -49,7 +49,7 @@ function Rings({ items, unread, close }) {
 	`;
 }
 
-export function BellButton() {
+export function NotificationsButton() {
 	if (!isTeam || !myName.value) return null;
 	const { items, unread } = bell.value ?? { items: [], unread: 0 };
 	const label = html`<svg viewBox="0 0 16 16" aria-hidden="true"><path d="M3 12h10l-1.5-2V7a3.5 3.5 0 0 0-7 0v3zM6.5 14h3" /></svg><span class="hidden-text">Notifications: </span>${unread ? html`<span class="bell__count">${unread > 99 ? '99+' : unread}</span><span class="hidden-text"> new</span>` : html`<span class="hidden-text">nothing new</span>`}`;

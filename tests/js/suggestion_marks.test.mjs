@@ -7,7 +7,7 @@ globalThis.getComputedStyle = () => ({ getPropertyValue: (name) => name });
 globalThis.matchMedia = () => ({ addEventListener: () => {} });
 globalThis.devicePixelRatio = 1;
 
-const { drawMendMarks } = await import('../../static/overlays/mend_marks.js');
+const { drawSuggestionMarks } = await import('../../static/overlays/suggestion_marks.js');
 
 const AT = { x: 40, y: 60 };
 const LINES = { 'Big rect. left main': [AT, { x: 80, y: 60 }] };
@@ -26,11 +26,11 @@ function drawn(meant, width = 900) {
 		lineTo: (x, y) => seen.ends.push([x, y]),
 	};
 	const context = new Proxy(own, { get: (target, name) => target[name] ?? (() => {}), set: () => true });
-	drawMendMarks(context, { picture: { view: { lines: LINES }, markings: [fit] }, viewport, meant });
+	drawSuggestionMarks(context, { picture: { view: { lines: LINES }, markings: [fit] }, viewport, meant });
 	return { words: seen.words, rings: seen.rings.length / 2, ends: seen.ends };
 }
 
-describe('drawMendMarks', () => {
+describe('drawSuggestionMarks', () => {
 	it('points at a line, at one of its points, at a place, or speaks of the whole view', () => {
 		const marking = 'Big rect. left main';
 		assert.deepEqual(drawn({ marking, index: null, caption: 'is it?' }), { words: ['is it?'], rings: 0, ends: [[80, 60]] });

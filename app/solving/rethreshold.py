@@ -24,13 +24,13 @@ from app.solving.gates import reprojection
 from app.solving.judgement import failures, view_jac
 
 
-def has_smaller_tau(policy: Policy, before: Policy) -> bool:
+def differs_in_smaller_tau(policy: Policy, before: Policy) -> bool:
     """Whether a policy differs from another in its name and a smaller tau alone."""
     alike = replace(before, name=policy.name, tau_percent=policy.tau_percent)
     return alike == policy and policy.tau_percent < before.tau_percent
 
 
-def alike_under(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
+def unchanged_under(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
     """Groups in which no pair fails another gate than under the policy before, shape (G,).
 
     Args:
@@ -46,12 +46,12 @@ def alike_under(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
     return same
 
 
-def retold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> Solution | None:
+def rethreshold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> Solution | None:
     """What ``solve`` says under a smaller tau, bit for bit; None where it has to be asked.
 
     Args:
-        solution: Under a policy that this one ``has_smaller_tau`` than, of a group that is
-            ``alike_under``; its calibrations are not read.
+        solution: Under a policy that this one ``differs_in_smaller_tau`` than, of a group that is
+            ``unchanged_under``; its calibrations are not read.
         diagonals: Of the pictures of its views, pixels.
         policy: The policy with that tau.
     """
@@ -64,8 +64,8 @@ def retold(solution: Solution, diagonals: Sequence[float], policy: Policy) -> So
         for view in solution.views
         if view.included and view.ball is not None and (view.ball.error_px or 0) > tau_px[view.view]
     }
-    told = {item.view for item in solution.findings if item.kind == "view_disagrees"}
-    if not missed <= told:
+    reported = {item.view for item in solution.findings if item.kind == "view_disagrees"}
+    if not missed <= reported:
         return None
     letters = {key: view_letter(place) for place, key in enumerate(keys)}
     gate = reprojection(solution.pairs, letters, tau_px, policy.tau_percent)

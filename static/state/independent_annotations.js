@@ -3,7 +3,7 @@
 
 import { signal } from '@preact/signals';
 
-import { postTake, putGold } from '../api/takes.js';
+import { postIndependentAnnotation, putGold } from '../api/independent_annotations.js';
 import { ApiError } from '../api/problem.js';
 import { navigate } from '../lib/router.js';
 import { groupDocument } from './group.js';
@@ -33,7 +33,7 @@ export async function annotateOwn() {
 	const group = groupDocument.value;
 	if (!group) return;
 	if (isCopy(group)) { announce('This is already your independent annotation.'); return; }
-	const take = await told(() => postTake(group.id));
+	const take = await told(() => postIndependentAnnotation(group.id));
 	if (take) navigate(reviewAddress(take.group));
 }
 

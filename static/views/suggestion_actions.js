@@ -1,11 +1,11 @@
 // @ts-check
-/** Carrying out what mends a group: the edit itself, or leading the person to the place where to draw. */
+/** Carrying out what corrects a group: the edit itself, or leading the person to the place where to draw. */
 
 import { framePoints } from '../geometry/frame_points.js';
 import { raysInto } from '../overlays/scene.js';
 import { startBall, startMarking } from '../state/drawing.js';
 import { group, pending, solution, submit } from '../state/group.js';
-import { mend } from '../state/mends.js';
+import { suggestion } from '../state/suggestions.js';
 import { announce } from '../state/notice.js';
 import { zoomTo } from '../state/viewports.js';
 import { focusView, selected } from '../state/workspace.js';
@@ -13,7 +13,7 @@ import { focusView, selected } from '../state/workspace.js';
 /** @import {GroupDocument, PairJson, ViewJson} from '../api/types.js' */
 /** @import {ImagePoint} from '../geometry/viewport.js' */
 /** @import {Edit} from '../state/edits.js' */
-/** @import {Mend} from '../state/mends.js' */
+/** @import {Suggestion} from '../state/suggestions.js' */
 
 /** Screen pixels per image pixel where a ball is looked for. */
 const BALL_SCALE = 8;
@@ -69,7 +69,7 @@ function submitOffered(edit) {
 	else submit(edit);
 }
 
-/** @param {GroupDocument} shown @param {ViewJson} view @param {NonNullable<Mend['guide']>} guide */
+/** @param {GroupDocument} shown @param {ViewJson} view @param {NonNullable<Suggestion['guide']>} guide */
 function lead(shown, view, { ball, draws, looks, reads }) {
 	if (ball) drawBall(shown, view);
 	if (draws) drawMissing(view, draws);
@@ -77,7 +77,7 @@ function lead(shown, view, { ball, draws, looks, reads }) {
 	if (reads) import('../state/paint_reading.js').then(({ readAgain }) => readAgain(shown));
 }
 
-/** @param {Mend} wanted */
+/** @param {Suggestion} wanted */
 export function carryOut({ view: key, edit, guide, run }) {
 	const shown = group.value;
 	const view = shown?.views.find((one) => one.key === key);
@@ -89,6 +89,6 @@ export function carryOut({ view: key, edit, guide, run }) {
 }
 
 /** Carry out what the card shows. */
-export function mendNow() {
-	if (mend.value) carryOut(mend.value);
+export function applySuggestion() {
+	if (suggestion.value) carryOut(suggestion.value);
 }

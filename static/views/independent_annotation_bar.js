@@ -5,20 +5,20 @@ import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
 import { listen } from '../api/events.js';
-import { getTake, postHandIn } from '../api/takes.js';
+import { getIndependentAnnotation, postSubmission } from '../api/independent_annotations.js';
 import { ApiError, sentenceOf } from '../api/problem.js';
 import { useResource } from '../lib/resource.js';
 import { groupDocument } from '../state/group.js';
-import { askHandBack, askTakeOver, canHandBack, canTakeOver, take as onScreen } from '../state/hand_back.js';
+import { askReturn, askTakeOver, canReturn, canTakeOver, take as onScreen } from '../state/return_group.js';
 import { complain } from '../state/notice.js';
 import { isTeam, myName } from '../state/me.js';
-import { HandedBack } from './lease_bar.js';
+import { ReturnedNote } from './lease_bar.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 
 /** @param {{group: GroupDocument}} props */
 function Bar({ group }) {
-	const { value: found, error, reload } = useResource((signal) => getTake(group.id, signal), [group.id, group.verdict.at]);
+	const { value: found, error, reload } = useResource((signal) => getIndependentAnnotation(group.id, signal), [group.id, group.verdict.at]);
 	const [busy, setBusy] = useState(false);
 	useEffect(() => listen('group', (told) => { if (told.group === group.id && told.kind === 'take') reload(); }, reload), [group.id, reload]);
 	useEffect(() => {
@@ -29,7 +29,7 @@ function Bar({ group }) {
 	async function handIn() {
 		setBusy(true);
 		try {
-			await postHandIn(group.id);
+			await postSubmission(group.id);
 		} catch (problem) {
 			if (!(problem instanceof ApiError)) throw problem;
 			complain(sentenceOf(problem));
@@ -43,8 +43,8 @@ function Bar({ group }) {
 	const state = take.settled ? 'It is done: it is used in its group, or another one is.' : take.handed_in ? `It is submitted and can no longer be changed${mine && isTeam ? '; only a lead can return it' : ''}.` : mine ? 'Only you and the leads see it.' : 'It is not submitted yet.';
 	return html`
 		<div class="bar take-bar" data-tone=${take.handed_back ? 'info' : undefined} role="status">
-			<p><strong>${take.number === null || mine ? take.title : `${take.number} · ${take.title}`}</strong>, ${whose}. ${take.handed_back ? html`<${HandedBack} back=${take.handed_back} />` : state}</p>
-			${canHandBack.value ? html`<button class="button" type="button" onClick=${askHandBack}>Return… <kbd>⇧U</kbd></button>` : null}
+			<p><strong>${take.number === null || mine ? take.title : `${take.number} · ${take.title}`}</strong>, ${whose}. ${take.handed_back ? html`<${ReturnedNote} back=${take.handed_back} />` : state}</p>
+			${canReturn.value ? html`<button class="button" type="button" onClick=${askReturn}>Return… <kbd>⇧U</kbd></button>` : null}
 			${canTakeOver.value ? html`<button class="button" type="button" onClick=${askTakeOver}>Take over… <kbd>⇧R</kbd></button>` : null}
 			${take.of && take.settled ? html`<a class="button" href=${`/review/${take.of}`}>Open the group</a>` : null}
 			${mine && !take.handed_in && take.batch === null ? html`<button class="button button--primary" type="button" disabled=${busy} onClick=${handIn}>Submit</button>` : null}
@@ -52,7 +52,7 @@ function Bar({ group }) {
 	`;
 }
 
-export function TakeBar() {
+export function IndependentAnnotationBar() {
 	const group = groupDocument.value;
 	return group ? html`<${Bar} key=${group.id} group=${group} />` : null;
 }

@@ -5,20 +5,20 @@ import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
 import { listen } from '../../api/events.js';
-import { getHistory } from '../../api/past.js';
+import { getHistory } from '../../api/history.js';
 import { useKeys } from '../../lib/hooks.js';
 import { useResource } from '../../lib/resource.js';
 import { navigate, page, param } from '../../lib/router.js';
 import { load } from '../../state/documents.js';
 import { isTeam } from '../../state/me.js';
 import { reviewAddress } from '../../state/navigation.js';
-import { isPictured, sentenceOfEntry } from '../../state/past_words.js';
+import { isPictured, sentenceOfEntry } from '../../state/history_words.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { Term } from '../term.js';
 import { When } from '../when.js';
 import { BeforeAfter } from './before_after.js';
 
-/** @import {LogEntryJson} from '../../api/past.js' */
+/** @import {LogEntryJson} from '../../api/history.js' */
 /** @import {GroupDocument} from '../../api/types.js' */
 
 /** @param {GroupDocument} group */

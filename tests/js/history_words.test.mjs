@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { sentenceOfEntry } from '../../static/state/past_words.js';
+import { sentenceOfEntry } from '../../static/state/history_words.js';
 
 const said = (kind, body) => sentenceOfEntry({ id: 1, at: '', actor: 'anna', kind, body }, () => 'B');
 

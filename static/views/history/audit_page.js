@@ -4,7 +4,7 @@
 import { html } from 'htm/preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 
-import { auditFile, getAudit } from '../../api/past.js';
+import { auditFile, getAudit } from '../../api/history.js';
 import { ApiError } from '../../api/problem.js';
 import { beginningOf } from '../../lib/day.js';
 import { withForm } from '../../lib/field.js';
@@ -13,7 +13,7 @@ import { datasets } from '../../state/datasets.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { When } from '../when.js';
 
-/** @import {AuditEntryJson, AuditFilter} from '../../api/past.js' */
+/** @import {AuditEntryJson, AuditFilter} from '../../api/history.js' */
 
 const FAMILIES = [
 	{ name: 'edit', label: 'edits' }, { name: 'verdict', label: 'verdicts' }, { name: 'comment', label: 'comments' }, { name: 'policy', label: 'policies' },

@@ -345,7 +345,7 @@ class TestUndrawnLine:
         one.change(1, "/lines", {"lines": {missing: None}})
         screen = one.open()
         page = one.page
-        fix = page.locator(".mend .button--fix")
+        fix = page.locator(".suggestion .button--fix")
         for _ in range(6):
             if fix.inner_text().startswith("Draw it"):
                 break
@@ -356,7 +356,7 @@ class TestUndrawnLine:
         expect(page.locator('.image-panel[data-view="B"] .drawing-chip')).to_contain_text(missing)
         # The card leads to the drawing, and does not offer it once more.
         expect(one.card).to_contain_text("You are drawing")
-        expect(page.locator(".mend .button--fix")).to_have_count(0)
+        expect(page.locator(".suggestion .button--fix")).to_have_count(0)
         # Nobody has looked yet: Enter alone draws nothing.
         screen.press("Enter")
         assert missing not in one.document()["views"][1]["lines"]

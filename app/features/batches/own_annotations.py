@@ -11,9 +11,9 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.batches.queries import groups_of, groups_returned
-from app.features.batches.queries import hand_in as hand_in_group
+from app.features.batches.queries import mark_submitted as hand_in_group
 from app.features.batches.service import Batch, Part, get_batch, list_batches
-from app.features.independent_annotations.adopt import adopt_take
+from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.known_truth import (
     Terms,
     begin_next,
@@ -22,15 +22,15 @@ from app.features.independent_annotations.known_truth import (
 )
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
-    Take,
+    IndependentAnnotation,
+    annotation_of_copy,
+    annotations_of_batch,
     count_left,
-    take_of_copy,
-    takes_of_batch,
 )
-from app.features.independent_annotations.service import read_take
+from app.features.independent_annotations.service import read_annotation
 from app.features.independent_annotations.submission_queries import require_open, submit_copy
 from app.features.people.visibility_queries import READER, judges_in
-from app.features.queue.fields import asks_blind
+from app.features.queue.fields import reads_hidden_work
 from app.soccer.actors import person_of
 
 OVER = ("accepted", "rejected")
@@ -44,12 +44,12 @@ def takes_part(batch: Batch, parts: Collection[Part]) -> bool:
     return Part.ANNOTATOR in parts or (Part.REVIEWER in parts and not batch.annotators)
 
 
-def next_own(store: Store, batch: Batch, person: str) -> Take | None:
+def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation | None:
     """The own annotation that somebody shall work on now; None: there is nothing left for them.
 
     Where one annotation a group is asked for, what they have handed in is taken over first.
     """
-    take_over_handed_in(store, batch, person)
+    adopt_submitted(store, batch, person)
     with store.read() as session:
         groups = _waiting(session, batch)
     terms = Terms(
@@ -77,8 +77,8 @@ def own_left(session: Session, batch: Batch, person: str) -> int:
     left = begun + free + len(returned_to(session, batch, person))
     if batch.gold_every is None:
         return left
-    takes = takes_of_batch(session, batch.id, batch.dataset_id)
-    kinds = [take.kind for take in takes if take.person == name]
+    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
+    kinds = [annotation.kind for annotation in annotations if annotation.person == name]
     fresh = len(fresh_outside(session, batch.dataset_id, name, _waiting(session, batch)))
     return left + count_gold_left(kinds, batch.gold_every, free, fresh)
 
@@ -89,7 +89,7 @@ def as_seen(session: Session, batch: Batch) -> Batch:
     Of one that they annotate blind they see their own part alone: counts of the groups change with
     what is submitted of them, and not with what is submitted of a gold group.
     """
-    if asks_blind(batch.query) and not judges_in(batch.dataset_id):
+    if reads_hidden_work(batch.query) and not judges_in(batch.dataset_id):
         batch = replace(batch, query="")
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
@@ -99,13 +99,13 @@ def as_seen(session: Session, batch: Batch) -> Batch:
 
 def own_part(session: Session, batch: Batch, person: str) -> Batch:
     """A batch with the counts of somebody's own annotations: what they submitted is done."""
-    takes = takes_of_batch(session, batch.id, batch.dataset_id)
+    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
     name = person_of(person)
     back = set(returned_to(session, batch, person))
     done = [
-        take.handed_in
-        for take in takes
-        if take.person == name and take.handed_in and take.group_id not in back
+        annotation.handed_in
+        for annotation in annotations
+        if annotation.person == name and annotation.handed_in and annotation.group_id not in back
     ]
     return replace(
         batch,
@@ -148,12 +148,12 @@ def own_total(session: Session, batch: Batch, person: str) -> int | None:
     if batch.gold_every is not None:
         return None
     name = person_of(person)
-    takes = takes_of_batch(session, batch.id, batch.dataset_id)
-    done = len([row for row in takes if row.person == name and row.handed_in is not None])
+    annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
+    done = len([row for row in annotations if row.person == name and row.handed_in is not None])
     return done + sum(count_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
 
 
-def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
+def adopt_submitted(store: Store, batch: Batch, person: str) -> None:
     """Take over what somebody handed in, where nobody else annotates the same groups.
 
     What an annotator has not judged waits for a reviewer then, as if they had handed the group in.
@@ -163,7 +163,7 @@ def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
     with store.read() as session:
         ready = [
             row
-            for row in takes_of_batch(session, batch.id, batch.dataset_id)
+            for row in annotations_of_batch(session, batch.id, batch.dataset_id)
             if row.person == person_of(person)
             and (row.kind, row.settled) == (INDEPENDENT, None)
             and row.handed_in is not None
@@ -174,24 +174,26 @@ def take_over_handed_in(store: Store, batch: Batch, person: str) -> None:
         def note(session: Session, group: int = row.group_id) -> None:
             hand_in_group(session, batch.id, group, at=now(), by=person_of(person))
 
-        adopt_take(store, row.id, actor=person, also=note if waits else None)
+        adopt_annotation(store, row.id, actor=person, also=note if waits else None)
 
 
-def own_of(session: Session, batch: Batch, group: int, person: str) -> Take | None:
+def own_of(session: Session, batch: Batch, group: int, person: str) -> IndependentAnnotation | None:
     """The own annotation of a person in a batch whose copy a group is; None: it is none."""
-    row = take_of_copy(session, group)
+    row = annotation_of_copy(session, group)
     if row is None or (row.batch_id, row.person) != (batch.id, person_of(person)):
         return None
-    return read_take(session, row.id)
+    return read_annotation(session, row.id)
 
 
-def hand_in_own(session: Session, take: Take, *, actor: str, done: bool) -> None:
+def submit_own(
+    session: Session, annotation: IndependentAnnotation, *, actor: str, done: bool
+) -> None:
     """Submit an own annotation; ``done`` False: refused, only a lead lets its person go on with it.
 
     Raises:
         ConflictError: It was submitted before, or is not and shall be taken back.
     """
     if not done:
-        require_open(take)
+        require_open(annotation)
         raise ConflictError("this annotation is not submitted yet")
-    submit_copy(session, read_take(session, take.id), actor=actor, at=now())
+    submit_copy(session, read_annotation(session, annotation.id), actor=actor, at=now())

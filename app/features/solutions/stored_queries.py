@@ -162,8 +162,8 @@ def decode_row(session: Session, row: Any) -> Solution:
         solution = decode_solution(unpack(row.body), calibrations)
         if named != [view.calibration_key for view in solution.views]:
             raise ValueError("its calibrations differ from those in its row")
-        said = (solution.policy_hash, solution.solver_version)
-        if said != (row.policy_hash, row.solver_version):
+        stored = (solution.policy_hash, solution.solver_version)
+        if stored != (row.policy_hash, row.solver_version):
             raise ValueError("its policy or solver differs from the one in its row")
     return solution
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.bootstrap import Resamples
-from app.evaluation.careful import boxes_figure, boxes_table
 from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import Detection
+from app.evaluation.reference_boxes import boxes_figure, boxes_table
 from app.evaluation.table import FrameRange
 from app.soccer.frames import Box
 

@@ -3,12 +3,12 @@
 
 import { effect, signal, untracked } from '@preact/signals';
 
-import { getBell, postRead } from '../api/bell.js';
+import { getNotifications, postNotificationsRead } from '../api/notifications.js';
 import { listen } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { isTeam, mustLogIn, myName } from './me.js';
 
-/** @import {BellJson} from '../api/bell.js' */
+/** @import {NotificationsJson} from '../api/notifications.js' */
 
 /** Jobs tell often how far they are; what is read waits so long for more, ms. */
 const PAUSE = 250;
@@ -19,7 +19,7 @@ const ENDED = ['done', 'failed'];
 const TELLING = ['comment', 'take', 'work'];
 
 /** What is told; null until it is known. */
-export const bell = signal(/** @type {BellJson | null} */ (null));
+export const bell = signal(/** @type {NotificationsJson | null} */ (null));
 
 /** @type {ReturnType<typeof setTimeout> | undefined} */
 let timer;
@@ -28,11 +28,11 @@ let timer;
 function readSoon() {
 	clearTimeout(timer);
 	timer = setTimeout(async () => {
-		if (!mustLogIn.value) await take(getBell());
+		if (!mustLogIn.value) await take(getNotifications());
 	}, PAUSE);
 }
 
-/** @param {Promise<BellJson>} asked */
+/** @param {Promise<NotificationsJson>} asked */
 async function take(asked) {
 	try {
 		bell.value = await asked;
@@ -44,11 +44,11 @@ async function take(asked) {
 
 /** It was seen. @param {number[] | null} ids null: all of it */
 export function seen(ids) {
-	return take(postRead(ids));
+	return take(postNotificationsRead(ids));
 }
 
 /** Follow what is told to whoever is logged in. */
-export function startBell() {
+export function startNotifications() {
 	if (!isTeam) return;
 	effect(() => {
 		if (!myName.value || mustLogIn.value) return undefined;

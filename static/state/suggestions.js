@@ -1,5 +1,5 @@
 // @ts-check
-/** What would mend the group on screen, the likeliest first: proposed lines, findings, missing balls, remedies. */
+/** What would correct the group on screen, the likeliest first: proposed lines, findings, missing balls, remedies. */
 
 import { computed, effect, signal, untracked } from '@preact/signals';
 
@@ -28,14 +28,14 @@ import { focused } from './workspace.js';
  * @property {(view: ViewJson) => void} [run]
  */
 /**
- * @typedef {object} About what a mend speaks about
+ * @typedef {object} About what a suggestion speaks about
  * @property {string | null} view
  * @property {string | null} [marking]
  * @property {number | null} [index] of a point of the marking
  * @property {PairJson | null} [point] where that point would have to stand, image pixels
  */
 /**
- * @typedef {Way & About & {title: string | null, sentence: string, passes: boolean, finding?: FindingJson}} Mend one thing that a person can do
+ * @typedef {Way & About & {title: string | null, sentence: string, passes: boolean, finding?: FindingJson}} Suggestion one thing that a person can do
  *   about a group; title null: that of the gate that fails; passes: whether the solver found that the group would pass; finding: that it mends
  */
 
@@ -62,7 +62,7 @@ function inPicture({ width, height }, [x, y]) {
 	return x >= 0 && y >= 0 && x < width && y < height;
 }
 
-/** @param {GroupDocument} shown @param {SolutionJson} solved @returns {Mend[]} */
+/** @param {GroupDocument} shown @param {SolutionJson} solved @returns {Suggestion[]} */
 function missingBalls(shown, solved) {
 	return blindViews(shown, solved).flatMap((view) => {
 		const place = solved.views.find((one) => one.view === view.key)?.expected?.place;
@@ -81,7 +81,7 @@ function missingBalls(shown, solved) {
 	});
 }
 
-/** To look for lines in the picture of a view that nobody has looked at. @param {GroupDocument} shown @param {SolutionJson | null} solved @param {ViewJson} view @returns {Mend} */
+/** To look for lines in the picture of a view that nobody has looked at. @param {GroupDocument} shown @param {SolutionJson | null} solved @param {ViewJson} view @returns {Suggestion} */
 function lookForLines(shown, solved, view) {
 	const finding = solved?.findings.find((one) => one.kind === 'under_constrained' && one.view === view.key);
 	return {
@@ -93,7 +93,7 @@ function lookForLines(shown, solved, view) {
 	};
 }
 
-/** Lines that are proposed for views without a camera. @param {GroupDocument} shown @param {ReadonlyMap<string, ViewProposalJson>} proposed @returns {Mend[]} */
+/** Lines that are proposed for views without a camera. @param {GroupDocument} shown @param {ReadonlyMap<string, ViewProposalJson>} proposed @returns {Suggestion[]} */
 function proposedLines(shown, proposed) {
 	return shown.views.flatMap((view) => {
 		const item = proposed.get(view.key);
@@ -113,20 +113,20 @@ function aboutOf({ view, marking = null, index = null, point = null }) {
 	return { view, marking, index, point };
 }
 
-/** @param {GroupDocument} shown @param {FindingJson} finding @returns {Mend[]} */
+/** @param {GroupDocument} shown @param {FindingJson} finding @returns {Suggestion[]} */
 function ofFinding(shown, finding) {
 	const told = { title: findingTitle(shown, finding), sentence: finding.sentence, passes: false, finding };
 	return waysOf(finding).map((way) => ({ ...aboutOf(finding.fix ?? finding), ...way, ...told }));
 }
 
-/** @param {Remedy} remedy @returns {Mend[]} */
+/** @param {Remedy} remedy @returns {Suggestion[]} */
 function ofRemedy(remedy) {
 	const { edit: fix, sentence, passes } = remedy;
 	const told = { title: null, sentence: `${passes ? 'It would pass' : 'It would come closer'} if ${sentence}.`, passes };
 	return waysOf(remedy).map((way) => ({ ...aboutOf(fix), ...way, ...told }));
 }
 
-/** Whether two are the same button about the same thing. @param {Mend} a @param {Mend} b */
+/** Whether two are the same button about the same thing. @param {Suggestion} a @param {Suggestion} b */
 function isSame(a, b) {
 	return a.label === b.label && a.view === b.view && a.marking === b.marking && a.index === b.index;
 }
@@ -137,9 +137,9 @@ function isSame(a, b) {
  *
  * @param {GroupDocument} shown @param {SolutionJson | null} solved @param {readonly Remedy[]} helping
  * @param {ReadonlyMap<string, ViewProposalJson>} proposed
- * @returns {Mend[]}
+ * @returns {Suggestion[]}
  */
-function mendsOf(shown, solved, helping, proposed) {
+function suggestionsOf(shown, solved, helping, proposed) {
 	// Without its camera a view says nothing of the ball: that comes before everything else.
 	const lines = proposedLines(shown, proposed);
 	const looks = shown.views.filter((view) => waitsForLines(view, solved) && !proposed.has(view.key)).map((view) => lookForLines(shown, solved, view));
@@ -148,22 +148,22 @@ function mendsOf(shown, solved, helping, proposed) {
 	const short = solved.first_failing?.gate === 'ball';
 	const tried = helping.flatMap(ofRemedy);
 	const found = openFindings(solved).flatMap((finding) => ofFinding(shown, finding))
-		.map((mend) => ({ ...mend, passes: tried.some((remedy) => remedy.passes && isSame(remedy, mend)) }));
+		.map((suggestion) => ({ ...suggestion, passes: tried.some((remedy) => remedy.passes && isSame(remedy, suggestion)) }));
 	const known = short ? [...missing, ...found] : [...found, ...missing];
-	const more = tried.filter((remedy) => !known.some((mend) => isSame(remedy, mend)));
+	const more = tried.filter((remedy) => !known.some((suggestion) => isSame(remedy, suggestion)));
 	return solved.passes ? [...lines, ...known, ...looks, ...more] : [...lines, ...looks, ...known, ...more];
 }
 
-/** Everything that would mend the group on screen. */
-export const mends = computed(() => {
+/** Everything that would correct the group on screen. */
+export const suggestions = computed(() => {
 	const shown = group.value;
 	if (!shown) return [];
 	const known = remedies.value?.id === shown.id ? remedies.value.items : [];
-	return mendsOf(shown, solution.value, known, openProposals.value);
+	return suggestionsOf(shown, solution.value, known, openProposals.value);
 });
 
 /** Which of them is meant: its place from 0, -1 without any. */
-export const mendIndex = computed(() => Math.min(chosen.value, mends.value.length - 1));
+export const suggestionIndex = computed(() => Math.min(chosen.value, suggestions.value.length - 1));
 /** Whether lines may still be proposed that would come first: until that is known the card offers nothing. */
 export const isHeld = computed(() => {
 	const saved = groupDocument.value;
@@ -171,30 +171,30 @@ export const isHeld = computed(() => {
 	return ![...openProposals.value.values()].some(({ outcome }) => outcome === 'proposed');
 });
 /** The one that the card shows and Enter carries out. */
-export const mend = computed(() => (isHeld.value ? null : mends.value[mendIndex.value] ?? null));
+export const suggestion = computed(() => (isHeld.value ? null : suggestions.value[suggestionIndex.value] ?? null));
 
-/** The finding that the card speaks about: the worst, whatever else could be mended, else that of the mend; null where it speaks of something else. */
-export const toldFinding = computed(() => {
-	const meant = mend.value;
+/** The finding that the card speaks about: the worst, whatever else could be mended, else that of the suggestion; null where it speaks of something else. */
+export const shownFinding = computed(() => {
+	const meant = suggestion.value;
 	const first = openFindings(solution.value)[0];
 	if (first && isGrave(first, solution.value)) return first;
 	return (meant?.title ? meant.finding : first) ?? null;
 });
 
-/** Whether the card's title is that of the mend that it offers. */
-export const isMendTold = computed(() => {
-	const meant = mend.value;
-	return Boolean(meant?.title) && (meant?.finding ?? null) === toldFinding.value;
+/** Whether the card's title is that of the suggestion that it offers. */
+export const isSuggestionShown = computed(() => {
+	const meant = suggestion.value;
+	return Boolean(meant?.title) && (meant?.finding ?? null) === shownFinding.value;
 });
 
 /** Show another one. @param {number} step */
-export function turnMend(step) {
-	const count = mends.value.length;
-	if (count) chosen.value = (mendIndex.value + step + count) % count;
+export function nextSuggestion(step) {
+	const count = suggestions.value.length;
+	if (count) chosen.value = (suggestionIndex.value + step + count) % count;
 }
 
 /** Begin with the first one in every group, and after everything that changed it. */
-export function startMends() {
+export function startSuggestions() {
 	let at = { id: 0, etag: '', proposed: 0 };
 	return effect(() => {
 		const { id = 0, etag = '' } = groupDocument.value ?? {};
@@ -210,7 +210,7 @@ export function startMends() {
 /** Keys speak about the view that the card speaks about, and it is seen whole, whatever was looked at before. */
 function focusMeant() {
 	returnLent();
-	const meant = group.value?.views.find(({ key }) => key === mends.value[mendIndex.value]?.view);
+	const meant = group.value?.views.find(({ key }) => key === suggestions.value[suggestionIndex.value]?.view);
 	if (!meant) return;
 	focused.value = meant.letter;
 	fitPanel(meant.letter);

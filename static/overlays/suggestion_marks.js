@@ -7,7 +7,7 @@ import { shortMarking } from '../lib/format.js';
 import { label, strokeLine, widthOf } from './pen.js';
 
 /** @import {PairJson} from '../api/types.js' */
-/** @import {Mend} from '../state/mends.js' */
+/** @import {Suggestion} from '../state/suggestions.js' */
 /** @import {Scene} from './scene.js' */
 
 const RING = 11;
@@ -15,7 +15,7 @@ const RING = 11;
 const ROOMY = 330;
 
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
-export function drawMendMarks(context, scene) {
+export function drawSuggestionMarks(context, scene) {
 	const { meant } = scene;
 	// Nothing is pointed out that has no words: undrawn lines and missing balls stand there already.
 	if (!meant?.caption) return;
@@ -62,7 +62,7 @@ function line(context, { picture, viewport }, marking, caption) {
 	beside(context, caption, { x: at.x + 14, y: at.y - 16 });
 }
 
-/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {Mend} meant */
+/** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {Suggestion} meant */
 function point(context, { picture, viewport }, meant) {
 	const fit = picture.markings.find((one) => one.marking === meant.marking);
 	const found = fit?.points[meant.index ?? -1];
