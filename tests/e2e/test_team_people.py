@@ -27,7 +27,7 @@ from tests.e2e.test_access import serious_in_both
 
 WHO_IS_THERE = """async () => (await import(
   document.querySelector('script[src$="main.js"]').src.replace('main.js', 'state/me.js')
-)).askWhoIsThere()"""
+)).loadSession()"""
 
 
 class TestPeople:
