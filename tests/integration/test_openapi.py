@@ -171,7 +171,7 @@ def api_schema(application: FastAPI) -> schemathesis.BaseSchema:
 
 
 TAKES = (
-    ("GET", "take"),
+    ("GET", "independent-annotation"),
     ("POST", "submission"),
     ("POST", "return"),
     ("POST", "adoption"),

@@ -67,7 +67,7 @@ class TestBestBall:
 
     def test_subsets_of_views_have_together_the_bits_that_each_has_alone(self):
         views = _Views(ball_observations(*random_views(11)), PAPER)
-        chosen = list(combinations(range(len(views.sights)), 2))
+        chosen = list(combinations(range(len(views.observations)), 2))
         starts = [np.array([0.0, 0.0, -1.0])] * len(chosen)
         together = views.estimates(chosen, starts)
         assert len([found for found in together if found is not None]) > 2
