@@ -108,6 +108,10 @@ class TestEveryRoute:
                 # The cameras of the small dataset are not static.
                 assert stale.status_code == 409, path
                 continue
+            if "/recordings/" in path:
+                # The small dataset has none; test_routes of recordings has the conflict.
+                assert stale.status_code == 404, path
+                continue
             assert stale.status_code == 412, path
             assert stale.json()["current"]["etag"] == stale.headers["etag"]
         assert guarded >= 8
