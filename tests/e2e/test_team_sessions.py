@@ -155,7 +155,7 @@ class TestSessions:
         log_out(page)
         provider.who = {"sub": "s-stranger"}
         page.get_by_role("button", name="Log in with Club").click()
-        expect(page.get_by_text("Nobody here is linked")).to_be_visible()
+        expect(page.get_by_text("No person here is linked")).to_be_visible()
         expect(page.get_by_role("link", name="Back to the login")).to_be_focused()
         assert serious_in_both(page) == []
 
