@@ -20,7 +20,7 @@ from app.sample.pose import INDEX, LIMBS, Pose, pose_people
 from app.sample.props import draw_ball, draw_frame, draw_net
 from app.sample.scene import Scene
 from app.sample.scoreboard import draw_scoreboard
-from app.sample.surface import BOARD_HEIGHT, TILE, Bowl, SurfaceCamera, Turf, shade
+from app.sample.surface import BOARD_HEIGHT, TILE, Bowl, Eye, Turf, shade
 from app.sample.views import HEIGHT, WIDTH
 
 Tile = npt.NDArray[np.float32]
@@ -246,9 +246,9 @@ def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
     return image
 
 
-def _eye(camera: Camera) -> SurfaceCamera:
+def _eye(camera: Camera) -> Eye:
     lens = (camera.focal_length[0], *camera.principal_point, float(camera.distortion[0]))
-    return SurfaceCamera(camera.rotation, camera.position, *lens)
+    return Eye(camera.rotation, camera.position, *lens)
 
 
 def _turf(look: Look) -> Turf:

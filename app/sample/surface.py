@@ -23,7 +23,7 @@ _WALL, _CROWD = 0, 1
 _jit = numba.njit(cache=True, nogil=True, fastmath=False)
 
 
-class SurfaceCamera(NamedTuple):
+class Eye(NamedTuple):
     """The camera: R, position in the pitch frame, and lens (pixels; first radial coefficient)."""
 
     rotation: FloatArray
@@ -331,7 +331,7 @@ def _sky(out: np.ndarray, ray: np.ndarray, sky: np.ndarray) -> None:
 @_jit
 def shade(
     image: np.ndarray, background: np.ndarray, shadow: np.ndarray, exposure: np.ndarray,
-    eye: SurfaceCamera, turf: Turf, bowl: Bowl, coarse: np.ndarray, fine: np.ndarray,
+    eye: Eye, turf: Turf, bowl: Bowl, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Paint the whole frame.
 
