@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.errors import InputError
+from app.finite import json_text
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.video.measures import MEASURES, Measured
 
@@ -165,7 +166,7 @@ def time_base_of(times: FloatArray) -> tuple[tuple[int, int], IntArray]:
 def index_to_bytes(index: RecordingIndex) -> bytes:
     """An index as bytes, compressed."""
     content = BytesIO()
-    head = json.dumps({"version": VERSION, **asdict(index.facts)}).encode()
+    head = json_text({"version": VERSION, **asdict(index.facts)}).encode()
     np.savez_compressed(
         content,
         allow_pickle=False,

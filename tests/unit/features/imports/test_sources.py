@@ -204,7 +204,7 @@ class TestImportSource:
             (
                 "match.mp4",
                 "holds a video, which is a recording",
-                "import video",
+                "Bring it in with `touchline import video",
             ),
             ("still.jpg", "holds pictures and no annotations", "Import them as frames"),
         ],

@@ -82,6 +82,21 @@ RESULTS = [
         {"items": [{"proposed": None}, {"proposed": {}}]},
         "2 matches estimated, 1 with a proposal.",
     ),
+    (
+        "recording",
+        {"name": "half.mp4", "frames": 1500, "shots": 1},
+        "half.mp4 has 1,500 frames in 1 shot.",
+    ),
+    (
+        "instants",
+        {"name": "half.mp4", "new": 4, "unchanged": 0},
+        "4 groups made of half.mp4.",
+    ),
+    (
+        "instants",
+        {"name": "half.mp4", "new": 1, "unchanged": 3},
+        "1 group made of half.mp4; 3 were there before.",
+    ),
 ]
 
 
