@@ -47,8 +47,9 @@ run: setup
 	@$(BIN)/touchline serve --sample
 
 # Two halves side by side, in as many processes as there are cores, and one more for the half that waits
-# for processes of its own: servers and browsers that are tested are processes too. Files in their order, so that the long ones (integration, security)
-# come first and no process is left with one at the end. Every line says which half speaks.
+# for processes of its own: servers and browsers that are tested are processes too. Files in their order,
+# so that the long ones (integration, security) come first and no process is left with one at the end.
+# Every line says which half speaks.
 PROCESSES = $(shell n=$$(getconf _NPROCESSORS_ONLN); echo $$(( n < 2 ? 2 : n < 8 ? n : 8 )))
 # What tests write lies in memory where that has much room: they wait for no disk.
 ROOMY = $(shell df -Pk /dev/shm 2>/dev/null | awk 'NR == 2 && $$4 > 8000000 { print "yes" }')

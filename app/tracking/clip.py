@@ -15,6 +15,10 @@ from app.media.video import open_video
 from app.paint.evidence import Image
 from app.paint.propose import ENLARGED_WIDTH, WORK_WIDTH, enlarged, why_too_small
 from app.soccer.frames import ImageSize
+from app.video.indexing import pixel_aspect
+
+_MOST_UNEQUAL = 0.01
+"""By how much width and height of a pixel may differ: containers round."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,16 @@ class Clip:
         """The clip of a file.
 
         Raises:
-            ImageError: It is no video that can be read, or too small to follow a line in.
+            ImageError: It is no video that can be read, its pixels are not square, or it is too small to
+                follow a line in.
         """
+        with open_video(path) as video:
+            over, under = pixel_aspect(video, 0)
+        if abs(over / under - 1) > _MOST_UNEQUAL:
+            raise ImageError(
+                f"{path.name}: its pixels are not square ({over}:{under})",
+                hint="Convert it first: ffmpeg -i IN -vf scale=iw*sar:ih,setsar=1 OUT",
+            )
         first = next(_decoded(path, 0, 1), None)
         if first is None:
             raise ImageError(f"{path.name} is no video that can be read, or has no frame")

@@ -57,7 +57,7 @@ def index_recording(
         coded = _coded_size(video)
         check_size(ImageHeader("video", *coded), settings, path.name)
         rotation = int(video.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
-        aspect = _pixel_aspect(video, rotation)
+        aspect = pixel_aspect(video, rotation)
         measurer = FrameMeasurer(video.get(cv2.CAP_PROP_FPS))
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         while video.grab():
@@ -120,7 +120,7 @@ def _require_size(picture: Any, coded: tuple[int, int], number: int, path: Path)
         )
 
 
-def _pixel_aspect(video: cv2.VideoCapture, rotation: int) -> tuple[int, int]:
+def pixel_aspect(video: cv2.VideoCapture, rotation: int) -> tuple[int, int]:
     """Width of a pixel by its height, as decoded and turned upright."""
     over, under = (int(video.get(name)) for name in (cv2.CAP_PROP_SAR_NUM, cv2.CAP_PROP_SAR_DEN))
     if over <= 0 or under <= 0 or not 1 / _MOST_ASPECT <= over / under <= _MOST_ASPECT:

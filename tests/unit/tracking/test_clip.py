@@ -12,10 +12,11 @@ from app.errors import ImageError
 from app.soccer.frames import ImageSize
 from app.tracking.clip import Clip
 from tests.cameras import looking
+from tests.videos import stretch_pixels
 
 
-def write(path: Path, width: int, height: int, count: int = 4) -> Path:
-    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 10, (width, height))
+def write(path: Path, width: int, height: int, count: int = 4, codec: str = "MJPG") -> Path:
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), 10, (width, height))
     for number in range(count):
         video.write(np.full((height, width, 3), (200, 20 + 40 * number, 10), np.uint8))
     video.release()
@@ -43,6 +44,15 @@ def test_frames_are_numbered_from_nought_with_their_times_and_colours(tmp_path: 
     assert [frame.time for frame in frames] == pytest.approx([0.1, 0.2])
     red, green, blue = frames[1].image[180, 320].tolist()
     assert abs(red - 10) < 12 and abs(green - 100) < 12 and abs(blue - 200) < 12
+
+
+def test_pixels_that_are_not_square_are_refused_with_what_to_do(tmp_path: Path):
+    path = write(tmp_path / "clip.mp4", 640, 360, codec="mp4v")
+    assert Clip.open(stretch_pixels(path, 200, 199)).size == ImageSize(640, 360)
+    path = write(tmp_path / "wide.mp4", 640, 360, codec="mp4v")
+    with pytest.raises(ImageError, match=r"not square \(4:3\)") as refused:
+        Clip.open(stretch_pixels(path, 4, 3))
+    assert "setsar=1" in (refused.value.hint or "")
 
 
 def test_frames_too_small_to_follow_a_line_in_are_refused(tmp_path: Path):
