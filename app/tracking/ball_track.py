@@ -177,16 +177,16 @@ class BallTrack:
     def none(frames: IntArray, times: FloatArray, reason: str) -> BallTrack:
         """No ball in any frame, and why."""
         count = len(frames)
-        state: tuple[BallState, ...] = ("gap",) * count
-        mode: tuple[BallMode, ...] = ("",) * count
+        state: tuple[BallState, ...] = ("gap",)
+        mode: tuple[BallMode, ...] = ("",)
         return BallTrack(
             frames,
             times,
             np.full((count, 3), np.nan),
             np.full((count, 3), np.nan),
             np.full((count, 6, 6), np.nan),
-            state,
-            mode,
+            state * count,
+            mode * count,
             ((),) * count,
             reason=reason,
         )
