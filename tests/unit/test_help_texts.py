@@ -42,7 +42,7 @@ PLAIN_WORDS = """
     measures membership mentions menu merge messages metrics migrate mini model motion name names navigation needs
     neighbours notice nudge numbers object on open openapi opened opentrackio options order origin other output own
     ownership packing page pages paint palette panel parameters parquet parse parts patch path pen people
-    permissions pins pitch pitches pixel place places plain playback plural png pointer policies pool popover pose
+    permissions pins pitch pitches pixel place places plain play playback plural png pointer policies pool popover pose
     position postgresql preopen preview problem process processes profile progress projection proof property
     proposal propose props provider queries query quota rail rater reader reasons record reimport remote render
     repeats report requests resect resource respond responses restore result rethreshold return revert reviewers
