@@ -5,8 +5,9 @@ The recording may be gone later: its groups have their frames, and say which one
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,15 @@ from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
 from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
-from app.features.recordings.service import Recording, get_recording, groups_taken, read_index
+from app.features.recordings.link_frames import linked_frames
+from app.features.recordings.links import list_links
+from app.features.recordings.service import (
+    Recording,
+    get_recording,
+    groups_taken,
+    read_index,
+    single_views,
+)
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
@@ -38,12 +47,37 @@ class Taken:
     Attributes:
         name: Of the recording.
         new: Groups that were made.
-        unchanged: Groups that were there already.
+        changed: Groups of one view that got those of linked replays.
+        unchanged: Groups that were there already, and stay as they are.
+        linked_views: Views of linked replays in the groups that were made or changed.
+        outside: Times that an instant of those is outside of the stretch of a linked replay.
     """
 
     name: str
     new: int
+    changed: int
     unchanged: int
+    linked_views: int
+    outside: int
+
+
+@dataclass(frozen=True)
+class _LinkedView:
+    """A frame of a replay that shows what a live frame shows, and what its group shall tell of it."""
+
+    recording: Recording
+    index: RecordingIndex
+    frame: int
+    link: dict[str, Any]
+
+
+@dataclass
+class _LinkedViews:
+    """Views of linked replays by their live frame."""
+
+    of: defaultdict[int, list[_LinkedView]] = field(default_factory=lambda: defaultdict(list))
+    missed: list[int] = field(default_factory=list)
+    """Live frames that are outside of the stretch of a replay, once for each such replay."""
 
 
 def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
@@ -71,9 +105,14 @@ def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
 
 
 def take_instants(
-    store: Store, recording_id: int, frames: Sequence[int], actor: str, progress: ReportProgress
+    store: Store,
+    recording_id: int,
+    frames: Sequence[int],
+    linked: bool,
+    actor: str,
+    progress: ReportProgress,
 ) -> Taken:
-    """Make a group of one view of each instant; in a worker process, which decodes.
+    """Make a group of each instant: of one view, or with those of linked replays; in a worker process, which decodes.
 
     Killed anywhere and started again, it ends in the same state.
 
@@ -81,47 +120,121 @@ def take_instants(
         store: The database.
         recording_id: Which recording.
         frames: Numbers of its frames.
+        linked: Whether the frames of linked replays that show the same are further views. Groups of one view that
+            are there already get them, too.
         actor: Who wants it.
         progress: Called with instants done and in all.
 
     Raises:
-        ConflictError, InputError: As ``require_instants``.
+        ConflictError, InputError: As ``require_instants``, also of the recording of a replay.
         ImageError: A frame cannot be decoded.
         StorageError: The disk refuses.
     """
     recording = get_recording(store, recording_id)
     numbers = require_instants(recording, frames)
     there = groups_taken(store, recording)
-    wanted = [number for number in numbers if number not in there]
+    replays = _linked_views(store, recording, numbers) if linked else _LinkedViews()
+    single = single_views(store, recording) if linked else set()
+    wanted = [n for n in numbers if n not in there or (n in single and n in replays.of)]
     index = read_index(store.settings, recording.require_readable())
     origin, report = Origin(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
-    groups = _groups(store.settings, recording, index, wanted)
+    groups = _groups(store.settings, recording, index, wanted, replays.of)
     while batch := list(islice(groups, BATCH)):
         with store.write() as session:
             ingest_batch(session, origin, batch, report, set())
         done += len(batch)
         progress(done, total)
-    return Taken(recording.name, report.new, len(numbers) - len(wanted))
+    return Taken(
+        recording.name,
+        report.new,
+        report.changed,
+        len(numbers) - len(wanted),
+        sum(len(replays.of.get(number, ())) for number in wanted),
+        sum(number in wanted for number in replays.missed),
+    )
+
+
+def _linked_views(store: Store, recording: Recording, numbers: Sequence[int]) -> _LinkedViews:
+    """The frames of all linked replays that show what live frames show; those of usable links alone."""
+    found = _LinkedViews()
+    for link in list_links(store, recording.id):
+        asked = [number for number in numbers if number in link.live.frames]
+        if link.live.recording != recording.id or not link.map.is_usable or not asked:
+            continue
+        replay = get_recording(store, link.replay.recording)
+        index = read_index(store.settings, replay.require_readable())
+        same = linked_frames(store, link)
+        for number in asked:
+            at = number - same.first
+            frame, off = same.replay[at], same.off_s[at]
+            if frame is None:
+                found.missed.append(number)
+                continue
+            told = {
+                "link": link.id,
+                "live_frame": number,
+                "off_s": off,
+                "repeated": frame in same.repeated,
+                "blended": frame in same.blended,
+            }
+            if all((replay.id, frame) != (one.recording.id, one.frame) for one in found.of[number]):
+                found.of[number].append(_LinkedView(replay, index, frame, told))
+    return found
 
 
 def _groups(
-    settings: Settings, recording: Recording, index: RecordingIndex, numbers: Iterable[int]
+    settings: Settings,
+    recording: Recording,
+    index: RecordingIndex,
+    numbers: Sequence[int],
+    linked: Mapping[int, Sequence[_LinkedView]],
 ) -> Iterator[Group]:
+    for start in range(0, len(numbers), BATCH):
+        some = numbers[start : start + BATCH]
+        _keep_linked(settings, [view for number in some for view in linked.get(number, ())])
+        for number, image in read_frames(recording.path, index, some):
+            key, name = f"{recording.name}/{number}.png", f"{number}.png"
+            _kept(settings.recordings / index.facts.sha256 / name, image)
+            views = [_view(settings, name, key, recording, index, number)]
+            for one in linked.get(number, ()):
+                mine = one.recording.id == recording.id
+                name = f"{one.frame}.png" if mine else f"{one.recording.name}_{one.frame}.png"
+                place = (one.recording, one.index, one.frame, one.link)
+                views.append(_view(settings, name, f"{key}/{name}", *place))
+            yield Group(key, tuple(views), match=recording.name, label=f"Frame {number}")
+
+
+def _keep_linked(settings: Settings, views: Sequence[_LinkedView]) -> None:
+    """Keep the frames of replays, each recording read once and forwards."""
+    for any_one in {view.recording.id: view for view in views}.values():
+        recording, index = any_one.recording, any_one.index
+        frames = {one.frame for one in views if one.recording.id == recording.id}
+        folder = settings.recordings / index.facts.sha256
+        missing = sorted(one for one in frames if not (folder / f"{one}.png").is_file())
+        for number, image in read_frames(recording.path, index, missing):
+            _kept(folder / f"{number}.png", image)
+
+
+def _view(
+    settings: Settings,
+    name: str,
+    station: str,
+    recording: Recording,
+    index: RecordingIndex,
+    number: int,
+    link: Mapping[str, Any] | None = None,
+) -> View:
+    """The view of a frame that is kept; ``link``: what is said of how it shows the group's instant."""
     facts = index.facts
-    size = ImageSize(facts.width, facts.height)
-    folder = settings.recordings / facts.sha256
-    for number, image in read_frames(recording.path, index, numbers):
-        key = f"{recording.name}/{number}.png"
-        path = _kept(folder / f"{number}.png", image)
-        view = View(
-            f"{number}.png",
-            Station(key, size),
-            media=Media(str(path)),
-            extras=Extras(metadata={"recording": _provenance(recording, index, number)}),
-        )
-        yield Group(key, (view,), match=recording.name, label=f"Frame {number}")
+    told = {**_provenance(recording, index, number), **(link or {})}
+    return View(
+        name,
+        Station(station, ImageSize(facts.width, facts.height)),
+        media=Media(str(settings.recordings / facts.sha256 / f"{number}.png")),
+        extras=Extras(metadata={"recording": told}),
+    )
 
 
 def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dict[str, Any]:

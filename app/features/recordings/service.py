@@ -434,13 +434,21 @@ def _require_sound(shots: Sequence[Shot], frames: int) -> None:
 def groups_taken(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
-        keys = taken_frames(session, recording.dataset_id, recording.name)
-    found = {}
-    for key, group in keys.items():
-        number = key.rpartition("/")[2].removesuffix(".png")
-        if number.isascii() and number.isdigit():
-            found[int(number)] = group
-    return found
+        rows = taken_frames(session, recording.dataset_id, recording.name)
+    return {n: int(row.id) for row in rows if (n := _number(row.key)) is not None}
+
+
+def single_views(store: Store, recording: Recording) -> set[int]:
+    """Numbers of the frames whose groups have no view but theirs."""
+    with store.read() as session:
+        rows = taken_frames(session, recording.dataset_id, recording.name)
+    return {n for row in rows if row.views == 1 and (n := _number(row.key)) is not None}
+
+
+def _number(key: str) -> int | None:
+    """The number of the frame whose group has a key."""
+    number = key.rpartition("/")[2].removesuffix(".png")
+    return int(number) if number.isascii() and number.isdigit() else None
 
 
 def _shots(settings: Settings, row: Any) -> RecordingShots:

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useCallback, useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
 import { listen } from '../../api/events.js';
-import { getRecording, getShots, putShots } from '../../api/recordings.js';
+import { getLinks, getRecording, getShots, putShots } from '../../api/recordings.js';
 import { ApiError } from '../../api/problem.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
 import { page } from '../../lib/router.js';
@@ -16,6 +16,7 @@ import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted
 import { shotAt, timecode } from '../../state/shots.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { InstantsCard } from './instants_card.js';
+import { LinkCard } from './link_card.js';
 import { keysOfRecording } from './recording_keys.js';
 import { FindAgain, ShotCard } from './shot_card.js';
 import { Strip } from './strip.js';
@@ -135,6 +136,7 @@ function clock(shots, one) {
 function Film({ one, reload }) {
 	const { list, latest, error, read, change, undo, remember } = useShots(one.id);
 	const instants = useInstants();
+	const links = useResource((signal) => getLinks(one.id, signal), [one.id]).value?.items ?? [];
 	useEffect(() => openFilm({ id: one.id, frames: one.frames ?? 0, fps: one.fps ?? 25 }), [one.id, one.frames]);
 	useEffect(() => listen('job', (/** @type {JobJson} */ job) => {
 		if (isOver(job) && job.result?.recording === one.id) read();
@@ -157,7 +159,8 @@ function Film({ one, reload }) {
 			<${Stage} one=${one} seconds=${clock(list.items, one)} />
 			<div class="film__rail">
 				<${ShotCard} one=${one} shots=${list.items} at=${at} change=${change} remember=${remember} />
-				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} />
+				<${LinkCard} one=${one} shots=${list.items} shot=${list.items[at]} links=${links} />
+				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} links=${links} />
 			</div>
 			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} goTo=${goTo} />
 		</div>
