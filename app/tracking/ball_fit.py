@@ -13,7 +13,7 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.tracking.ball_fit_kernels import factor, inverse_blocks, solve_factored
-from app.tracking.ball_physics import (
+from app.tracking.ball_models import (
     BOUNCE,
     DRAG,
     FLIGHT,

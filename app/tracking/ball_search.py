@@ -8,7 +8,7 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
-from app.tracking.ball_physics import REST
+from app.tracking.ball_models import REST
 from app.tracking.ball_search_kernels import likeliest
 from app.tracking.ball_track import BallMeasurements
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from app.tracking.ball_physics import (
+from app.tracking.ball_models import (
     BOUNCE,
     DRAG,
     FLIGHT,

@@ -12,8 +12,8 @@ from scipy.stats import norm
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_fit import Fitted, fit
-from app.tracking.ball_left_out import left_out, summed
-from app.tracking.ball_physics import BOUNCE, FLIGHT, HELD, NOTHING, REST, ROLL
+from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, NOTHING, REST, ROLL
+from app.tracking.ball_prediction import left_out, summed
 from app.tracking.ball_search import History, Knots, knots_of, search
 from app.tracking.ball_track import (
     BallEvent,

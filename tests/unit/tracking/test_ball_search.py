@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.soccer.pitch import Pitch
-from app.tracking.ball_physics import BOUNCE, FLIGHT, KICK, ROLL
+from app.tracking.ball_models import BOUNCE, FLIGHT, KICK, ROLL
 from app.tracking.ball_search import knots_of, search
 from tests.unit.tracking.test_ball_solve import BALL, BOTH, LEFT, PLACES, RIGHT, TIMES, seen
 

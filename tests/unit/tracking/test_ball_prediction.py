@@ -7,7 +7,7 @@ import pytest
 
 from app.soccer.pitch import Pitch
 from app.tracking.ball_fit import fit
-from app.tracking.ball_left_out import left_out, summed
+from app.tracking.ball_prediction import left_out, summed
 from app.tracking.ball_search import knots_of, search
 from tests.unit.tracking.test_ball_solve import BOTH, TIMES, seen
 
