@@ -116,6 +116,7 @@ HARMLESS = {
     "previewGroup": "Saves nothing.",
     "proposeLines": "Saves nothing.",
     "readPaint": "Saves nothing.",
+    "sendPart": "Bytes that are here already are passed over.",
     "setMaintenance": "The same notice once more is the same notice.",
     "setMemberRole": "The same role once more changes nothing, and has the same answer.",
     "openGroup": "A lease that one has lasts on.",
