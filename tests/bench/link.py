@@ -19,7 +19,8 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.play import RADIUS, step_ball
 from app.tracking.ball_rays import BallRays, ball_rays
-from app.tracking.link import TimeMap, find_time_map
+from app.tracking.link import find_time_map
+from app.tracking.time_map import TimeMap
 from tests.bench.table import print_table
 from tests.cameras import looking
 
