@@ -164,7 +164,7 @@ def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     solve = proposals = None
     if taken["new"]:
         solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id
-        if asked["propose"]:
+        if asked["propose"] and taken["cameras"] < taken["new"]:
             number, match = recording.dataset_id, recording.name
             proposals = PROPOSALS.request(jobs, store, number, match, actor=actor).id
     return {**taken, "solve_job": solve, "proposals_job": proposals}

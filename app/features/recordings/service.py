@@ -247,7 +247,7 @@ def index_now(
     stamp = _stamp(path)
     if stamp is None:
         raise NotFoundError(f"{path.name} is not where it was imported from")
-    facts, shots = _in_worker(path, index_file, store.settings, progress=progress, stop=stop)
+    facts, shots = in_worker(path, index_file, store.settings, progress=progress, stop=stop)
     if _stamp(path) != stamp:
         raise ImageError(f"{path.name} changed while it was read", hint="Import it again.")
     with store.write() as session:
@@ -259,12 +259,13 @@ def index_now(
         return _recording(need_recording(session, recording_id))
 
 
-def _in_worker(
+def in_worker(
     path: Path,
     work: Callable[..., Found],
     *arguments: Any,
     progress: ReportProgress,
     stop: Callable[[], None],
+    limits: WorkerLimits = LIMITS,
 ) -> Found:
     """The result of ``work(path, *arguments, send)`` in a worker process."""
 
@@ -272,7 +273,7 @@ def _in_worker(
         done, total, sentence = place
         progress(done, total, *([sentence] if sentence else []))
 
-    with closing(WorkerProcess(LIMITS)) as worker, COUNTS["recordings"].working():
+    with closing(WorkerProcess(limits)) as worker, COUNTS["recordings"].working():
         try:
             found: Found = worker.run(work, path, *arguments, on_message=answer, stop=stop)
         except WorkerEnded as error:
@@ -358,7 +359,7 @@ def find_again(
     before = get_shots(store, recording_id)
     path, sha256 = before.recording.path, before.recording.require_readable()
     asked = (shots_of, store.settings, sha256)
-    found = _in_worker(path, *asked, progress=progress, stop=stop)
+    found = in_worker(path, *asked, progress=progress, stop=stop)
     shots = [Shot(**one) for one in found]
     return put_shots(store, recording_id, shots, before.etag, actor=actor)
 

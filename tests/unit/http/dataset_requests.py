@@ -105,6 +105,10 @@ def instants(api: Any) -> Request:
     return "POST", f"{recording(api)}/groups", {"frames": [3], "propose": False}, {}
 
 
+def tracked_cameras(api: Any) -> Request:
+    return "POST", f"{recording(api)}/cameras", {"first": 0, "last": 9}, {}
+
+
 def saved_view(_api: Any) -> Request:
     return "POST", "/datasets/broadcast/saved-views", {"name": "Mine", "q": "jac<0.8"}, {}
 
