@@ -8,6 +8,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select
 
 from app.db.session import Session, now
+from app.features.datasets.tables import GroupModel, StationModel, ViewModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.alias_queries import shown_actor
 from app.features.recordings.tables import ShotCamerasModel
@@ -20,6 +21,18 @@ def list_cameras_rows(session: Session, recording_id: int) -> Sequence[Any]:
     actor = shown_actor(model.actor, model.created).label("actor")
     statement = select(*columns, actor).where(model.recording_id == recording_id)
     return session.execute(statement.order_by(model.first)).all()
+
+
+def drawn_keys(session: Session, dataset_id: int, name: str) -> list[str]:
+    """Keys of the groups that were taken from a recording and have lines."""
+    statement = (
+        select(GroupModel.key)
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.dataset_id == dataset_id, GroupModel.match == name)
+        .where(StationModel.lines != "{}")
+    )
+    return list(session.scalars(statement))
 
 
 def delete_overlapping(session: Session, recording_id: int, first: int, last: int) -> Sequence[Any]:

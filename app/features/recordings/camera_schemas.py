@@ -57,6 +57,7 @@ class CamerasDocument(Document):
     )
     revision: int = Field(description="How often the stretch was tracked.")
     stale: bool = Field(description="Whether the video is another one by now.")
+    drawn: tuple[int, ...] = Field(description="Frames with lines now, which the next run knows.")
     created: datetime
     by: str = Field(validation_alias="actor")
 

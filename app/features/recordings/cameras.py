@@ -29,11 +29,13 @@ from app.features.pitches.queries import edited_pitches
 from app.features.recordings.camera_queries import (
     delete_overlapping,
     digests_of,
+    drawn_keys,
     insert_cameras,
     list_cameras_rows,
 )
 from app.features.recordings.service import (
     Recording,
+    frames_of_keys,
     get_recording,
     groups_taken,
     in_worker,
@@ -93,6 +95,7 @@ class ShotCameras:
         first, last: Its frames.
         before: What the cameras were that these took the place of; None: there were none.
         stale: Whether the video is another one by now.
+        drawn: Frames that have lines now, which the next run knows.
         digest: Of the file that holds them.
     """
 
@@ -104,6 +107,7 @@ class ShotCameras:
     before: CameraSummary | None
     revision: int
     stale: bool
+    drawn: tuple[int, ...]
     digest: str
     digest_before: str | None
     actor: str
@@ -126,7 +130,10 @@ def list_cameras(store: Store, recording_id: int) -> list[ShotCameras]:
     """
     with store.read() as session:
         recording = need_recording(session, recording_id)
-        return [_of_row(row, recording.sha256) for row in list_cameras_rows(session, recording_id)]
+        rows = list_cameras_rows(session, recording_id)
+        keys = drawn_keys(session, recording.dataset_id, recording.name) if rows else []
+    drawn = sorted(frames_of_keys(keys))
+    return [_of_row(row, recording.sha256, drawn) for row in rows]
 
 
 def get_cameras(store: Store, recording_id: int, frame: int) -> ShotCameras:
@@ -224,7 +231,7 @@ def track_now(
     tracked: Tracked = in_worker(
         recording.path, track_stretch, *known, progress=progress, stop=stop, limits=LIMITS
     )
-    return _save(store, recording, (first, last), tracked, sorted(lines), actor)
+    return save_cameras(store, recording, (first, last), tracked, sorted(lines), actor)
 
 
 def track_stretch(
@@ -253,7 +260,7 @@ def track_stretch(
     return Tracked(frames, tuple(sorted(set(lines) - set(usable))))
 
 
-def _save(
+def save_cameras(
     store: Store,
     recording: Recording,
     stretch: tuple[int, int],
@@ -261,6 +268,7 @@ def _save(
     annotated: Sequence[int],
     actor: str,
 ) -> tuple[ShotCameras, int]:
+    """Keep what was found of a stretch (first and last frame): ``track_now`` without the tracking."""
     first, last = stretch
     content = frames_to_bytes(tracked.frames)
     digest = digest_of(content)
@@ -329,7 +337,7 @@ def _summary(tracked: Tracked, annotated: Sequence[int]) -> CameraSummary:
     )
 
 
-def _of_row(row: Any, sha256: str | None) -> ShotCameras:
+def _of_row(row: Any, sha256: str | None, drawn: Sequence[int]) -> ShotCameras:
     return ShotCameras(
         id=int(row.id),
         recording=int(row.recording_id),
@@ -339,6 +347,7 @@ def _of_row(row: Any, sha256: str | None) -> ShotCameras:
         before=None if row.before_summary is None else CameraSummary(**parse(row.before_summary)),
         revision=row.revision,
         stale=row.sha256 != sha256,
+        drawn=tuple(frame for frame in drawn if row.first <= frame <= row.last),
         digest=row.digest,
         digest_before=row.before,
         actor=row.actor,

@@ -7,7 +7,7 @@ the home: the index under its sha256, facts and shots in the database.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -430,11 +430,16 @@ def groups_taken(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
         keys = taken_frames(session, recording.dataset_id, recording.name)
+    return {number: keys[key] for number, key in frames_of_keys(keys).items()}
+
+
+def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
+    """Keys of groups that were taken from a recording, by the number of their frame."""
     found = {}
-    for key, group in keys.items():
+    for key in keys:
         number = key.rpartition("/")[2].removesuffix(".png")
         if number.isascii() and number.isdigit():
-            found[int(number)] = group
+            found[int(number)] = key
     return found
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from app.errors import InputError
 from app.tracking.camera_file import frames_from_bytes, frames_to_bytes
-from tests.unit.features.file_tools.test_track import frame
+from tests.tracked_frames import frame
 
 
 def test_frames_come_back_exactly_and_the_same_frames_are_the_same_bytes():

@@ -208,6 +208,7 @@ def test_groups_get_the_cameras_of_their_frames_and_need_no_proposal(
     assert track(api, recording, finished)["lost"] == 1
     taken = take(api, recording, finished, 5, 6)
     assert (taken["new"], taken["cameras"], taken["proposals_job"]) == (2, 2, None)
+    assert taken["group"] == groups_taken(app.state.services.store, found)[5]
     taken = take(api, recording, finished, 7, 8)
     assert taken["cameras"] == 1 and taken["proposals_job"] is not None
     store: Store = app.state.services.store
@@ -232,6 +233,7 @@ def test_a_person_mends_a_frame_and_shot_and_groups_follow(
     take(api, recording, finished, 5, 7, 8, 11)
     groups = groups_taken(store, found)
     draw(api, groups[7], tracker.truth[3])
+    assert api.get(f"{recording}/cameras").json()["items"][0]["drawn"] == [7]
     tracker.lost, tracker.off = {11}, 0.0
     result = track(api, recording, finished)
     assert sorted(tracker.asked) == [7] and "Side line top" in tracker.asked[7]
@@ -321,7 +323,7 @@ def test_a_video_that_changes_while_it_is_tracked_is_refused(
     tracked = Tracked([tracker.frame(number, {}) for number in range(4, 12)], ())
     other = Recording(**{**vars(found), "sha256": "0" * 64})
     with pytest.raises(ConflictError, match="became another file"):
-        module._save(store, other, (4, 11), tracked, [], "ann")
+        module.save_cameras(store, other, (4, 11), tracked, [], "ann")
     with pytest.raises(InputError):
         module.require_stretch(found, 4, 12)
 
