@@ -27,6 +27,7 @@ from app.features.predictions.evaluation_run import EvaluationRequest, run_evalu
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
 from app.features.recordings.cameras import Tracked, save_cameras
+from app.features.recordings.links import add_link
 from app.features.recordings.service import Shot, add_recording, index_now, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze
@@ -44,7 +45,7 @@ SECRET = "three plain words"
 ITEMS = "items"
 ADDRESS = {
     "dataset": "small", "group": "1", "view": "1", "batch": "1", "evaluation": "1", "user": "1",
-    "webhook": "1", "recording": "1",
+    "webhook": "1", "recording": "1", "frame": "10",
 }  # fmt: skip
 """Values of the parameters in the addresses of lists."""
 PAGED_ALREADY = 3
@@ -54,7 +55,7 @@ FULL = (
     "listEvaluations", "listSavedViews", "listThreads", "listWebhooks", "listWebhookDeliveries",
     "listBatches", "listBatchGroups", "getMyWork", "getTeamWork", "listUsers", "listMembers",
     "listTokens", "listSessions", "listDatasets", "listUploads", "listVerdictBatches", "getAudit",
-    "getNotifications", "getHistory", "listRecordings", "listShots", "listCameras", "listPolicies", "listQueryFields", "listEvaluationFrames",
+    "getNotifications", "getHistory", "listRecordings", "listShots", "listLinks", "listCameras", "listPolicies", "listQueryFields", "listEvaluationFrames",
 )  # fmt: skip
 """Lists of which the home has several things, so that their second pages are looked at."""
 
@@ -100,6 +101,9 @@ def fill(store: Store, home: Path) -> None:
             save_cameras(store, recording, (first, first + 1), Tracked(frames, ()), [], "local")
         shots = [Shot(first, first + 4, "main", "cut") for first in range(0, 20, 5)]
         put_shots(store, recording.id, shots, None, actor="local")
+        if number == 0:
+            for first in range(3):
+                add_link(store, (1, first, 8), (1, 10, 19), actor="local")
         begin_thread(store, 1, f"Is this the ball, @admin? {number}", actor="lead")
 
 
