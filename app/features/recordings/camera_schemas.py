@@ -48,7 +48,7 @@ class CamerasDocument(Document):
     """Cameras of a stretch of a recording."""
 
     id: int
-    recording: int
+    recording: int = Field(description="Id of the recording.")
     first: int = Field(description="Number of its first frame, from 0.")
     last: int = Field(description="Number of its last frame.")
     summary: SummaryDocument = Field(description="What became of its frames.")

@@ -6,13 +6,13 @@ import { useMemo } from 'preact/hooks';
 
 import { markingsPath, OUTCOMES, runsOf } from '../../state/cameras.js';
 import { goTo, seen, wanted } from '../../state/playback.js';
-import { Chart } from '../chart.js';
+import { Chart, Numbers } from '../chart.js';
 
 /** @import {FrameCamerasJson} from '../../api/cameras.js' */
 /** @import {Cameras} from './camera_state.js' */
 /** @import {Curve} from '../chart.js' */
 
-const HEIGHT = 96;
+const HEIGHT = 84;
 const [PAN, TILT, FOCAL] = [3, 4, 6];
 
 /** The markings of the frame that is seen, where its camera puts them. @param {{cameras: Cameras}} props */
@@ -22,7 +22,7 @@ export function CameraLines({ cameras: { frames, lines, before } }) {
 	if (!frames || !path) return null;
 	const [width, height] = frames.size;
 	return html`
-		<svg class="camera__lines" viewBox="-0.5 -0.5 ${width} ${height}" data-frame=${frame} data-before=${before} aria-hidden="true"><path d=${path} /><path d=${path} /></svg>
+		<svg class="camera__lines" viewBox="-0.5 -0.5 ${width} ${height}" data-frame=${frame} data-before=${before} aria-hidden="true"><clipPath id="camera-frame"><rect x="-0.5" y="-0.5" width=${width} height=${height} /></clipPath><g clip-path="url(#camera-frame)"><path d=${path} /><path d=${path} /></g></svg>
 	`;
 }
 
@@ -67,8 +67,9 @@ export function CameraCurves({ cameras: { frames, before } }) {
 			<${Outcomes} frames=${frames} />
 			<div class="camera__charts">
 				${charts.map((chart) => html`
-					<${Chart} key=${chart.yLabel} ...${chart} height=${HEIGHT} marker=${frame} onPick=${(/** @type {number} */ index) => goTo(frames.first + index)} />`)}
+					<${Chart} key=${chart.yLabel} ...${chart} compact=${true} height=${HEIGHT} marker=${frame} onPick=${(/** @type {number} */ index) => goTo(frames.first + index)} />`)}
 			</div>
+			<${Numbers} x=${charts[0].x} xLabel="frame" curves=${charts.flatMap(({ curves }) => curves)} format=${two} />
 		</section>
 	`;
 }
@@ -83,11 +84,11 @@ function chartsOf(frames) {
 			{ label: 'supported', values: frames.supported, colour: 'chart-a' },
 			{ label: 'explained', values: frames.explained, colour: 'chart-b', dash: [6, 3] },
 		], two, [0, 1]),
-		one('px', [{ label: 'error', values: frames.error_px, colour: 'chart-d' }], two, [0, null]),
+		one('px', [{ label: 'error, px', values: frames.error_px, colour: 'chart-d' }], two, [0, null]),
 		one('degrees', [
-			{ label: 'pan', values: column(frames, PAN), colour: 'chart-a' },
-			{ label: 'tilt', values: column(frames, TILT).map((value) => (value === null ? null : value - 90)), colour: 'chart-b', dash: [6, 3] },
+			{ label: 'pan, degrees', values: column(frames, PAN), colour: 'chart-a' },
+			{ label: 'tilt, degrees', values: column(frames, TILT).map((value) => (value === null ? null : value - 90)), colour: 'chart-b', dash: [6, 3] },
 		], two),
-		one('focal px', [{ label: 'zoom', values: column(frames, FOCAL), colour: 'chart-c' }], whole),
+		one('focal px', [{ label: 'zoom, px', values: column(frames, FOCAL), colour: 'chart-c' }], whole),
 	];
 }
