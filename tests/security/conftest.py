@@ -159,6 +159,10 @@ def _fill(guarded: Guarded, frame: str) -> None:
     }
     indexed = json_("POST", "/recordings", recorded)
     ids |= {"recording": str(indexed["result"]["recording"]), "frame": "3"}
+    replay = {"recording": indexed["result"]["recording"], "first": 10, "last": 19}
+    both = {"live": {"first": 0, "last": 9}, "replay": replay}
+    made = json_("POST", f"/recordings/{ids['recording']}/links", both)
+    ids |= {"link": str(made["id"])}
     ids |= {"batch": str(batch["batch"]), "saved": str(view["id"]), "path": "nothing"}
 
 
