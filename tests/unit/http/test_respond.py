@@ -94,6 +94,7 @@ KEPT: dict[str, Made] = {
     "startPractice": dataset_requests.practice,
     "revertDatasetPaint": dataset_requests.no_paint,
     "takeInstants": dataset_requests.instants,
+    "trackCameras": dataset_requests.tracked_cameras,
     "withdrawSubmission": group_requests.hand_in_taken_back,
     "revertNoise": dataset_requests.no_noise,
     "revertPositions": dataset_requests.no_positions,
