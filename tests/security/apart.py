@@ -56,6 +56,7 @@ BODIES: Mapping[str, dict[str, Any]] = {
     "POST /api/v1/recordings": {"source": {}},
     "PUT /api/v1/recordings/{recording}/shots": {"shots": []},
     "POST /api/v1/recordings/{recording}/groups": {"frames": [0]},
+    "POST /api/v1/recordings/{recording}/cameras": {"first": 0, "last": 0},
     "POST /api/v1/recordings/{recording}/links": {
         "live": {"first": 0, "last": 0},
         "replay": {"first": 0, "last": 0},
@@ -158,6 +159,8 @@ class Apart:
                 inner[last] = value
         target = row.target(path).removeprefix(API) + ("?" + "&".join(query) if query else "")
         sent = body if row.kind == "body" else None
+        if row.kind == "upload" and mentioned(row):
+            sent = b"P"
         return self.ask(name, row.method, target, sent)
 
     def value(self, kind: OwnedKind, where: str) -> Any:

@@ -145,6 +145,12 @@ def _taken(result: Json) -> str:
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
+def _tracked(result: Json) -> str:
+    counts = ", ".join(f"{result[name]:,} {name}" for name in ("tracked", "bridged", "lost"))
+    given = f"; {plural(result['groups'], 'group')} got another camera" if result["groups"] else ""
+    return f"{plural(result['frames'], 'frame')} of {result['name']}: {counts}{given}."
+
+
 _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "solve": _solved,
     "import": _imported,
@@ -161,6 +167,7 @@ _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "pictures": _pictures,
     "recording": _indexed,
     "instants": _taken,
+    "track": _tracked,
 }
 """By the kind of the job."""
 

@@ -18,7 +18,9 @@ from app.config import Settings
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
+from app.features.file_tools.track import frame_row
 from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
+from app.features.recordings.cameras import SOURCE, cameras_at
 from app.features.recordings.link_frames import linked_frames
 from app.features.recordings.links import list_links
 from app.features.recordings.service import (
@@ -33,6 +35,7 @@ from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
+from app.tracking.track import FrameCamera
 from app.video.frames import read_frames
 from app.video.index import RecordingIndex
 
@@ -51,6 +54,7 @@ class Taken:
         unchanged: Groups that were there already, and stay as they are.
         linked_views: Views of linked replays in the groups that were made or changed.
         outside: Times that an instant of those is outside of the stretch of a linked replay.
+        cameras: Views of those groups that have the camera of their frame.
     """
 
     name: str
@@ -59,23 +63,37 @@ class Taken:
     unchanged: int
     linked_views: int
     outside: int
+    cameras: int
 
 
 @dataclass(frozen=True)
-class _LinkedView:
-    """A frame of a replay that shows what a live frame shows, and what its group shall tell of it."""
+class _Shown:
+    """A frame that is a view of a group.
+
+    Attributes:
+        recording, index: Of what.
+        number: Of the frame.
+        tracked: What the tracker found of it; None: it was not tracked.
+        link: Of a frame of a replay: what is said of how it shows the group's instant.
+    """
 
     recording: Recording
     index: RecordingIndex
-    frame: int
-    link: dict[str, Any]
+    number: int
+    tracked: FrameCamera | None
+    link: Mapping[str, Any] | None = None
+
+    @property
+    def place(self) -> str:
+        """Where it is kept, below the recordings of the home."""
+        return f"{self.index.facts.sha256}/{self.number}.png"
 
 
 @dataclass
 class _LinkedViews:
     """Views of linked replays by their live frame."""
 
-    of: defaultdict[int, list[_LinkedView]] = field(default_factory=lambda: defaultdict(list))
+    of: defaultdict[int, list[_Shown]] = field(default_factory=lambda: defaultdict(list))
     missed: list[int] = field(default_factory=list)
     """Live frames that are outside of the stretch of a replay, once for each such replay."""
 
@@ -140,19 +158,26 @@ def take_instants(
     origin, report = Origin(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
-    groups = _groups(store.settings, recording, index, wanted, replays.of)
+    tracked = cameras_at(store, recording, wanted)
+    live = [_Shown(recording, index, number, tracked.get(number)) for number in wanted]
+    groups = _groups(store.settings, live, replays.of)
     while batch := list(islice(groups, BATCH)):
         with store.write() as session:
             ingest_batch(session, origin, batch, report, set())
         done += len(batch)
         progress(done, total)
+    linked_views = [view for number in wanted for view in replays.of.get(number, ())]
     return Taken(
         recording.name,
         report.new,
         report.changed,
         len(numbers) - len(wanted),
-        sum(len(replays.of.get(number, ())) for number in wanted),
+        len(linked_views),
         sum(number in wanted for number in replays.missed),
+        sum(
+            view.tracked is not None and view.tracked.camera is not None
+            for view in (*live, *linked_views)
+        ),
     )
 
 
@@ -166,75 +191,64 @@ def _linked_views(store: Store, recording: Recording, numbers: Sequence[int]) ->
         replay = get_recording(store, link.replay.recording)
         index = read_index(store.settings, replay.require_readable())
         same = linked_frames(store, link)
-        for number in asked:
-            at = number - same.first
-            frame, off = same.replay[at], same.off_s[at]
+        frames = {number: same.replay[number - same.first] for number in asked}
+        tracked = cameras_at(store, replay, [one for one in frames.values() if one is not None])
+        for number, frame in frames.items():
             if frame is None:
                 found.missed.append(number)
                 continue
             told = {
                 "link": link.id,
                 "live_frame": number,
-                "off_s": off,
+                "off_s": same.off_s[number - same.first],
                 "repeated": frame in same.repeated,
                 "blended": frame in same.blended,
             }
-            if all((replay.id, frame) != (one.recording.id, one.frame) for one in found.of[number]):
-                found.of[number].append(_LinkedView(replay, index, frame, told))
+            view = _Shown(replay, index, frame, tracked.get(frame), told)
+            if all(view.place != other.place for other in found.of[number]):
+                found.of[number].append(view)
     return found
 
 
 def _groups(
-    settings: Settings,
-    recording: Recording,
-    index: RecordingIndex,
-    numbers: Sequence[int],
-    linked: Mapping[int, Sequence[_LinkedView]],
+    settings: Settings, live: Sequence[_Shown], linked: Mapping[int, Sequence[_Shown]]
 ) -> Iterator[Group]:
-    for start in range(0, len(numbers), BATCH):
-        some = numbers[start : start + BATCH]
-        _keep_linked(settings, [view for number in some for view in linked.get(number, ())])
-        for number, image in read_frames(recording.path, index, some):
-            key, name = f"{recording.name}/{number}.png", f"{number}.png"
-            _kept(settings.recordings / index.facts.sha256 / name, image)
-            views = [_view(settings, name, key, recording, index, number)]
-            for one in linked.get(number, ()):
-                mine = one.recording.id == recording.id
-                name = f"{one.frame}.png" if mine else f"{one.recording.name}_{one.frame}.png"
-                place = (one.recording, one.index, one.frame, one.link)
-                views.append(_view(settings, name, f"{key}/{name}", *place))
-            yield Group(key, tuple(views), match=recording.name, label=f"Frame {number}")
+    for start in range(0, len(live), BATCH):
+        some = live[start : start + BATCH]
+        _keep(settings, [*some, *(view for one in some for view in linked.get(one.number, ()))])
+        for one in some:
+            match = one.recording.name
+            key = f"{match}/{one.number}.png"
+            views = [_view(settings, one, f"{one.number}.png", key)]
+            for other in linked.get(one.number, ()):
+                name = f"{other.number}.png"
+                if other.recording.id != one.recording.id:
+                    name = f"{other.recording.name}_{name}"
+                views.append(_view(settings, other, name, f"{key}/{name}"))
+            yield Group(key, tuple(views), match=match, label=f"Frame {one.number}")
 
 
-def _keep_linked(settings: Settings, views: Sequence[_LinkedView]) -> None:
-    """Keep the frames of replays, each recording read once and forwards."""
-    for any_one in {view.recording.id: view for view in views}.values():
-        recording, index = any_one.recording, any_one.index
-        frames = {one.frame for one in views if one.recording.id == recording.id}
-        folder = settings.recordings / index.facts.sha256
-        missing = sorted(one for one in frames if not (folder / f"{one}.png").is_file())
-        for number, image in read_frames(recording.path, index, missing):
-            _kept(folder / f"{number}.png", image)
+def _keep(settings: Settings, views: Sequence[_Shown]) -> None:
+    """Keep frames, each recording read once and forwards."""
+    by_place = {view.place: view for view in views}
+    missing = [one for one in by_place.values() if not (settings.recordings / one.place).is_file()]
+    for number in {one.recording.id for one in missing}:
+        mine = {one.number: one for one in missing if one.recording.id == number}
+        any_one = next(iter(mine.values()))
+        for at, image in read_frames(any_one.recording.path, any_one.index, sorted(mine)):
+            _kept(settings.recordings / mine[at].place, image)
 
 
-def _view(
-    settings: Settings,
-    name: str,
-    station: str,
-    recording: Recording,
-    index: RecordingIndex,
-    number: int,
-    link: Mapping[str, Any] | None = None,
-) -> View:
-    """The view of a frame that is kept; ``link``: what is said of how it shows the group's instant."""
-    facts = index.facts
-    told = {**_provenance(recording, index, number), **(link or {})}
-    return View(
-        name,
-        Station(station, ImageSize(facts.width, facts.height)),
-        media=Media(str(settings.recordings / facts.sha256 / f"{number}.png")),
-        extras=Extras(metadata={"recording": told}),
-    )
+def _view(settings: Settings, shown: _Shown, name: str, key: str) -> View:
+    """The view of a frame that is kept; ``key`` is that of its station."""
+    facts, frame = shown.index.facts, shown.tracked
+    station = Station(key, ImageSize(facts.width, facts.height))
+    told = {**_provenance(shown.recording, shown.index, shown.number), **(shown.link or {})}
+    if frame is not None and frame.camera is not None:
+        station = station.with_given(frame.camera, frame.covariance)
+        told["camera"] = _given_by_track(frame)
+    media = Media(str(settings.recordings / shown.place))
+    return View(name, station, media=media, extras=Extras(metadata={"recording": told}))
 
 
 def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dict[str, Any]:
@@ -248,6 +262,13 @@ def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dic
         "time_base": f"{over}/{under}",
         "seconds": float(index.seconds[number]),
     }
+
+
+def _given_by_track(frame: FrameCamera) -> dict[str, Any]:
+    """What the tracker says of the camera that it gives a frame."""
+    row = frame_row(frame)
+    names = ("outcome", "keyframe", "supported", "explained", "error_px", "sigma")
+    return {"source": SOURCE, **{name: row[name] for name in names}}
 
 
 def _kept(place: Path, image: Any) -> Path:

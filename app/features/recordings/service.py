@@ -7,7 +7,7 @@ the home: the index under its sha256, facts and shots in the database.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -36,6 +36,7 @@ from app.features.recordings.queries import (
     taken_frames,
     update_recording,
 )
+from app.formats.csv_text import csv_line
 from app.formats.frame_names import VIDEO_SUFFIXES
 from app.geometry.arrays import FloatArray
 from app.media.frames import refused_picture
@@ -248,7 +249,7 @@ def index_now(
     stamp = _stamp(path)
     if stamp is None:
         raise NotFoundError(f"{path.name} is not where it was imported from")
-    facts, shots = _in_worker(path, index_file, store.settings, progress=progress, stop=stop)
+    facts, shots = in_worker(path, index_file, store.settings, progress=progress, stop=stop)
     if _stamp(path) != stamp:
         raise ImageError(f"{path.name} changed while it was read", hint="Import it again.")
     with store.write() as session:
@@ -264,12 +265,13 @@ def index_now(
         return _recording(need_recording(session, recording_id))
 
 
-def _in_worker(
+def in_worker(
     path: Path,
     work: Callable[..., Found],
     *arguments: Any,
     progress: ReportProgress,
     stop: Callable[[], None],
+    limits: WorkerLimits = LIMITS,
 ) -> Found:
     """The result of ``work(path, *arguments, send)`` in a worker process."""
 
@@ -277,7 +279,7 @@ def _in_worker(
         done, total, sentence = place
         progress(done, total, *([sentence] if sentence else []))
 
-    with closing(WorkerProcess(LIMITS)) as worker, COUNTS["recordings"].working():
+    with closing(WorkerProcess(limits)) as worker, COUNTS["recordings"].working():
         try:
             found: Found = worker.run(work, path, *arguments, on_message=answer, stop=stop)
         except WorkerEnded as error:
@@ -364,7 +366,7 @@ def find_again(
     before = get_shots(store, recording_id)
     path, sha256 = before.recording.path, before.recording.require_readable()
     asked = (shots_of, store.settings, sha256)
-    found = _in_worker(path, *asked, progress=progress, stop=stop)
+    found = in_worker(path, *asked, progress=progress, stop=stop)
     shots = [Shot(**one) for one in found]
     return put_shots(store, recording_id, shots, before.etag, actor=actor)
 
@@ -383,6 +385,16 @@ def get_shots(store: Store, recording_id: int) -> RecordingShots:
     with store.read() as session:
         row = need_recording(session, recording_id)
     return _shots(store.settings, row)
+
+
+def shots_csv(found: RecordingShots) -> str:
+    """The shots of a recording as CSV, a row for each."""
+    columns = ("first", "last", "start_s", "end_s", "kind", "entered_by", "kept")
+    lines = [csv_line(("recording", "shot", *columns))]
+    for number, (shot, times) in enumerate(zip(found.items, found.times, strict=True), 1):
+        place = (found.recording.name, number, shot.first, shot.last, *times)
+        lines.append(csv_line((*place, shot.kind, shot.entered_by, shot.kept)))
+    return "".join(lines)
 
 
 def put_shots(
@@ -435,20 +447,25 @@ def groups_taken(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
         rows = taken_frames(session, recording.dataset_id, recording.name)
-    return {n: int(row.id) for row in rows if (n := _number(row.key)) is not None}
+    ids = {row.key: int(row.id) for row in rows}
+    return {number: ids[key] for number, key in frames_of_keys(ids).items()}
 
 
 def single_views(store: Store, recording: Recording) -> set[int]:
     """Numbers of the frames whose groups have no view but theirs."""
     with store.read() as session:
         rows = taken_frames(session, recording.dataset_id, recording.name)
-    return {n for row in rows if row.views == 1 and (n := _number(row.key)) is not None}
+    return set(frames_of_keys(row.key for row in rows if row.views == 1))
 
 
-def _number(key: str) -> int | None:
-    """The number of the frame whose group has a key."""
-    number = key.rpartition("/")[2].removesuffix(".png")
-    return int(number) if number.isascii() and number.isdigit() else None
+def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
+    """Keys of groups that were taken from a recording, by the number of their frame."""
+    found = {}
+    for key in keys:
+        number = key.rpartition("/")[2].removesuffix(".png")
+        if number.isascii() and number.isdigit():
+            found[int(number)] = key
+    return found
 
 
 def _shots(settings: Settings, row: Any) -> RecordingShots:

@@ -144,16 +144,16 @@ function Both({ first, recordings }) {
 		setSide('live');
 		players.replay.stand();
 		follows.current = next;
-		const start = mapped.current?.replay.findIndex((frame) => frame !== null) ?? -1;
-		if (next && mapped.current && start >= 0) {
-			// From where both show something.
-			const here = replayFrameAt(mapped.current, players.live.wanted.value);
-			if (here === null) players.live.goTo(mapped.current.first + start);
-			else players.replay.goTo(here);
-			if (!players.live.speed.value) players.live.run(1);
-		} else {
+		if (!next) {
 			players.live.stand();
+			return;
 		}
+		const start = mapped.current?.replay.findIndex((frame) => frame !== null) ?? -1;
+		const here = mapped.current && replayFrameAt(mapped.current, players.live.wanted.value);
+		// From where both show something.
+		if (mapped.current && here === null && start >= 0) players.live.goTo(mapped.current.first + start);
+		else if (here !== null) players.replay.goTo(here);
+		if (!players.live.speed.value) players.live.run(1);
 	}
 	/** @param {1 | -1} way */
 	function showBeside(way) {
