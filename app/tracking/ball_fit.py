@@ -74,6 +74,8 @@ class Fitted:
         weight: Of each ray, 1 but for gross errors, shape (R,).
         event_time: Of the event before each knot, seconds, NaN where there is none, shape (K,).
         event_sigma: Of these.
+        late: How much the rays say of each view's time, per second squared, shape (V, V).
+        late_pull: And in which direction, per second, shape (V,).
     """
 
     state: FloatArray
@@ -83,6 +85,8 @@ class Fitted:
     weight: FloatArray
     event_time: FloatArray
     event_sigma: FloatArray
+    late: FloatArray
+    late_pull: FloatArray
 
 
 def fit(
@@ -117,10 +121,12 @@ def fit(
         if most < _SETTLED_M:
             break
     diagonal, beside, _ = problem.equations(state)
-    covariance, after = inverse_blocks(factor(diagonal, beside), SIZE)
+    rows = factor(diagonal, beside)
+    covariance, after = inverse_blocks(rows, SIZE)
     when, spread = problem.events(state, covariance, after)
     miss, slope, weight = problem.misses(state)
-    return Fitted(state, covariance, miss, slope, weight, when, spread)
+    late = problem.lateness(state, rows)
+    return Fitted(state, covariance, miss, slope, weight, when, spread, *late)
 
 
 class _Problem:
@@ -195,6 +201,25 @@ class _Problem:
             gain = one.way @ np.linalg.pinv(noise, hermitian=True) @ one.way
             spread[at + 1] = np.sqrt(1 / (12 / self.dt[at] ** 2 + gain))
         return when, spread
+
+    def lateness(self, state: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What the rays say of the views' times when the ball's way may follow, (V, V) and (V,)."""
+        knots = self.knots
+        miss, slope, weight = self.misses(state)
+        moved = np.einsum("rki,ri->rk", slope, state[knots.at, _V])
+        views = int(knots.view.max(initial=-1)) + 1
+        known, pull = np.zeros((views, views)), np.zeros(views)
+        tied = np.zeros((views, *state.shape))
+        for view in range(views):
+            own = np.flatnonzero((knots.view == view) & (weight > 0))
+            push = moved[own] * weight[own, None]
+            known[view, view] = (push * moved[own]).sum()
+            pull[view] = (push * miss[own]).sum()
+            np.add.at(tied[view][:, _P], knots.at[own], np.einsum("rki,rk->ri", slope[own], push))
+        flat = tied.reshape(views, -1)
+        for view in range(views):
+            known[view] -= flat @ solve_factored(rows, SIZE, flat[view])
+        return (known + known.T) / 2, pull
 
     def _see(self, state: FloatArray, diagonal: FloatArray, pull: FloatArray) -> None:
         knots = self.knots

@@ -26,11 +26,11 @@ TOUCHED, TOUCHED_SIGMA = 0.9, 0.9
 """Height at which a ball in the air is touched: by feet mostly, by heads at twice that, metres."""
 REACH = 2.7
 """Height above which nobody but a keeper touches a ball, metres."""
-GRASS_SIGMA = 0.08
+GRASS_SIGMA = 0.1
 """Height of a rolling ball above and below rest: blades, ruts, hops and what the pitch is off, metres."""
 GRASS_S = 2.0
 """How long a rolling ball keeps such a height, seconds."""
-SPIN_SHARE, SPIN_LEAST, SPIN_S = 0.5, 0.2, 1.0
+SPIN_SHARE, SPIN_LEAST, SPIN_S = 0.5, 0.2, 2.5
 """Acceleration by spin as a share of the drag, what wind adds in m/s2, and how long both last, s."""
 ROLL_SIGMA, ROLL_S = 1.5, 0.4
 """Acceleration of a rolling ball beside its deceleration (skids, ruts, feet that run along)."""
