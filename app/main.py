@@ -43,6 +43,7 @@ from app.features.queue import routes as queue
 from app.features.recordings import routes as recordings
 from app.features.saved_views import routes as saved_views
 from app.features.stations import routes as stations
+from app.features.tracks import routes as tracks
 from app.features.verdicts import routes as verdicts
 from app.features.versions import routes as versions
 from app.features.webhooks import routes as webhooks
@@ -106,6 +107,7 @@ ROUTERS = (
     imports.uploads_router,
     imports.imports_router,
     recordings.router,
+    tracks.router,
     saved_views.router,
     queue.query_fields_router,
     queue.statistics_router,

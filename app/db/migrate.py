@@ -54,6 +54,7 @@ KNOWN_REVISIONS = (
     "0034",
     "0035",
     "0036",
+    "0037",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]

@@ -145,6 +145,14 @@ def _taken(result: Json) -> str:
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
+def _tracked(result: Json) -> str:
+    there = f"; {result['unchanged']:,} were up to date" if result["unchanged"] else ""
+    count = len(result["without"])
+    without = f"; {count:,} {'has' if count == 1 else 'have'} no track" if count else ""
+    stretches = plural(result["made"], "stretch", "stretches")
+    return f"The ball was tracked over {stretches}{there}{without}."
+
+
 _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "solve": _solved,
     "import": _imported,
@@ -161,6 +169,7 @@ _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "pictures": _pictures,
     "recording": _indexed,
     "instants": _taken,
+    "tracks": _tracked,
 }
 """By the kind of the job."""
 
