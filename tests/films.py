@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from app.sample.recording import draw_logo
 from tests.videos import write_pictures
 
 Clip = list[np.ndarray]
@@ -90,24 +91,8 @@ def _wiped(old: np.ndarray, new: np.ndarray, share: float, turn: int) -> np.ndar
 
 
 def _under_logo(old: np.ndarray, new: np.ndarray, share: float, turn: int) -> np.ndarray:
-    """A disc with a star flies in, covers everything and flies on; behind it the picture changes."""
-    height, width = old.shape[:2]
-    picture = (old if share < 0.5 else new).copy()
-    along = 2 * share - 1
-    size = int(width * (0.85 - 0.55 * abs(along)))
-    middle = (int(width * (0.5 + 0.8 * along)), int(height * (0.5 + 0.2 * along * (-1) ** turn)))
-    colours = [((150, 70, 30), (240, 220, 200)), ((20, 20, 20), (240, 240, 240))][turn % 2]
-    cv2.circle(picture, middle, size, colours[0], -1, cv2.LINE_AA)
-    spokes = 5 + turn % 3
-    for spoke in range(2 * spokes):
-        angles = [2 * math.pi * (spoke + step) / (2 * spokes) + 2 * share for step in (0, 0.5, 1)]
-        reach = (0.9 if spoke % 2 else 0.5) * size
-        points = [
-            (middle[0] + reach * math.cos(a) * f, middle[1] + reach * math.sin(a) * f)
-            for a, f in zip(angles, (0.5, 1.0, 0.5), strict=True)
-        ]
-        cv2.fillPoly(picture, [np.int32([middle, *points])], colours[1], cv2.LINE_AA)
-    return picture
+    """A logo flies in, covers everything and flies on; behind it the picture changes."""
+    return draw_logo((old if share < 0.5 else new).copy(), share, turn)
 
 
 def flash(clip: Clip, at: int, frames: int = 2, light: float = 2.2) -> Clip:

@@ -117,6 +117,39 @@ def draw_person(
     patch.lay(gain)
 
 
+_SHIFT = 4
+_DISTANT = (
+    ("knee_l", "ankle_l", 0.028, "socks"), ("knee_r", "ankle_r", 0.028, "socks"),
+    ("hip_l", "knee_l", 0.050, "shorts"), ("hip_r", "knee_r", 0.050, "shorts"),
+    ("shoulder_l", "hand_l", 0.030, "shirt"), ("chest", "pelvis", 0.098, "shirt"),
+    ("shoulder_r", "hand_r", 0.030, "shirt"),
+)  # fmt: skip
+"""Joint, joint, radius as a share of body height, and what covers it: what is left of people far away."""
+
+
+def draw_distant_person(image: Image, person: DrawnPerson, look: Look, gain: Colour) -> None:
+    """Draw somebody who is too small for more than the colours of the kit.
+
+    Args:
+        gain: Light on the person, per channel.
+    """
+    kit, metre = kit_of(look, person.index), person.height * person.scale
+    joints = np.round(person.joints * (1 << _SHIFT)).astype(int)
+    for a, b, radius, part in _DISTANT:
+        colour = _lit(getattr(kit, part), gain)
+        ends = joints[INDEX[a]].tolist(), joints[INDEX[b]].tolist()
+        wide = max(1, round(2 * radius * metre))
+        cv2.line(image, *ends, colour, wide, cv2.LINE_AA, _SHIFT)
+    head = joints[INDEX["head"]].tolist()
+    skin = _lit(SKIN[person.index % len(SKIN)], gain)
+    cv2.circle(image, head, round(0.056 * metre * (1 << _SHIFT)), skin, -1, cv2.LINE_AA, _SHIFT)
+
+
+def _lit(colour: Colour, gain: Colour) -> Colour:
+    b, g, r = (0.86 * channel * light for channel, light in zip(colour, gain, strict=True))
+    return b, g, r
+
+
 @dataclass
 class _Painter:
     patch: Patch

@@ -15,7 +15,7 @@ TEAM = 11
 PEOPLE = 2 * TEAM + 1
 """Home keeper and ten, away keeper and ten, referee."""
 PLAYER_RADIUS = 0.32
-_FORMATION = np.array(
+FORMATION = np.array(
     [
         (-0.75, -0.75), (-0.85, -0.25), (-0.85, 0.25), (-0.75, 0.75),
         (0.0, -0.8), (-0.15, -0.25), (-0.1, 0.3), (0.05, 0.85), (0.75, -0.3), (0.85, 0.25),
@@ -59,7 +59,7 @@ def make_instant(rng: np.random.Generator, numbers: tuple[int, ...]) -> Instant:
     return Instant(
         ball=ball,
         spin=rng.normal(0, 1.4, 3),
-        feet=_spread_people(feet),
+        feet=spread_people(feet),
         heading=heading,
         speed=speed,
         stride=rng.uniform(0, 2 * np.pi, PEOPLE),
@@ -91,7 +91,7 @@ def later(instant: Instant, seconds: float, ball_shift: FloatArray) -> Instant:
         instant,
         ball=ball,
         spin=instant.spin + 0.7 * seconds,
-        feet=_spread_people(feet),
+        feet=spread_people(feet),
         stride=instant.stride + 9.0 * seconds,
     )
 
@@ -148,7 +148,7 @@ def _place_people(rng: np.random.Generator, ball: FloatArray, attack: float) -> 
     scale = np.array([17.0, 21.0])
     teams = []
     for sign in (1.0, -1.0):  # home attacks +x, away attacks -x
-        spots = focus + _FORMATION * scale * np.array([sign, 1.0]) + rng.normal(0, 3.2, (10, 2))
+        spots = focus + FORMATION * scale * np.array([sign, 1.0]) + rng.normal(0, 3.2, (10, 2))
         pulled = rng.random(10) < 0.35
         spots[pulled] += 0.5 * (ball[:2] - spots[pulled])
         keeper = np.array([-sign * HALF_LENGTH, 0.0])
@@ -166,7 +166,7 @@ def _place_people(rng: np.random.Generator, ball: FloatArray, attack: float) -> 
     return inside
 
 
-def _spread_people(feet: FloatArray) -> FloatArray:
+def spread_people(feet: FloatArray) -> FloatArray:
     feet = feet.copy()
     for _ in range(4):
         offset = feet[:, None] - feet[None]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 GROUPS, SEED = 60, 20_260_101
+RECORDING_SECONDS, SHORTEST_RECORDING = 180, 36
+"""Of a recording, and of the shortest that shows all kinds of shots."""
 
 
 @dataclass(frozen=True)

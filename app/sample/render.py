@@ -234,9 +234,9 @@ def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
         background,
         shadow,
         exposure,
-        _eye(camera),
-        _turf(look),
-        _bowl(camera, look),
+        eye_of(camera),
+        turf_of(look),
+        bowl_of(camera, look),
         *noise_tiles(),
     )
     # A long lens that is focused on the play shows the crowd out of focus.
@@ -246,17 +246,20 @@ def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
     return image
 
 
-def _eye(camera: Camera) -> Eye:
+def eye_of(camera: Camera) -> Eye:
+    """The camera as ``shade`` takes it."""
     lens = (camera.focal_length[0], *camera.principal_point, float(camera.distortion[0]))
     return Eye(camera.rotation, camera.position, *lens)
 
 
-def _turf(look: Look) -> Turf:
+def turf_of(look: Look) -> Turf:
+    """The grass of a match."""
     grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
     return Turf(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def _bowl(camera: Camera, look: Look) -> Bowl:
+def bowl_of(camera: Camera, look: Look) -> Bowl:
+    """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
     atlas, levels = board_atlas(look.seed)
     along, beyond = stands.board_distance
@@ -283,7 +286,7 @@ def _bowl(camera: Camera, look: Look) -> Bowl:
 
 def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> None:
     """Everything that stands on the grass, far things first."""
-    lit_from = _lit_from(camera, look)
+    side = lit_from(camera, look)
     gain = look.light.exposure
     # Play is between the goal lines: a goal hides it, or is hidden, as a whole.
     near_goals = [sign for sign in (-1.0, 1.0) if sign * camera.position[0] > HALF_LENGTH]
@@ -291,13 +294,13 @@ def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> 
         if sign not in near_goals:
             draw_net(image, camera, sign, gain)
             draw_frame(image, camera, sign, gain)
-    _draw_play(image, camera, instant, look, lit_from)
+    _draw_play(image, camera, instant, look, side)
     for sign in near_goals:
         draw_frame(image, camera, sign, gain)
         draw_net(image, camera, sign, gain)
 
 
-def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, lit_from: float) -> None:
+def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, side: float) -> None:
     """People and the ball, far ones first."""
     people = people_in_view(camera, instant, pose_people(instant), image)
     ball_depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
@@ -307,13 +310,13 @@ def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, lit_f
         if depth < 0.5:
             continue
         if person is None:
-            draw_ball(image, camera, instant, _gain_at(look, instant.ball[:2]), lit_from)
+            draw_ball(image, camera, instant, gain_at(look, instant.ball[:2]), side)
         else:
-            gain = _gain_at(look, instant.feet[person.index])
-            draw_person(image, person, look, instant.numbers[person.index], gain, lit_from)
+            gain = gain_at(look, instant.feet[person.index])
+            draw_person(image, person, look, instant.numbers[person.index], gain, side)
 
 
-def _lit_from(camera: Camera, look: Look) -> float:
+def lit_from(camera: Camera, look: Look) -> float:
     """Which side of the image the light comes from, -1 left to +1 right."""
     if len(look.light.lamps) > 1:
         return 0.3
@@ -322,7 +325,7 @@ def _lit_from(camera: Camera, look: Look) -> float:
     return float(-(camera.rotation[0] @ shift) / max(length, 0.3))
 
 
-def _gain_at(look: Look, place: FloatArray) -> Colour:
+def gain_at(look: Look, place: FloatArray) -> Colour:
     """Light on somebody who stands there, per channel."""
     b, g, r = look.light.exposure
     if look.light.shade is None:

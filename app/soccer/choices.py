@@ -37,6 +37,10 @@ ShotKind = Literal["main", "replay", "closeup", "other"]
 """What a shot of a recording shows."""
 ShotStart = Literal["start", "cut", "dissolve", "wipe", "fade"]
 """How a shot begins."""
+LinkOutcome = Literal["none", "offset", "linked", "unobservable"]
+"""What is known of the times of a replay: nothing, where it begins, all, or that it cannot be told."""
+LinkSource = Literal["instants", "ball"]
+"""What the times of a replay were found from."""
 GoldStart = Literal["imported", "without_balls", "bare"]
 """What annotators of a gold group begin with."""
 BatchState = Literal["open", "closed"]

@@ -1,4 +1,4 @@
-"""Clip: the frames of a video one after the other, in the width in which paint is followed."""
+"""Clip: a stretch of a video, its frames in the width in which paint is followed."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ import numpy as np
 
 from app.errors import ImageError
 from app.geometry.camera import Camera
-from app.media.video import open_video
 from app.paint.evidence import Image
 from app.paint.propose import ENLARGED_WIDTH, WORK_WIDTH, enlarged, why_too_small
 from app.soccer.frames import ImageSize
-from app.video.indexing import pixel_aspect
-
-_MOST_UNEQUAL = 0.01
-"""By how much width and height of a pixel may differ: containers round."""
+from app.video.frames import read_frames
+from app.video.index import RecordingIndex
+from app.video.indexing import index_times
 
 
 @dataclass(frozen=True)
@@ -26,8 +24,8 @@ class Frame:
     """One frame.
 
     Attributes:
-        number: From 0, as the decoder returns them.
-        time: When it is shown, seconds.
+        number: From 0, the first one of the clip.
+        time: When it is shown, seconds after the first frame of the video.
         image: Red green blue, work size, shape (H, W, 3).
     """
 
@@ -38,56 +36,55 @@ class Frame:
 
 @dataclass(frozen=True)
 class Clip:
-    """A video that can be read.
+    """A stretch of a video that can be read.
 
     Attributes:
         path: The file.
-        size: Its own, pixels.
+        index: Of the whole file.
+        start: Number in the file of the clip's first frame.
+        count: How many frames it has.
+        size: Of a frame as people see it, upright with square pixels.
         work: The size in which its paint is followed, pixels.
     """
 
     path: Path
+    index: RecordingIndex
+    start: int
+    count: int
     size: ImageSize
     work: ImageSize
 
     @staticmethod
-    def open(path: Path) -> Clip:
-        """The clip of a file.
+    def open(
+        path: Path, index: RecordingIndex | None = None, first: int = 0, last: int | None = None
+    ) -> Clip:
+        """The clip of a file, from its frame ``first`` to ``last``.
+
+        Args:
+            index: Of the file; None: it is decoded for its times.
 
         Raises:
-            ImageError: It is no video that can be read, its pixels are not square, or it is too small to
-                follow a line in.
+            ImageError: It is no video that can be read, or it is too small to follow a line in.
         """
-        with open_video(path) as video:
-            over, under = pixel_aspect(video, 0)
-        if abs(over / under - 1) > _MOST_UNEQUAL:
-            raise ImageError(
-                f"{path.name}: its pixels are not square ({over}:{under})",
-                hint="Convert it first: ffmpeg -i IN -vf scale=iw*sar:ih,setsar=1 OUT",
-            )
-        first = next(_decoded(path, 0, 1), None)
-        if first is None:
-            raise ImageError(f"{path.name} is no video that can be read, or has no frame")
-        image = first[2]
+        index = index or index_times(path)
+        _, image = next(read_frames(path, index, [first]))
         if (small := why_too_small(image)) is not None:
             raise ImageError(f"{path.name}: {small}")
         shapes = [(each.shape[1], each.shape[0]) for each in (image, _work_size(image))]
         own, work = (ImageSize(*shape) for shape in shapes)
-        return Clip(path, own, work)
+        end = len(index) if last is None else last + 1
+        return Clip(path, index, first, end - first, own, work)
 
     def frames(self, first: int = 0, end: int | None = None) -> Iterator[Frame]:
-        """Frames from ``first`` to before ``end``; all are decoded, jumping may land beside one.
+        """Frames of the clip from ``first`` to before ``end``.
 
         Raises:
-            ImageError: A frame has another size than the first one.
+            ImageError: A frame cannot be decoded.
         """
-        for number, time, image in _decoded(self.path, first, end):
-            if (image.shape[1], image.shape[0]) != (self.size.width, self.size.height):
-                raise ImageError(
-                    f"{self.path.name}: frame {number} has another size than the first"
-                )
-            small = _work_size(image)
-            yield Frame(number, time, np.ascontiguousarray(small[:, :, ::-1]))
+        start, end = self.start, self.count if end is None else min(end, self.count)
+        for number, image in read_frames(self.path, self.index, range(start + first, start + end)):
+            time = float(self.index.seconds[number])
+            yield Frame(number - start, time, np.ascontiguousarray(_work_size(image)))
 
     def as_shown(self, camera: Camera) -> Camera:
         """A camera of the work size in pixels of the video."""
@@ -101,21 +98,6 @@ class Clip:
     @property
     def _factors(self) -> tuple[float, float]:
         return self.size.width / self.work.width, self.size.height / self.work.height
-
-
-def _decoded(path: Path, first: int, end: int | None) -> Iterator[tuple[int, float, Image]]:
-    with open_video(path) as video:
-        if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
-        number = 0
-        while (end is None or number < end) and video.grab():
-            if number >= first:
-                time = video.get(cv2.CAP_PROP_POS_MSEC) / 1000
-                done, image = video.retrieve()
-                if not done:
-                    raise ImageError(f"frame {number} of {path.name} cannot be decoded")
-                yield number, time, np.asarray(image, np.uint8)
-            number += 1
 
 
 def _work_size(image: Image) -> Image:

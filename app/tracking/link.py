@@ -15,6 +15,7 @@ from scipy.linalg import solveh_banded
 from app.geometry.arrays import FloatArray, IntArray
 from app.tracking.ball_rays import LONGEST_GAP_S, BallRays, BoolArray, slopes_of
 from app.tracking.link_kernels import meeting_scores
+from app.tracking.time_map import TimeMap, map_of_instants
 
 SLOWEST, FASTEST = 0.2, 1.15
 """Speeds of replays that are looked for."""
@@ -71,36 +72,6 @@ _CHANGE_S, _CHANGE_SHARE = 0.04, 0.05
 """Time and share of the speed by which the maps of two pieces differ."""
 
 
-@dataclass(frozen=True)
-class TimeMap:
-    """What became of a link, or of a piece of one.
-
-    Attributes:
-        reason: Why there is no map, a sentence; None where there is one.
-        offset, speed: ``t_live = offset + speed * t_replay``, seconds; the best there was where
-            there is a reason.
-        covariance: Of both, shape (2, 2).
-        miss: Median distance of the rays that meet, metres.
-        pairs: Rays of the replay with a live one beside them.
-        overlap: Live seconds between the first and the last of those.
-        by_hand: Whether a person's instants alone say it.
-        first, last: Replay times of a piece.
-        pieces: Where one map does not fit the whole replay: those that fit parts of it.
-    """
-
-    reason: str | None
-    offset: float | None = None
-    speed: float | None = None
-    covariance: FloatArray | None = None
-    miss: float | None = None
-    pairs: int = 0
-    overlap: float = 0.0
-    by_hand: bool = False
-    first: float = 0.0
-    last: float = 0.0
-    pieces: tuple[TimeMap, ...] = ()
-
-
 def find_time_map(
     live: BallRays, replay: BallRays, hints: Sequence[tuple[float, float]] = ()
 ) -> TimeMap:
@@ -143,17 +114,14 @@ def _from_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool 
 
 def _by_hand(live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
     """The map of a person's instants alone."""
-    rows = np.column_stack([np.ones(len(hints)), hints[:, 1]])
-    offset, speed = np.linalg.lstsq(rows, hints[:, 0], rcond=None)[0]
-    if speed <= 0:
-        return TimeMap("The instants given run backwards: later in the replay is earlier live.")
-    covariance = _frame_s(live) ** 2 * np.linalg.inv(rows.T @ rows)
-    miss, count = None, 0
-    if min(len(live), len(replay)) > 1:
-        pairs = _Fit(live, replay, hints).pairs(_Map(offset, speed, 0.0))
-        count = len(pairs.miss)
-        miss = float(np.median(np.abs(pairs.miss))) if count else None
-    return TimeMap(None, float(offset), float(speed), covariance, miss, count, by_hand=True)
+    made = map_of_instants(hints, _frame_s(live))
+    if made.reason is not None or min(len(live), len(replay)) < 2:
+        return made
+    assert made.offset is not None and made.speed is not None
+    pairs = _Fit(live, replay, hints).pairs(_Map(made.offset, made.speed, 0.0))
+    count = len(pairs.miss)
+    miss = float(np.median(np.abs(pairs.miss))) if count else None
+    return replace(made, miss=miss, pairs=count)
 
 
 def _frame_s(rays: BallRays) -> float:

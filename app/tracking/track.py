@@ -27,8 +27,8 @@ class FrameCamera:
     """The camera of one frame.
 
     Attributes:
-        number: From 0, as the decoder returns frames.
-        time: When the frame is shown, seconds.
+        number: In the video, from 0, as the decoder returns frames.
+        time: When it is shown, seconds after the first frame of the video.
         outcome: ``tracked``: the camera lies on the paint; ``bridged``: the background carries it
             between frames where it does; ``lost``: there is none.
         size: Of the video, pixels.
@@ -55,7 +55,7 @@ class FrameCamera:
 
 
 def track_clip(
-    path: Path,
+    clip: Clip | Path,
     lines: Mapping[int, Lines],
     pitch: Pitch | None = None,
     policy: CalibrationPolicy | None = None,
@@ -64,8 +64,8 @@ def track_clip(
     """The camera of every frame of a clip.
 
     Args:
-        path: The video.
-        lines: Annotated lines by number of their frame, pixels of the video.
+        clip: The video, or a stretch of it.
+        lines: Annotated lines by number of their frame in the video, pixels of the video.
         pitch: The pitch.
         policy: Prior of the distortion.
         tell: Called with frames done.
@@ -75,9 +75,14 @@ def track_clip(
         ImageError: The clip cannot be read.
     """
     pitch, policy = pitch or Pitch(), policy or CalibrationPolicy()
-    clip = Clip.open(path)
+    clip = clip if isinstance(clip, Clip) else Clip.open(clip)
     given: dict[int, Given] = {}
     for number, drawn in lines.items():
+        if not 0 <= number - clip.start < clip.count:
+            raise InputError(
+                f"{clip.path.name} has {clip.count} frames, and none of the number {number}",
+                hint="Frames count from 0.",
+            )
         found = calibrate(drawn, pitch, clip.size, CLICKED)
         if found.camera is None:
             raise InputError(
@@ -85,24 +90,18 @@ def track_clip(
                 hint="Draw more of the markings that this frame shows, or annotate another frame.",
             )
         spread = None if found.covariance is None else np.reshape(found.covariance, (8, 8))
-        given[number] = Given(clip.as_read(found.camera), spread)
+        given[number - clip.start] = Given(clip.as_read(found.camera), spread)
     shot = follow_shot(clip, given, pitch, policy, tell)
-    beyond = [number for number in given if number >= len(shot.frames)]
-    if beyond:
-        raise InputError(
-            f"{path.name} has {len(shot.frames)} frames, and none of the number {beyond[0]}",
-            hint="Frames count from 0.",
-        )
     solved = solve_shot(shot.frames, shot.matches, clip.work, pitch, policy)
     return [_as_shown(frame, clip) for frame in solved]
 
 
 def _as_shown(frame: TrackedFrame, clip: Clip) -> FrameCamera:
-    """A frame in pixels of the video."""
+    """A frame in pixels and numbers of the video."""
     scale = clip.size.width / clip.work.width
     seen, covariance, error = frame.seen, frame.covariance, frame.error_px
     return FrameCamera(
-        number=frame.number,
+        number=clip.start + frame.number,
         time=frame.time,
         outcome=frame.outcome,
         size=clip.size,

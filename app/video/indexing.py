@@ -47,30 +47,52 @@ def index_recording(
         TooLargeError: Its frames are larger than the limits, or too many.
     """
     _require_whole(path)
-    sha256, size = _digest(path)
-    has_table, key_times = _has_seek_table(path), _key_times(path)
+    return _index(path, _digest(path), settings, tell)
+
+
+def index_times(path: Path) -> RecordingIndex:
+    """The index of a video whose pictures are not measured and whose content has no digest: enough to read its
+    frames exactly. Decodes it all, in this process.
+
+    Raises:
+        ImageError: It is no video that can be read.
+        TooLargeError: It has too many frames.
+    """
+    return _index(path, ("", path.stat().st_size if path.is_file() else 0), None, None)
+
+
+def _index(
+    path: Path,
+    content: tuple[str, int],
+    settings: Settings | None,
+    tell: Callable[[int, int | None], object] | None,
+) -> RecordingIndex:
+    """The index of a video of a content (sha256, bytes); without settings nothing is measured."""
+    sha256, size = content
     rows, combs = Rows(), list[float]()
     times, intra = list[float](), list[bool]()
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
         coded = _coded_size(video)
-        check_size(ImageHeader("video", *coded), settings, path.name)
+        if settings is not None:
+            check_size(ImageHeader("video", *coded), settings, path.name)
         rotation = int(video.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
         aspect = pixel_aspect(video, rotation)
         measurer = FrameMeasurer(video.get(cv2.CAP_PROP_FPS))
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
         while video.grab():
-            done, picture = video.retrieve()
-            if not done:
-                raise ImageError(f"frame {len(times)} of {path.name} cannot be decoded")
-            _require_size(picture, coded, len(times), path)
+            row, before = rows.add()
+            if settings is not None:
+                done, picture = video.retrieve()
+                if not done:
+                    raise ImageError(f"frame {len(times)} of {path.name} cannot be decoded")
+                _require_size(picture, coded, len(times), path)
+                measurer.measure(np.asarray(picture, np.uint8), row, before)
+                if len(times) % COMB_EVERY == COMB_EVERY - 1 and row["change"] > _MOVING:
+                    combs.append(comb(np.asarray(picture, np.uint8)))
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             intra.append(video.get(cv2.CAP_PROP_FRAME_TYPE) == ord("I"))
-            row, before = rows.add()
-            measurer.measure(np.asarray(picture, np.uint8), row, before)
-            if len(times) % COMB_EVERY == 0 and row["change"] > _MOVING:
-                combs.append(comb(np.asarray(picture, np.uint8)))
             if len(times) > MAX_FRAMES:
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
             if tell is not None and len(times) % _A_WORD == 0:
@@ -91,10 +113,10 @@ def index_recording(
         pixel_aspect=aspect,
         interlaced=_is_interlaced(combs),
         time_base=base,
-        has_seek_table=has_table,
+        has_seek_table=_has_seek_table(path),
         decoder=f"OpenCV {cv2.__version__}",
     )
-    return RecordingIndex(facts, pts, _keys(shown, key_times, np.array(intra)), rows.all())
+    return RecordingIndex(facts, pts, _keys(shown, _key_times(path), np.array(intra)), rows.all())
 
 
 def _digest(path: Path) -> tuple[str, int]:

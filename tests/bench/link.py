@@ -17,8 +17,10 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.sample.play import RADIUS, step_ball
 from app.tracking.ball_rays import BallRays, ball_rays
-from app.tracking.link import TimeMap, find_time_map
+from app.tracking.link import find_time_map
+from app.tracking.time_map import TimeMap
 from tests.bench.table import print_table
 from tests.cameras import looking
 
@@ -66,7 +68,7 @@ def hawkeye(data: Path = DATA) -> FloatArray | None:
 def made_ball(seconds: float = 60.0, seed: int = 0) -> FloatArray:
     """A ball that is kicked, flies with drag, bounces and rolls out, as ``hawkeye``."""
     generator = np.random.default_rng(seed)
-    place, velocity = np.array([0.0, 0.0, 0.11]), np.zeros(3)
+    place, velocity = np.array([0.0, 0.0, RADIUS]), np.zeros(3)
     until, rows = 0.0, []
     for step in range(round(seconds / BALL_STEP)):
         now = step * BALL_STEP
@@ -78,17 +80,7 @@ def made_ball(seconds: float = 60.0, seed: int = 0) -> FloatArray:
             up = generator.choice([0.0, generator.uniform(2.0, 9.0)])
             velocity = np.array([*(pace * way / np.linalg.norm(way)), up])
         rows.append((now, place[0], place[1], -place[2]))
-        airborne = place[2] > 0.12 or velocity[2] > 0.5
-        if airborne:
-            velocity = velocity - BALL_STEP * (
-                np.array([0.0, 0.0, 9.81]) + 0.012 * np.linalg.norm(velocity) * velocity
-            )
-        else:
-            pace = float(np.linalg.norm(velocity[:2]))
-            velocity[:2] *= max(0.0, 1 - BALL_STEP * 0.6 / max(pace, 0.1))
-        place = place + BALL_STEP * velocity
-        if place[2] < 0.11:
-            place[2], velocity[2] = 0.11, max(0.0, -0.6 * velocity[2] - 0.3)
+        step_ball(place, velocity, BALL_STEP)
     return np.array(rows)
 
 

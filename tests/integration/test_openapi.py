@@ -41,7 +41,8 @@ from app.features.policies.service import read_policy
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
-from app.features.recordings.service import add_recording, get_shots, index_now
+from app.features.recordings.links import add_link, get_link
+from app.features.recordings.service import Shot, add_recording, get_shots, index_now, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station
 from app.features.tracks.service import get_track
@@ -62,7 +63,7 @@ EXPORT, DELETED_EXPORT = "1", "2"
 """Exports are the first jobs of the home; what is deleted must not be asked for later."""
 DELETED_WEBHOOK = "2"
 DELETED_COMMENT = "2"
-DELETED_RECORDING = "2"
+DELETED_RECORDING = DELETED_LINK = "2"
 HOOK = "http://127.0.0.1:9/hook"
 """Where webhooks may be sent, and nobody listens."""
 REFUSALS = ["2xx", "400", "404", "409", "412", "422", "428", "503"]
@@ -152,6 +153,10 @@ def add_recordings(store: Store) -> None:
         number = add_recording(store, "small", path, actor="local").id
     assert str(number) == DELETED_RECORDING
     index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
+    put_shots(store, 1, [Shot(0, 19, "replay", "start")], None, actor="local")
+    for first in (0, 1):
+        number = add_link(store, (1, first, 9), (1, 10, 19), actor="local").id
+    assert str(number) == DELETED_LINK
 
 
 @pytest.fixture(scope="module")
@@ -321,8 +326,17 @@ class Attack:
 
     def aim_at_recordings(self, case: schemathesis.Case) -> None:
         """The recording that there is, and frames of it."""
-        if case.method == "DELETE" and "recording" in case.path_parameters:
+        if case.operation.path.endswith("/{recording}") and case.method == "DELETE":
             case.path_parameters["recording"] = DELETED_RECORDING
+        if "link" in case.path_parameters:
+            case.path_parameters["link"] = DELETED_LINK if case.method == "DELETE" else "1"
+        if "/suggestions/" in case.operation.path:
+            case.path_parameters["frame"] = "3"
+        if case.operation.path.endswith("/links") and case.method == "POST":
+            replay = {"recording": 1, "first": 12, "last": 15}
+            case.body = {"live": {"first": 0, "last": 5}, "replay": replay}
+        if case.operation.path.endswith("/instants"):
+            case.body = {"instants": [{"live": 3, "replay": 12}, {"live": 7, "replay": 18}]}
         if case.operation.path.endswith("/recordings") and case.method == "POST":
             case.body = {"dataset": "small", "source": {"upload": self.upload("film.mp4")}}
         if case.operation.path.endswith("/tracks") and case.method == "POST":
@@ -348,6 +362,8 @@ class Attack:
             return read_policy(self.store, "small").etag
         if case.operation.path.endswith("/pitches"):
             return read_pitches(self.store, "small").etag
+        if "link" in case.path_parameters:
+            return get_link(self.store, 1, 1).etag
         if "recording" in case.path_parameters:
             return get_shots(self.store, 1).etag
         if "track" in case.path_parameters:

@@ -26,6 +26,7 @@ from app.features.people.service import invite
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
+from app.features.recordings.links import add_link
 from app.features.recordings.service import Shot, add_recording, index_now, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze
@@ -42,7 +43,7 @@ SECRET = "three plain words"
 ITEMS = "items"
 ADDRESS = {
     "dataset": "small", "group": "1", "view": "1", "batch": "1", "evaluation": "1", "user": "1",
-    "webhook": "1", "recording": "1",
+    "webhook": "1", "recording": "1", "frame": "10",
 }  # fmt: skip
 """Values of the parameters in the addresses of lists."""
 PAGED_ALREADY = 3
@@ -52,7 +53,7 @@ FULL = (
     "listEvaluations", "listSavedViews", "listThreads", "listWebhooks", "listWebhookDeliveries",
     "listBatches", "listBatchGroups", "getMyWork", "getTeamWork", "listUsers", "listMembers",
     "listTokens", "listSessions", "listDatasets", "listUploads", "listVerdictBatches", "getAudit",
-    "getNotifications", "getHistory", "listRecordings", "listShots", "listPolicies", "listQueryFields", "listEvaluationFrames",
+    "getNotifications", "getHistory", "listRecordings", "listShots", "listLinks", "listPolicies", "listQueryFields", "listEvaluationFrames",
 )  # fmt: skip
 """Lists of which the home has several things, so that their second pages are looked at."""
 
@@ -95,6 +96,9 @@ def fill(store: Store, home: Path) -> None:
         index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
         shots = [Shot(first, first + 4, "main", "cut") for first in range(0, 20, 5)]
         put_shots(store, recording.id, shots, None, actor="local")
+        if number == 0:
+            for first in range(3):
+                add_link(store, (1, first, 8), (1, 10, 19), actor="local")
         begin_thread(store, 1, f"Is this the ball, @admin? {number}", actor="lead")
 
 

@@ -59,6 +59,11 @@ BODIES: Mapping[str, dict[str, Any]] = {
     "POST /api/v1/recordings": {"source": {}},
     "PUT /api/v1/recordings/{recording}/shots": {"shots": []},
     "POST /api/v1/recordings/{recording}/groups": {"frames": [0]},
+    "POST /api/v1/recordings/{recording}/links": {
+        "live": {"first": 0, "last": 0},
+        "replay": {"first": 0, "last": 0},
+    },
+    "PUT /api/v1/recordings/{recording}/links/{link}/instants": {"instants": []},
     "POST /api/v1/predictions/accept": {"q": "", "dry_run": True},
     "POST /api/v1/datasets/{dataset}/predictions": {"name": "p2", "format": "csv"},
     "POST /api/v1/datasets/{dataset}/evaluations": {"groups": "all"},

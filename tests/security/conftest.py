@@ -169,6 +169,10 @@ def _fill(guarded: Guarded, frame: str) -> None:
     tracked = json_("POST", "/datasets/flight/tracks", {})
     assert (tracked["state"], tracked["result"]["made"]) == ("done", 1), tracked
     ids |= {"track": "1"}
+    replay = {"recording": indexed["result"]["recording"], "first": 10, "last": 19}
+    both = {"live": {"first": 0, "last": 9}, "replay": replay}
+    made = json_("POST", f"/recordings/{ids['recording']}/links", both)
+    ids |= {"link": str(made["id"])}
     ids |= {"batch": str(batch["batch"]), "saved": str(view["id"]), "path": "nothing"}
 
 

@@ -33,7 +33,7 @@ PLAIN_WORDS = """
     counts cross css csv cursor curve cuts damped database datasets day delete deps descriptions details detect
     devices diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor
     empty engine enrol ephemeral errors estimator evaluate event events executors export exports facets facts faults
-    fields figure figures files finder finite first fit fixture folder folders follow form format formats frozen
+    fields figure figures files film finder finite first fit fixture folder folders follow form format formats frozen
     gestures give glossary gold grass grid guess guide guideline guidelines header headers heat help histograms
     history hit home hooks hosts idempotency identity if image images import imports index indexing info init insert
     insight invitation invitations invite items jaccard join json kept kernels key keys kinds known konva last
@@ -42,7 +42,7 @@ PLAIN_WORDS = """
     measures membership mentions menu merge messages metrics migrate mini model motion name names navigation needs
     neighbours notice nudge numbers object on open openapi opened opentrackio options order origin other output own
     ownership packing page pages paint palette panel parameters parquet parse parts patch path pen people
-    permissions pins pitch pitches pixel place places plain playback plural png pointer policies pool popover pose
+    permissions pins pitch pitches pixel place places plain play playback plural png pointer policies pool popover pose
     position postgresql preopen preview problem process processes profile progress projection proof property
     proposal propose props provider queries query quota rail rater reader reasons record reimport remote render
     repeats report requests resect resource respond responses restore result rethreshold return revert reviewers
@@ -51,7 +51,7 @@ PLAIN_WORDS = """
     sign singular site smallest snapshot solve solving source sources sphere spill spread sqlite squares stacks
     stage staging standpoints starts state statements statistics steps storage store stored straight stream strict
     submit suggested suggestions summary surface swap synloc tab table tall team term terminal text threads
-    threshold ticks tokens tools trace tracing track transfer transitions tree trees triangulate tries truth types
+    threshold ticks time tokens tools trace tracing track transfer transitions tree trees triangulate tries truth types
     undo undrawn upload v3 v3d video viewport viewports virtual visibility wal walk warm web what when window words
     work worker workspace write writer zip
 """

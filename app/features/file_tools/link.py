@@ -19,7 +19,8 @@ from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
 from app.tracking.ball_rays import BallRays, ball_rays
-from app.tracking.link import TimeMap, find_time_map
+from app.tracking.link import find_time_map
+from app.tracking.time_map import TimeMap
 
 BALL_FILE = "ball.csv"
 _COLUMNS = ("frame", "time_s", "x", "y")

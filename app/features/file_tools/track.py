@@ -93,11 +93,12 @@ def track_video(
         shown: Their names.
         send: Called with frames done.
     """
-    size, report = Clip.open(clip).size, Report()
+    opened, report = Clip.open(clip), Report()
     lines = {
-        number: _lines(content, shown[number], size, report) for number, content in contents.items()
+        number: _lines(content, shown[number], opened.size, report)
+        for number, content in contents.items()
     }
-    return track_clip(clip, lines, tell=send)
+    return track_clip(opened, lines, tell=send)
 
 
 def _lines(content: bytes, shown: str, size: ImageSize, report: Report) -> Lines:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from app.durable import keep_private
-from app.sample.order import GROUPS, SEED, SampleOrder
+from app.sample.order import GROUPS, RECORDING_SECONDS, SEED, SHORTEST_RECORDING, SampleOrder
 from app.terminal.opened import opened_store
 from app.terminal.options import Json, Workers, acting, read_settings
 from app.terminal.terminal import print_values, show_progress
@@ -61,6 +61,23 @@ def sample(
     written = vars(made.written) if made.written else {}
     values = {"dataset": made.dataset, "groups": made.groups, "solved": made.solved}
     print_values({**written, **values, "written": made.written is not None}, json_)
+
+
+@commands.command("sample-recording")
+def sample_recording(
+    out: Annotated[Path, typer.Argument(help="The video to write, such as film.mp4.")],
+    seconds: Annotated[
+        float, typer.Option(min=SHORTEST_RECORDING, max=7200, help="How long it is.")
+    ] = RECORDING_SECONDS,
+    seed: Annotated[int, typer.Option(min=0, help="Seed; another one gives other play.")] = SEED,
+    json_: Json = False,
+) -> None:
+    """Draw a recording of a match, with shots, replays and the ball known, in OUT and a JSON beside it."""
+    from app.sample.recording import write_recording
+
+    with show_progress("Drawing the recording") as progress:
+        report = write_recording(out, seconds, seed, progress=progress)
+    print_values(vars(report), json_)
 
 
 @commands.command()

@@ -26,6 +26,7 @@ from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset, require_name
 from app.features.groups.state import require_etag
+from app.features.recordings.link_queries import delete_links
 from app.features.recordings.queries import (
     delete_recording,
     find_recording,
@@ -255,6 +256,10 @@ def index_now(
         found = {"stamp": stamp, "sha256": facts["sha256"], "facts": canonical(facts)}
         if row.sha256 != facts["sha256"] or row.shots == "[]":
             found |= {"shots": canonical(shots), "revision": row.revision + 1}
+        if row.sha256 != facts["sha256"] and (gone := delete_links(session, recording_id)):
+            # Their frames are those of another film.
+            what = {"recording": recording_id, "name": row.name, "links": gone}
+            add_audit_event(session, row.actor, "links removed", row.dataset_id, **what)
         update_recording(session, recording_id, **found)
         return _recording(need_recording(session, recording_id))
 
@@ -320,10 +325,11 @@ def read_index(settings: Settings, sha256: str) -> RecordingIndex:
     Raises:
         ConflictError: It is gone, or of an older version.
     """
-    return _read_index(index_place(settings, sha256))
+    return read_index_at(index_place(settings, sha256))
 
 
-def _read_index(place: Path) -> RecordingIndex:
+def read_index_at(place: Path) -> RecordingIndex:
+    """The same by the place where it lies."""
     try:
         return index_from_bytes(place.read_bytes())
     except (OSError, InputError) as error:
@@ -451,7 +457,16 @@ def _shots(settings: Settings, row: Any) -> RecordingShots:
 @lru_cache(maxsize=4)
 def _seconds(index: Path) -> FloatArray:
     """When each frame is shown, by the place of an index: that of a whole match takes a second to read."""
-    return _read_index(index).seconds
+    return read_index_at(index).seconds
+
+
+def frame_seconds(settings: Settings, sha256: str) -> FloatArray:
+    """When each frame of a recording is shown, seconds after the first one, shape (N,).
+
+    Raises:
+        ConflictError: Its index is gone, or of an older version.
+    """
+    return _seconds(index_place(settings, sha256))
 
 
 def _etag(row: Any) -> str:

@@ -1,8 +1,8 @@
-"""The table of recordings: films of a match, from which groups are taken."""
+"""The tables of recordings, films of a match from which groups are taken, and of links between their shots."""
 
 from __future__ import annotations
 
-from sqlalchemy import ForeignKey, UniqueConstraint
+from sqlalchemy import ForeignKey, Index, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -30,6 +30,32 @@ class RecordingModel(Base):
     sha256: Mapped[str | None]
     facts: Mapped[str | None]
     shots: Mapped[str]
+    revision: Mapped[int]
+    actor: Mapped[str]
+    created: Mapped[str]
+
+
+class ShotLinkModel(Base):
+    """A replay and the live shot that it shows again, both as they were when they were linked.
+
+    ``instants`` is JSON: pairs of a live frame and the frame of the replay that shows the same instant. ``map``
+    (JSON) is what was found from them. ``revision`` counts the changes.
+    """
+
+    __tablename__ = "shot_link"
+    __table_args__ = (Index("shot_link_live", "live_id"), Index("shot_link_replay", "replay_id"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"))
+    live_id: Mapped[int] = mapped_column(ForeignKey("recording.id", ondelete="CASCADE"))
+    live_first: Mapped[int]
+    live_last: Mapped[int]
+    replay_id: Mapped[int] = mapped_column(ForeignKey("recording.id", ondelete="CASCADE"))
+    replay_first: Mapped[int]
+    replay_last: Mapped[int]
+    instants: Mapped[str]
+    assumed_speed: Mapped[float | None]
+    map: Mapped[str]
     revision: Mapped[int]
     actor: Mapped[str]
     created: Mapped[str]

@@ -116,6 +116,27 @@ def tracks(api: Any) -> Request:
     return "POST", "/datasets/flight/tracks", {}, {}
 
 
+def link(api: Any) -> Request:
+    path = recording(api)
+    replay = {"recording": int(path.rpartition("/")[2]), "first": 10, "last": 19}
+    return "POST", f"{path}/links", {"live": {"first": 0, "last": 9}, "replay": replay}, {}
+
+
+def linked(api: Any) -> str:
+    made = send(api, asked := link(api)).json()
+    return f"{asked[1]}/{made['id']}"
+
+
+def linked_instants(api: Any) -> Request:
+    path = linked(api)
+    body = {"instants": [{"live": 2, "replay": 12}]}
+    return "PUT", f"{path}/instants", body, etag_of(api, path)
+
+
+def no_link(api: Any) -> Request:
+    return "DELETE", linked(api), None, {}
+
+
 def saved_view(_api: Any) -> Request:
     return "POST", "/datasets/broadcast/saved-views", {"name": "Mine", "q": "jac<0.8"}, {}
 

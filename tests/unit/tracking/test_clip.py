@@ -11,8 +11,10 @@ import pytest
 from app.errors import ImageError
 from app.soccer.frames import ImageSize
 from app.tracking.clip import Clip
+from app.video.frames import RecordingReader
+from app.video.indexing import index_times
 from tests.cameras import looking
-from tests.videos import stretch_pixels
+from tests.videos import number_of, numbered, stretch_pixels, turn, vary_times, write_pictures
 
 
 def write(path: Path, width: int, height: int, count: int = 4, codec: str = "MJPG") -> Path:
@@ -46,13 +48,32 @@ def test_frames_are_numbered_from_nought_with_their_times_and_colours(tmp_path: 
     assert abs(red - 10) < 12 and abs(green - 100) < 12 and abs(blue - 200) < 12
 
 
-def test_pixels_that_are_not_square_are_refused_with_what_to_do(tmp_path: Path):
-    path = write(tmp_path / "clip.mp4", 640, 360, codec="mp4v")
-    assert Clip.open(stretch_pixels(path, 200, 199)).size == ImageSize(640, 360)
+def test_frames_are_upright_and_have_square_pixels(tmp_path: Path):
     path = write(tmp_path / "wide.mp4", 640, 360, codec="mp4v")
-    with pytest.raises(ImageError, match=r"not square \(4:3\)") as refused:
-        Clip.open(stretch_pixels(path, 4, 3))
-    assert "setsar=1" in (refused.value.hint or "")
+    clip = Clip.open(stretch_pixels(path, 4, 3))
+    assert (clip.size, clip.work) == (ImageSize(853, 360), ImageSize(853, 360))
+    assert next(clip.frames()).image.shape == (360, 853, 3)
+    path = write(tmp_path / "turned.mp4", 640, 720, codec="mp4v")
+    assert Clip.open(turn(path, 90)).size == ImageSize(720, 640)
+
+
+def test_a_stretch_is_read_alone_by_an_index(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "clip.mp4"
+    write_pictures(path, "mp4v", (cv2.resize(numbered(n), (640, 384)) for n in range(120)))
+    vary_times(path, [512 + 128 * (number % 3) for number in range(120)])
+    index = index_times(path)
+    clip, asked = Clip.open(path, index, 90, 109), list[int]()
+    read = RecordingReader.read
+    monkeypatch.setattr(
+        RecordingReader, "read", lambda self, number: (asked.append(number), read(self, number))[1]
+    )
+    frames = list(clip.frames(2, 5))
+    assert asked == [92, 93, 94] and clip.count == 20
+    assert [frame.number for frame in frames] == [2, 3, 4]
+    assert [number_of(cv2.resize(each.image, (160, 96))) for each in frames] == asked
+    assert [frame.time for frame in frames] == pytest.approx(index.seconds[92:95].tolist())
+    assert np.ptp(np.diff(index.seconds)) > 0.01
+    assert [frame.number for frame in clip.frames(18)] == [18, 19]
 
 
 def test_frames_too_small_to_follow_a_line_in_are_refused(tmp_path: Path):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.tracking.ball_rays import BallRays
-from app.tracking.link import TimeMap, find_time_map
+from app.tracking.link import find_time_map
+from app.tracking.time_map import TimeMap
 from tests.bench.link import (
     Filmed,
     Planted,

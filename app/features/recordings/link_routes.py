@@ -1,0 +1,160 @@
+"""Links of a recording's replays to its live shots."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+
+from app.features.recordings.link_frames import linked_frames, suggest_live
+from app.features.recordings.link_schemas import (
+    InstantsEdit,
+    LinkDocument,
+    LinkedFramesDocument,
+    LinkList,
+    LiveSuggestions,
+    NewLink,
+)
+from app.features.recordings.links import (
+    ShotLink,
+    add_link,
+    get_link,
+    list_links,
+    remove_link,
+    set_instants,
+)
+from app.finite import MAX_ID
+from app.http.conflicts import current_state
+from app.http.cursor import paged
+from app.http.deps import Actor, AppStore, Id, IfMatch
+from app.http.permissions import Action, OwnedKind, may
+from app.http.problem import responses
+from app.http.respond import document, no_content, responds
+from app.http.route import Route
+
+router = APIRouter(prefix="/recordings/{recording}", tags=["recordings"], route_class=Route)
+
+TAGGED = {"headers": {"ETag": {"description": "Of the link.", "schema": {"type": "string"}}}}
+LOCATION = {"Location": {"description": "Its address.", "schema": {"type": "string"}}}
+LinkId = Annotated[int, Path(ge=1, le=MAX_ID, description="Id of the link.")]
+ReplayFrame = Annotated[int, Path(ge=0, le=MAX_ID, description="Any frame of the replay.")]
+
+
+def _tagged(found: ShotLink, status: int = 200, **headers: str) -> Response:
+    shown = LinkDocument.model_validate(found)
+    return document(shown, status, {"ETag": found.etag, **headers})
+
+
+def _made(found: ShotLink) -> Response:
+    at = f"/api/v1/recordings/{found.live.recording}/links/{found.id}"
+    return _tagged(found, 201, Location=at)
+
+
+@router.get("/links", operation_id="listLinks", responses=responses(404))
+@may(Action.READ, recording=OwnedKind.RECORDING)
+@paged()
+def get_links(recording: Id, store: AppStore) -> LinkList:
+    """The links of a recording, in which it has the live shot or the replay."""
+    return LinkList.model_validate({"items": list_links(store, recording)})
+
+
+@router.post(
+    "/links",
+    operation_id="addLink",
+    response_model=LinkDocument,
+    status_code=201,
+    responses={
+        **responses(404, 409, 413, 415),
+        201: {
+            "description": "The link; the same two shots again are the same link.",
+            "headers": {**TAGGED["headers"], **LOCATION},
+        },
+    },
+)
+@may(
+    Action.ANNOTATE,
+    recording=OwnedKind.RECORDING,
+    body={"replay/recording": OwnedKind.RECORDING},
+)
+@responds(_made)
+def add_one(recording: Id, wanted: NewLink, store: AppStore, actor: Actor) -> ShotLink:
+    """Link a replay to the live shot of this recording that it shows again, without an instant yet."""
+    live, replay = wanted.live, wanted.replay
+    return add_link(
+        store,
+        (recording, live.first, live.last),
+        (replay.recording, replay.first, replay.last),
+        actor=actor,
+    )
+
+
+@router.get("/links/suggestions/{frame}", operation_id="suggestLive", responses=responses(404, 409))
+@may(Action.READ, recording=OwnedKind.RECORDING)
+@paged()
+def get_suggestions(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveSuggestions:
+    """Live shots that the replay at a frame may show, the likeliest first, and why."""
+    return LiveSuggestions.model_validate({"items": suggest_live(store, recording, frame)})
+
+
+@router.get("/links/{link}", operation_id="getLink", responses={**responses(404), 200: TAGGED})
+@may(Action.READ, recording=OwnedKind.RECORDING)
+def get_one(recording: Id, link: LinkId, store: AppStore, response: Response) -> LinkDocument:
+    """One link: its instants, and the map of the times that follows from them."""
+    found = get_link(store, recording, link)
+    response.headers["ETag"] = found.etag
+    return LinkDocument.model_validate(found)
+
+
+@router.get("/links/{link}/frames", operation_id="getLinkedFrames", responses=responses(404, 409))
+@may(Action.READ, recording=OwnedKind.RECORDING)
+def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFramesDocument:
+    """Which frame of the replay shows the same as each live frame."""
+    found = linked_frames(store, get_link(store, recording, link))
+    return LinkedFramesDocument.model_validate(found)
+
+
+@router.put(
+    "/links/{link}/instants",
+    operation_id="setInstants",
+    response_model=LinkDocument,
+    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@responds(_tagged)
+def put_instants(
+    recording: Id,
+    link: LinkId,
+    wanted: InstantsEdit,
+    store: AppStore,
+    actor: Actor,
+    if_match: IfMatch,
+) -> ShotLink:
+    """Replace the instants of a link; the map of its times follows at once.
+
+    One says where the replay begins, at a speed that is assumed; two say the speed, too; more make both better, and
+    tell where the speed changes.
+    """
+    with current_state(lambda: LinkDocument.model_validate(get_link(store, recording, link))):
+        return set_instants(
+            store,
+            recording,
+            link,
+            wanted.pairs(),
+            wanted.assumed_speed,
+            if_match,
+            actor=actor,
+        )
+
+
+@router.delete(
+    "/links/{link}",
+    operation_id="deleteLink",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404), 204: {"description": "It is gone."}},
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@responds(no_content)
+def delete_one(recording: Id, link: LinkId, store: AppStore, actor: Actor) -> None:
+    """Remove a link and its instants; groups that were taken of it stay."""
+    remove_link(store, recording, link, actor=actor)

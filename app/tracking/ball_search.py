@@ -1,0 +1,140 @@
+"""Search: what the ball does when, by the likeliest history of all modes and events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.soccer.pitch import Pitch
+from app.tracking.ball_models import REST
+from app.tracking.ball_search_kernels import likeliest
+from app.tracking.ball_track import BallMeasurements
+
+_WIDTH = 48
+"""Histories that are kept."""
+_SAME_S = 1e-4
+"""Instants that are closer are one."""
+_ASIDE_M, _ABOVE_M, _BELOW_M = 12.0, 45.0, 0.0
+"""How far from the pitch a ball is looked for."""
+
+
+@dataclass(frozen=True)
+class Knots:
+    """Instants of a stretch and the rays of the ball at each.
+
+    Attributes:
+        times: Increasing, seconds, shape (K,).
+        rows: Measurement of each ray, by time, shape (R,).
+        at: Knot of each ray, shape (R,).
+        starts: First ray of each knot, and the end, shape (K + 1,).
+        centres: Of the cameras, shape (R, 3).
+        along: Unit directions of the rays, shape (R, 3).
+        across: Two unit vectors at right angles to each, shape (R, 2, 3).
+        scale: Pixels per radian, shape (R,).
+        noise: Radians, shape (R,).
+        far, far_sigma: Distance from the camera by size, 0 where unknown, metres, shape (R,).
+        view: Number of each ray's view, shape (R,).
+    """
+
+    times: FloatArray
+    rows: IntArray
+    at: IntArray
+    starts: IntArray
+    centres: FloatArray
+    along: FloatArray
+    across: FloatArray
+    scale: FloatArray
+    noise: FloatArray
+    far: FloatArray
+    far_sigma: FloatArray
+    view: IntArray
+
+
+@dataclass(frozen=True)
+class History:
+    """The likeliest one.
+
+    Attributes:
+        mode: At each knot, by number, shape (K,).
+        event: Before each knot, by number, shape (K,).
+        state: Position and velocity, as the past alone knows them, shape (K, 6).
+        used: Whether each ray is of the ball, shape (R,).
+        score: Logarithm of its likelihood.
+    """
+
+    mode: IntArray
+    event: IntArray
+    state: FloatArray
+    used: BoolArray
+    score: float
+
+
+def knots_of(measurements: BallMeasurements, times: FloatArray, shift: FloatArray) -> Knots:
+    """Instants and rays; pixels through which no ray goes have none.
+
+    Args:
+        measurements: Of a stretch.
+        times: Further instants, seconds.
+        shift: Seconds to add to each view's times, by ``measurements.names``.
+    """
+    names = {name: number for number, name in enumerate(measurements.names)}
+    view = np.array([names[name] for name in measurements.views], dtype=int)
+    by_camera: dict[int, list[int]] = {}
+    for row, camera in enumerate(measurements.cameras):
+        by_camera.setdefault(id(camera), []).append(row)
+    direction = np.full((len(measurements), 3), np.nan)
+    centre, focal = np.zeros((len(measurements), 3)), np.zeros(len(measurements))
+    for of_camera in by_camera.values():
+        camera = measurements.cameras[of_camera[0]]
+        direction[of_camera] = camera.rays(measurements.pixels[of_camera])
+        centre[of_camera] = camera.position
+        focal[of_camera] = np.sqrt(camera.focal_length[0] * camera.focal_length[1])
+    at_time = measurements.times + shift[view]
+    good = np.isfinite(direction).all(axis=1) & np.isfinite(at_time)
+    rows = np.flatnonzero(good)[np.argsort(at_time[good], kind="stable")]
+    every = np.sort(np.concatenate([times, at_time[rows]]))
+    knots = every[np.concatenate([[True], np.diff(every) > _SAME_S])]
+    at = np.clip(np.searchsorted(knots, at_time[rows] + _SAME_S) - 1, 0, len(knots) - 1)
+    length = np.linalg.norm(direction[rows], axis=1)
+    along = direction[rows] / length[:, None]
+    # A pixel off the axis turns the ray by less than one in the middle of the picture.
+    scale = focal[rows] * length
+    size, size_sigma = measurements.sizes[rows], measurements.size_sigma[rows]
+    known = np.isfinite(size) & np.isfinite(size_sigma) & (size > 0)
+    far = np.where(known, 2 * REST * scale / np.where(known, size, 1.0), 0.0)
+    return Knots(
+        knots,
+        rows,
+        at,
+        np.searchsorted(at, np.arange(len(knots) + 1)),
+        centre[rows],
+        along,
+        _across(along),
+        scale,
+        measurements.sigma[rows] / scale,
+        far,
+        np.where(known, far * size_sigma / np.where(known, size, 1.0), 0.0),
+        view[rows],
+    )
+
+
+def search(knots: Knots, pitch: Pitch, width: int = _WIDTH) -> History:
+    """The likeliest history of a stretch."""
+    x, y = pitch.length / 2 + _ASIDE_M, pitch.width / 2 + _ASIDE_M
+    room = np.array([[-x, x], [-y, y], [-_ABOVE_M, _BELOW_M]])
+    mode, event, left, state, score = likeliest(
+        knots.times, knots.starts, knots.centres, knots.across, knots.along,
+        knots.noise, knots.scale, knots.far, knots.far_sigma, room, width,
+    )  # fmt: skip
+    bit = np.arange(len(knots.at)) - knots.starts[knots.at]
+    return History(mode, event, state, (left[knots.at] >> bit) & 1 == 0, float(score))
+
+
+def _across(along: FloatArray) -> FloatArray:
+    """Two unit vectors at right angles to each direction and to each other, shape (N, 2, 3)."""
+    helper = np.where(np.abs(along[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    first = np.cross(along, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(along, first)], axis=1)

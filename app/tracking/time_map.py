@@ -1,0 +1,132 @@
+"""Time map: which time of a live shot each time of a replay shows, and the map of instants that a person linked.
+
+``t_live = offset + speed * t_replay``, in pieces where the speed of the replay changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+
+_CHANGE = 15.0
+"""Sum of squares of residuals, in frames, that a change of the speed has to explain."""
+
+
+@dataclass(frozen=True)
+class TimeMap:
+    """What became of a link, or of a piece of one.
+
+    Attributes:
+        reason: Why there is no map, a sentence; None where there is one.
+        offset, speed: ``t_live = offset + speed * t_replay``, seconds; the best there was where
+            there is a reason.
+        covariance: Of both, shape (2, 2).
+        miss: Median distance of the rays that meet, metres.
+        pairs: Rays of the replay with a live one beside them.
+        overlap: Live seconds between the first and the last of those.
+        by_hand: Whether a person's instants alone say it.
+        first, last: Replay times of a piece.
+        pieces: Where one map does not fit the whole replay: those that fit parts of it.
+    """
+
+    reason: str | None
+    offset: float | None = None
+    speed: float | None = None
+    covariance: FloatArray | None = None
+    miss: float | None = None
+    pairs: int = 0
+    overlap: float = 0.0
+    by_hand: bool = False
+    first: float = 0.0
+    last: float = 0.0
+    pieces: tuple[TimeMap, ...] = ()
+
+    def sigma_at(self, time: float) -> float | None:
+        """Standard deviation of the live time of a replay time, seconds; None where it is not known."""
+        if self.covariance is None:
+            return None
+        row = np.array([1.0, time])
+        return float(np.sqrt(max(float(row @ self.covariance @ row), 0.0)))
+
+    def live(self, times: FloatArray) -> FloatArray:
+        """Live times of replay times, each by the piece that it is in, or else the nearest one; shape (N,).
+
+        There has to be an offset and a speed, or pieces.
+        """
+        if not self.pieces:
+            assert self.offset is not None and self.speed is not None
+            return np.asarray(self.offset + self.speed * times)
+        ends = [(one.last + two.first) / 2 for one, two in pairwise(self.pieces)]
+        which = np.searchsorted(ends, times)
+        offsets = np.array([piece.offset for piece in self.pieces], dtype=float)
+        speeds = np.array([piece.speed for piece in self.pieces], dtype=float)
+        return np.asarray(offsets[which] + speeds[which] * times)
+
+
+def map_of_instants(
+    instants: FloatArray, frame_s: float, assumed_speed: float | None = None
+) -> TimeMap:
+    """The map of instants that a person sees in both shots, each to about a live frame.
+
+    One instant gives the offset at a speed that is assumed; two give both, more are fitted by least squares. Where one
+    line leaves more than the person's accuracy explains, the speed changes at instants: the fewest pieces that fit.
+
+    Args:
+        instants: Live and replay time of each, seconds, shape (N, 2).
+        frame_s: Time between two live frames, seconds: the standard deviation of an instant.
+        assumed_speed: Speed of the replay while one instant is known; None: that of the live shot.
+    """
+    if not len(instants):
+        return TimeMap("No instant is linked yet.", by_hand=True)
+    rows = instants[np.argsort(instants[:, 1], kind="stable")]
+    if np.ptp(rows[:, 1]) == 0:
+        speed = 1.0 if assumed_speed is None else assumed_speed
+        offset = float((rows[:, 0] - speed * rows[:, 1]).mean())
+        reason = f"Instants of one frame of the replay do not tell its speed; {speed:g} is assumed."
+        return TimeMap(reason, offset, speed, by_hand=True)
+    pieces = _pieces(rows, frame_s)
+    if any(piece.speed is None or piece.speed <= 0 for piece in pieces):
+        return TimeMap(
+            "The instants given run backwards: later in the replay is earlier live.", by_hand=True
+        )
+    if len(pieces) == 1:
+        return pieces[0]
+    changes = " and ".join(f"{piece.first:.2f} s" for piece in pieces[1:])
+    reason = f"One offset and speed do not fit the whole replay: they change near {changes}."
+    return TimeMap(reason, by_hand=True, pieces=tuple(pieces))
+
+
+def _pieces(rows: FloatArray, frame_s: float) -> list[TimeMap]:
+    """The maps of the fewest stretches of instants, by replay time, that lines fit; neighbours share one."""
+    count = len(rows)
+    cost, start = np.full(count, np.inf), np.zeros(count, dtype=int)
+    cost[0] = -_CHANGE
+    for last in range(1, count):
+        for first in range(last):
+            if rows[first, 1] == rows[last, 1]:
+                continue
+            total = cost[first] + _CHANGE + _line(rows[first : last + 1], frame_s)[1]
+            if total < cost[last]:
+                cost[last], start[last] = total, first
+    found: list[TimeMap] = []
+    last = count - 1
+    while last > 0:
+        first = int(start[last])
+        found.insert(0, _line(rows[first : last + 1], frame_s)[0])
+        last = first
+    return found
+
+
+def _line(rows: FloatArray, frame_s: float) -> tuple[TimeMap, float]:
+    """The line through instants, and the sum of squares of its residuals in frames."""
+    design = np.column_stack([np.ones(len(rows)), rows[:, 1]])
+    (offset, speed), *_ = np.linalg.lstsq(design, rows[:, 0], rcond=None)
+    covariance = frame_s**2 * np.linalg.inv(design.T @ design)
+    off = (design @ (offset, speed) - rows[:, 0]) / frame_s
+    first, last = float(rows[0, 1]), float(rows[-1, 1])
+    made = TimeMap(None, float(offset), float(speed), covariance, by_hand=True)
+    return replace(made, first=first, last=last), float(off @ off)

@@ -1,0 +1,230 @@
+"""Links of replays over HTTP."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.db.log import read_log
+from tests.videos import write_video
+
+API = "/api/v1/recordings"
+Finished = Callable[[Any], Any]
+LIVE, REPLAY = {"first": 0, "last": 19}, {"first": 20, "last": 59}
+
+
+@pytest.fixture
+def link(api: Any, recording: str) -> str:
+    """The address of a link of the film's frames 20 to 59 to those from 0 to 19."""
+    replay = {"recording": int(recording.rpartition("/")[2]), **REPLAY}
+    made = api.post(f"{recording}/links", json={"live": LIVE, "replay": replay})
+    assert made.status_code == 201, made.text
+    assert made.headers["location"] == f"{recording}/links/{made.json()['id']}"
+    return str(made.headers["location"])
+
+
+def instants(api: Any, link: str, *pairs: tuple[int, int], speed: float | None = None) -> Any:
+    """The answer to linking instants, upon the link as it is."""
+    body = {"instants": [{"live": a, "replay": b} for a, b in pairs], "assumed_speed": speed}
+    tag = {"If-Match": api.get(link).headers["etag"]}
+    return api.put(f"{link}/instants", json=body, headers=tag)
+
+
+class TestAddLink:
+    def test_it_has_no_map_yet_and_is_listed(self, app: Any, api: Any, link: str) -> None:
+        found = api.get(link).json()
+        assert (found["instants"], found["map"]["outcome"]) == ([], "none")
+        assert found["live"] == {"recording": 1, "name": "final", **LIVE}
+        assert found["replay"] == {"recording": 1, "name": "final", **REPLAY}
+        at = link.rpartition("/")[0]
+        assert api.get(at).json()["items"] == [found]
+        replay = {"recording": 1, **REPLAY}
+        again = api.post(at, json={"live": LIVE, "replay": replay})
+        assert (again.status_code, again.json()) == (201, found)
+        with app.state.services.store.read() as session:
+            (event,) = [e for e in read_log(session) if e.body.get("did") == "replay linked"]
+        assert (event.actor, event.body["replay_first"]) == ("local", 20)
+
+    @pytest.mark.parametrize(
+        ("live", "replay", "pointer"),
+        [
+            ((0, 20), (20, 59), "/replay"),
+            ((5, 4), (20, 59), "/live"),
+            ((0, 19), (20, 60), "/replay"),
+        ],
+    )
+    def test_shots_that_cannot_be_are_refused(
+        self,
+        api: Any,
+        recording: str,
+        live: tuple[int, int],
+        replay: tuple[int, int],
+        pointer: str,
+    ) -> None:
+        body = {
+            "live": dict(zip(("first", "last"), live, strict=True)),
+            "replay": {"recording": 1, **dict(zip(("first", "last"), replay, strict=True))},
+        }
+        answer = api.post(f"{recording}/links", json=body)
+        assert (answer.status_code, answer.json()["pointer"]) == (400, pointer)
+
+    def test_the_replay_may_be_another_recording_of_the_same_dataset_alone(
+        self, api: Any, film: Path, recording: str, finished: Finished
+    ) -> None:
+        ids = []
+        for dataset in ("cup", "league"):
+            write_video(film.parent / f"{dataset}.mp4", "mp4v", 30)
+            body = {"dataset": dataset, "source": {"folder": f"films/{dataset}.mp4"}}
+            ids.append(finished(api.post(API, json=body)).result["recording"])
+        for number, status in zip(ids, (201, 400), strict=True):
+            replay = {"recording": number, "first": 0, "last": 29}
+            answer = api.post(f"{recording}/links", json={"live": LIVE, "replay": replay})
+            assert answer.status_code == status
+        (listed,) = api.get(f"{API}/{ids[0]}/links").json()["items"]
+        assert (listed["live"]["name"], listed["replay"]["name"]) == ("final", "cup")
+        assert api.get(f"{API}/{ids[1]}/links").json()["items"] == []
+        assert api.get(f"{API}/{ids[1]}/links/{listed['id']}").status_code == 404
+
+    def test_it_goes_with_its_recording_and_with_another_film_in_its_place(
+        self, api: Any, film: Path, recording: str, link: str, finished: Finished
+    ) -> None:
+        finished(api.post(f"{recording}/shots"))
+        assert api.get(link).status_code == 200
+        write_video(film, "mp4v", 50)
+        finished(api.post(f"{recording}/shots"))
+        assert api.get(link).status_code == 404
+        replay = {"recording": 1, "first": 20, "last": 49}
+        made = api.post(f"{recording}/links", json={"live": LIVE, "replay": replay}).json()
+        assert api.delete(recording).status_code == 204
+        assert api.get(f"{recording}/links/{made['id']}").status_code == 404
+
+
+class TestSetInstants:
+    def test_one_gives_the_offset_two_the_speed_and_none_takes_it_back(
+        self, api: Any, link: str
+    ) -> None:
+        one = instants(api, link, (5, 30), speed=0.5).json()
+        assert (one["map"]["outcome"], one["map"]["speed"]) == ("offset", 0.5)
+        # Frame 30 is 0.4 s after the replay's first one, frame 5 0.2 s after the live one.
+        assert one["map"]["offset_s"] == pytest.approx(0.2 - 0.5 * 0.4)
+        assert "0.5 is assumed" in one["map"]["reason"]
+        two = instants(api, link, (15, 50), (5, 30))
+        found = two.json()
+        assert two.headers["etag"] == found["etag"] != one["etag"]
+        assert [(i["live"], i["replay"]) for i in found["instants"]] == [(5, 30), (15, 50)]
+        assert [i["residual"] for i in found["instants"]] == pytest.approx([0, 0], abs=1e-9)
+        assert (found["map"]["outcome"], found["map"]["found_by"]) == ("linked", "instants")
+        assert (found["map"]["speed"], found["map"]["offset_s"]) == pytest.approx((0.5, 0.0))
+        assert found["map"]["speed_sigma"] == pytest.approx(0.04 * 2**0.5 / 0.8)
+        none = instants(api, link).json()
+        assert (none["map"]["outcome"], none["instants"]) == ("none", [])
+
+    def test_more_say_by_how_much_each_is_off(self, api: Any, link: str) -> None:
+        found = instants(api, link, (0, 20), (5, 30), (11, 40), (15, 50)).json()
+        assert found["map"]["pieces"] == []
+        residuals = [one["residual"] for one in found["instants"]]
+        assert sum(residuals) == pytest.approx(0, abs=1e-9)
+        assert min(residuals) == residuals[2] == pytest.approx(-0.7)
+
+    def test_a_change_of_speed_is_told_in_frames(self, api: Any, link: str) -> None:
+        found = instants(api, link, (0, 20), (1, 30), (2, 40), (12, 50), (19, 57)).json()
+        assert [(one["first"], one["last"]) for one in found["map"]["pieces"]] == [
+            (20, 40),
+            (40, 57),
+        ]
+        speeds = [one["speed"] for one in found["map"]["pieces"]]
+        assert speeds == pytest.approx([0.1, 1.0], abs=0.02)
+        assert (found["map"]["outcome"], found["map"]["speed"]) == ("linked", None)
+
+    def test_those_that_run_backwards_are_kept_and_no_map(self, api: Any, link: str) -> None:
+        found = instants(api, link, (15, 30), (5, 50)).json()
+        assert found["map"]["outcome"] == "unobservable"
+        assert "backwards" in found["map"]["reason"]
+        assert [one["residual"] for one in found["instants"]] == [None, None]
+
+    @pytest.mark.parametrize(
+        ("pairs", "pointer"),
+        [
+            ([(20, 30)], "/instants/0/live"),
+            ([(5, 30), (6, 19)], "/instants/1/replay"),
+            ([(5, 30), (6, 30)], "/instants"),
+        ],
+    )
+    def test_those_that_cannot_be_are_refused(
+        self, api: Any, link: str, pairs: list[tuple[int, int]], pointer: str
+    ) -> None:
+        answer = instants(api, link, *pairs)
+        assert (answer.status_code, answer.json()["pointer"]) == (400, pointer)
+
+    def test_nobody_overwrites_another(self, api: Any, link: str) -> None:
+        tag = {"If-Match": api.get(link).headers["etag"]}
+        theirs = instants(api, link, (5, 30)).json()
+        body = {"instants": [{"live": 6, "replay": 30}]}
+        late = api.put(f"{link}/instants", json=body, headers=tag)
+        assert (late.status_code, late.json()["current"]) == (412, theirs)
+        assert api.put(f"{link}/instants", json=body).status_code == 428
+
+    def test_it_is_removed(self, api: Any, link: str) -> None:
+        assert api.delete(link).status_code == 204
+        assert api.get(link).status_code == api.delete(link).status_code == 404
+
+
+class TestLinkedFrames:
+    def test_each_live_frame_has_the_nearest_of_the_replay_or_none(
+        self, api: Any, link: str
+    ) -> None:
+        empty = api.get(f"{link}/frames").json()
+        assert (empty["first"], set(empty["replay"])) == (0, {None})
+        # Half as fast, and the replay begins with live frame 4.
+        instants(api, link, (4, 20), (14, 40))
+        found = api.get(f"{link}/frames").json()
+        assert found["replay"] == [None] * 4 + [20 + 2 * at for at in range(16)]
+        assert found["off_s"][3] is None
+        assert found["off_s"][4:] == pytest.approx([0.0] * 16, abs=1e-9)
+
+    def test_a_frame_that_is_repeated_or_blended_is_passed_over(
+        self, api: Any, link: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from app.features.recordings import link_frames
+
+        def marks(_index: Path, first: int, last: int) -> Any:
+            frames = range(first, last + 1)
+            return link_frames.np.array([[n == 24 for n in frames], [n == 26 for n in frames]])
+
+        monkeypatch.setattr(link_frames, "_marks", marks)
+        instants(api, link, (0, 20), (10, 50))
+        found = api.get(f"{link}/frames").json()
+        # Three frames of the replay are one live: 24 would be 1.33.
+        assert (found["repeated"], found["blended"]) == ([24], [26])
+        assert found["replay"][:4] == [20, 23, 27, 29]
+        assert found["off_s"][2] == pytest.approx(0.04 / 3)
+
+
+class TestSuggestions:
+    def test_shots_of_the_main_camera_before_the_replay_come_first(
+        self, api: Any, film: Path, recording: str, finished: Finished
+    ) -> None:
+        write_video(film.parent / "other.mp4", "mp4v", 30)
+        body = {"dataset": "cup", "source": {"folder": "films/other.mp4"}}
+        other = finished(api.post(API, json=body)).result["recording"]
+        ends = [(0, 9, "main"), (10, 19, "closeup"), (20, 29, "main"), (30, 49, "replay")]
+        ends += [(50, 59, "main")]
+        for at, shots in ((recording, ends), (f"{API}/{other}", [(0, 29, "main")])):
+            tag = {"If-Match": api.get(f"{at}/shots").headers["etag"]}
+            items = [{"first": a, "last": b, "kind": kind} for a, b, kind in shots]
+            assert api.put(f"{at}/shots", json={"shots": items}, headers=tag).status_code == 200
+        replay = {"recording": 1, "first": 30, "last": 49}
+        made = {"live": {"first": 0, "last": 9}, "replay": replay}
+        link = api.post(f"{recording}/links", json=made).json()["id"]
+        found = api.get(f"{recording}/links/suggestions/35").json()["items"]
+        told = [(one["recording"], one["first"], one["link"]) for one in found]
+        assert told == [(1, 20, None), (1, 0, link), (other, 0, None)]
+        assert found[0]["why"] == "Main camera, 0.4 s long, ends 0.0 s before the replay."
+        assert found[2]["why"] == "Main camera of other; when that was, nothing says."
+
+    def test_a_frame_in_no_shot_is_refused(self, api: Any, recording: str) -> None:
+        answer = api.get(f"{recording}/links/suggestions/60")
+        assert (answer.status_code, answer.json()["pointer"]) == (400, "/frame")

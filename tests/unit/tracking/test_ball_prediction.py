@@ -1,0 +1,47 @@
+"""The error without an instant, against a fit that is made without it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.soccer.pitch import Pitch
+from app.tracking.ball_fit import fit
+from app.tracking.ball_prediction import left_out, summed
+from app.tracking.ball_search import knots_of, search
+from tests.unit.tracking.test_ball_solve import BOTH, TIMES, seen
+
+
+def test_it_is_that_of_a_fit_without_the_instant() -> None:
+    measurements = seen(BOTH).part(np.arange(len(seen(BOTH)))[seen(BOTH).frames < 150])
+    times = TIMES[:50]
+    knots = knots_of(measurements, times, np.zeros(2))
+    history = search(knots, Pitch())
+    given = history.mode, history.event
+    unseen = np.zeros(len(times))
+    whole = fit(knots, *given, history.used, history.state, knots.noise, unseen)
+    px = left_out(knots, whole, knots.noise, np.ones(len(times), bool))
+    checked = 0
+    for knot in (12, 20, 33, 41):
+        rays = np.flatnonzero(knots.at == knot)
+        used = history.used.copy()
+        used[rays] = False
+        without = fit(knots, *given, used, whole.state[:, :6], knots.noise, unseen)
+        for ray in rays:
+            row = knots.rows[ray]
+            seen_at = measurements.cameras[row].project(without.state[knot, :3][None])[0]
+            miss = float(np.hypot(*(seen_at - measurements.pixels[row])))
+            assert px[ray] == pytest.approx(miss, rel=0.1, abs=0.1)
+            checked += 1
+    assert checked == 8
+
+
+def test_a_stretch_says_medians_and_what_was_predicted() -> None:
+    told = summed(np.array([1.0, 3.0, np.nan, 8.0]), np.array([5, 5, 6, 7]), np.array([5, 6, 7]))
+    assert told.predicted == 3 and told.median_px == 3.0
+    assert told.by_frame[0] == 2.0 and np.isnan(told.by_frame[1]) and told.by_frame[2] == 8.0
+
+
+def test_nothing_predicted_is_said() -> None:
+    told = summed(np.full(2, np.nan), np.array([1, 2]), np.array([1, 2]))
+    assert told.median_px is None and told.p95_px is None and told.predicted == 0

@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.soccer.pitch import Pitch
+from app.tracking.ball_models import BOUNCE, FLIGHT, KICK, ROLL
+from app.tracking.ball_search import knots_of, search
+from tests.unit.tracking.test_ball_solve import BALL, BOTH, LEFT, PLACES, RIGHT, TIMES, seen
+
+
+class TestKnots:
+    def test_rays_go_through_the_ball(self) -> None:
+        knots = knots_of(seen(BOTH, noise=0.0), TIMES, np.zeros(2))
+        off = PLACES[knots.at] - knots.centres
+        assert np.abs(np.einsum("rij,rj->ri", knots.across, off)).max() < 1e-6
+        assert np.allclose(np.einsum("rij,rj->ri", knots.across, knots.along), 0.0)
+
+    def test_views_of_other_instants_have_their_own_knots(self) -> None:
+        given = seen(BOTH)
+        late = np.array([view == "right" for view in given.views])
+        times = given.times + np.where(late, 0.013, 0.0)
+        knots = knots_of(replace(given, times=times), TIMES, np.zeros(2))
+        assert len(knots.times) == 2 * len(TIMES) and (np.diff(knots.starts) == 1).all()
+        moved = knots_of(replace(given, times=times), TIMES, np.array([0.0, -0.013]))
+        assert len(moved.times) == len(TIMES)
+
+    def test_a_size_says_the_distance(self) -> None:
+        given = seen({"left": LEFT}, noise=0.0)
+        far = np.linalg.norm(PLACES - LEFT.position, axis=1)
+        sizes = 0.226 * 1100.0 / LEFT.pitch_to_camera(PLACES)[:, 2]
+        knots = knots_of(
+            replace(given, sizes=sizes, size_sigma=np.full(len(sizes), 1.0)), TIMES, np.zeros(1)
+        )
+        assert knots.far == pytest.approx(far, rel=1e-6)
+        assert knots.far_sigma == pytest.approx(knots.far / sizes)
+
+
+class TestSearch:
+    def test_modes_are_those_of_the_ball(self) -> None:
+        history = search(knots_of(seen(BOTH), TIMES, np.zeros(2)), Pitch())
+        high = -PLACES[:, 2] > 0.6
+        assert (history.mode[high] == FLIGHT).mean() > 0.95
+        assert {KICK, BOUNCE} <= set(history.event.tolist())
+        assert ROLL in history.mode and history.used.all()
+
+    def test_what_a_slip_shows_is_not_used(self) -> None:
+        given = seen(BOTH)
+        pixels = given.pixels.copy()
+        pixels[70] += (60.0, 0.0)
+        knots = knots_of(replace(given, pixels=pixels), TIMES, np.zeros(2))
+        history = search(knots, Pitch())
+        assert knots.rows[~history.used].tolist() == [70]
+
+    def test_one_view_finds_a_flight_between_kick_and_bounce(self) -> None:
+        history = search(knots_of(seen({"right": RIGHT}), TIMES, np.zeros(1)), Pitch())
+        high = -PLACES[:, 2] > 0.6
+        assert (history.mode[high] == FLIGHT).mean() > 0.8
+        assert BALL[:, 3].min() < -0.6

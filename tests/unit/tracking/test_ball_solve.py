@@ -1,0 +1,184 @@
+"""Tracks of a made ball whose way is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.soccer.pitch import Pitch
+from app.tracking.ball_solve import TrackOptions, track_ball
+from app.tracking.ball_track import BallMeasurements, BallTrack
+from tests.bench.link import at_times, made_ball
+from tests.cameras import looking
+
+LEFT = looking((-10.0, 60.0, -14.0), (0.0, 0.0, 0.0), 1100.0)
+RIGHT = looking((12.0, -58.0, -12.0), (0.0, 0.0, 0.0), 1100.0)
+FPS = 25.0
+BALL = made_ball(8.0, seed=3)
+TIMES = np.arange(0.0, 7.6, 1 / FPS)
+PLACES = at_times(BALL, TIMES)
+FRAMES = 100 + np.arange(len(TIMES))
+INSIDE_95 = 7.815
+"""Chi-squared with three degrees of freedom."""
+
+
+def seen(
+    views: dict[str, Camera],
+    *,
+    noise: float = 0.5,
+    places: FloatArray = PLACES,
+    hide: Sequence[tuple[str, int, int]] = (),
+) -> BallMeasurements:
+    """A ball as cameras show it, without some stretches of some views."""
+    generator = np.random.default_rng(5)
+    parts: list[tuple[int, str, FloatArray]] = []
+    for name, camera in views.items():
+        pixels = camera.project(places) + generator.normal(0, noise, (len(places), 2))
+        for row, pixel in enumerate(pixels):
+            hidden = any(view == name and first <= row < last for view, first, last in hide)
+            if np.isfinite(pixel).all() and not hidden:
+                parts.append((row, name, pixel))
+    rows = np.array([row for row, _, _ in parts])
+    return BallMeasurements(
+        FRAMES[rows],
+        TIMES[rows],
+        tuple(name for _, name, _ in parts),
+        np.array([pixel for _, _, pixel in parts]),
+        np.full(len(rows), max(noise, 0.3)),
+        tuple(views[name] for _, name, _ in parts),
+    )
+
+
+def tracked(measurements: BallMeasurements, **options: float) -> BallTrack:
+    return track_ball(
+        measurements,
+        FRAMES,
+        TIMES,
+        pitch=Pitch(),
+        options=TrackOptions(**options),  # type: ignore[arg-type]
+    )
+
+
+BOTH = {"left": LEFT, "right": RIGHT}
+
+
+@pytest.fixture(scope="module")
+def track() -> BallTrack:
+    return tracked(seen(BOTH))
+
+
+class TestTwoViews:
+    def test_the_ball_is_where_it_was(self, track: BallTrack) -> None:
+        assert track.reason is None and set(track.state) == {"measured"}
+        off = np.linalg.norm(track.position - PLACES, axis=1)
+        assert np.median(off) < 0.03 and off.max() < 0.3
+
+    def test_its_uncertainty_is_honest(self, track: BallTrack) -> None:
+        off = track.position - PLACES
+        inverse = np.linalg.inv(track.covariance[:, :3, :3])
+        inside = np.einsum("ni,nij,nj->n", off, inverse, off) < INSIDE_95
+        assert 0.88 <= inside.mean() <= 1.0
+        assert np.median(track.sigma) < 0.06
+
+    def test_velocities_are_those_of_the_ball(self, track: BallTrack) -> None:
+        after, before = at_times(BALL, TIMES + 0.02), at_times(BALL, np.maximum(TIMES - 0.02, 0))
+        off = np.linalg.norm(track.velocity - (after - before) / 0.04, axis=1)[1:]
+        assert np.median(off) < 0.5
+
+    def test_kicks_and_bounces_are_found_in_time(self, track: BallTrack) -> None:
+        speed = np.diff(BALL[:, 1:], axis=0) / 0.02
+        change = np.linalg.norm(np.diff(speed, axis=0), axis=1)
+        real = BALL[1:-1][change > 2.5, 0]
+        real = real[(real > 0.1) & (real < TIMES[-1] - 0.1)]
+        found = np.array([event.time_s for event in track.events])
+        assert len(real) >= 3
+        assert all(np.abs(found - one).min() <= 2 / FPS for one in real)
+        assert {event.kind for event in track.events} >= {"kick", "bounce"}
+
+    def test_every_instant_left_out_is_predicted(self, track: BallTrack) -> None:
+        told = track.left_out
+        assert told is not None and told.predicted == 2 * len(FRAMES)
+        assert told.median_px is not None and 0.4 < told.median_px < 1.2
+        assert np.isfinite(told.by_frame).all()
+
+    def test_the_same_comes_out_twice(self, track: BallTrack) -> None:
+        again = tracked(seen(BOTH))
+        assert np.array_equal(again.position, track.position)
+
+    def test_the_order_of_measurements_does_not_matter(self, track: BallTrack) -> None:
+        given = seen(BOTH)
+        again = tracked(given.part(np.arange(len(given))[::-1]))
+        assert np.allclose(again.position, track.position, atol=1e-3)
+
+
+class TestLeftOutFrames:
+    def test_what_one_view_sees_and_what_none_sees_are_told_apart(self) -> None:
+        track = tracked(seen(BOTH, hide=[("left", 40, 60), ("right", 50, 60)]))
+        assert set(track.state[40:50]) == {"one_view"}
+        assert set(track.state[50:60]) == {"bridged"}
+        assert all(names == ("right",) for names in track.views[40:50])
+        off = np.linalg.norm(track.position - PLACES, axis=1)[40:60]
+        assert off.max() < 1.0
+
+    def test_nothing_is_carried_across_a_long_gap(self) -> None:
+        track = tracked(seen(BOTH, hide=[("left", 60, 130), ("right", 60, 130)]))
+        assert track.state[59] == "measured" and track.state[95] == "gap"
+        assert np.isnan(track.position[95]).all() and track.mode[95] == ""
+        assert track.state[61] == "predicted" and track.sigma[61] < track.sigma[64]
+
+    def test_a_slip_is_named_and_does_no_harm(self, track: BallTrack) -> None:
+        given = seen(BOTH)
+        pixels = given.pixels.copy()
+        pixels[70] += (40.0, -25.0)
+        spoilt = tracked(replace(given, pixels=pixels))
+        assert [one.measurement for one in spoilt.contradicted] == [70]
+        assert spoilt.contradicted[0].px == pytest.approx(47.2, abs=3)
+        assert np.abs(spoilt.position - track.position).max() < 0.2
+
+
+class TestNonsense:
+    """What is no ball is said, without a crash."""
+
+    def test_one_measurement(self) -> None:
+        track = tracked(seen(BOTH).part(np.array([3])))
+        assert track.reason == "The ball is measured at 1 instants; a track needs 6."
+        assert set(track.state) == {"gap"}
+
+    def test_nothing(self) -> None:
+        assert tracked(seen(BOTH).part(np.zeros(0, dtype=int))).reason is not None
+
+    def test_one_frame_a_second(self) -> None:
+        given = seen(BOTH)
+        track = tracked(given.part(given.frames % 25 == 0))
+        assert track.reason is not None and "four a second" in track.reason
+
+    def test_a_mirrored_camera(self) -> None:
+        given = seen(BOTH)
+        pixels = given.pixels.copy()
+        of_left = np.array([name == "left" for name in given.views])
+        pixels[of_left, 0] = 1279 - pixels[of_left, 0]
+        assert "contradict" in (tracked(replace(given, pixels=pixels)).reason or "")
+
+    def test_two_balls(self) -> None:
+        other = seen({"right": RIGHT}, places=np.add(PLACES[::-1], (6.0, 9.0, 0.0)))
+        one = seen({"left": LEFT})
+        both = BallMeasurements(
+            np.concatenate([one.frames, other.frames]),
+            np.concatenate([one.times, other.times]),
+            one.views + other.views,
+            np.concatenate([one.pixels, other.pixels]),
+            np.concatenate([one.sigma, other.sigma]),
+            one.cameras + other.cameras,
+        )
+        assert "contradict" in (tracked(both).reason or "")
+
+    def test_a_wrong_offset(self) -> None:
+        given = seen(BOTH)
+        of_left = np.array([name == "left" for name in given.views])
+        late = replace(given, times=given.times + np.where(of_left, 1.0, 0.0))
+        assert "contradict" in (tracked(late).reason or "")
