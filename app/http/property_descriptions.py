@@ -31,6 +31,7 @@ PARAMETERS: Mapping[str, str] = {
     "session": "Id of the session.",
     "sort": "Field by which the frames are ordered; with a minus before it, downwards.",
     "state": "Only jobs in this state.",
+    "track": "Id of the track.",
     "station": "Id of the station.",
     "table": "Name of the table.",
     "thread": "Id of the thread.",

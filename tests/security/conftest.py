@@ -109,11 +109,11 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
     write_issia(files / "flight", flight)
     run_touchline(
         home,
-        f"import issia {files / 'flight'} --dataset flight --size 1280x720",
-        "solve --dataset flight --workers 1",
         *(f"import soccernet-v3 {files / name} --dataset {name}" for name in ("small", "formula")),
         *(f"solve --dataset {name} --workers 1" for name in ("small", "formula")),
         f"import soccernet-v3 {files / 'spoiled'} --dataset spoiled",
+        f"import issia {files / 'flight'} --dataset flight --size 1280x720",
+        "solve --dataset flight --workers 1",
     )
     with serving(home) as address:
         found = Guarded(address, home)

@@ -75,7 +75,7 @@ class TrackDocument(Document):
     corrections: list[CorrectionDocument] = Field(
         description="Events that people added and removed; they stay when it is made again."
     )
-    summary: TrackSummaryDocument
+    summary: TrackSummaryDocument = Field(description="What came of it.")
     created: datetime
     by: str = Field(validation_alias="actor")
     etag: str
