@@ -21,6 +21,7 @@ from touchline.errors import (
     error_of,
 )
 from touchline.packages import package
+from touchline.recordings import Recording, SendProgress, Shot, read, require_same, send_in_parts
 
 API = "/api/v1/"
 ADDRESS = "http://127.0.0.1:8000"
@@ -206,13 +207,65 @@ class Client:
             report["items"] += [placed(one, places) for one in found]
         return merged(report)
 
-    def upload(self, path: Path | str, name: str | None = None) -> str:
-        """Send a file for an import or an evaluation; its id is the answer."""
+    def recordings(self, dataset: str | None = None) -> list[Recording]:
+        """The recordings of a dataset, or of all that one sees, the newest first."""
+        return [read(Recording, one) for one in self.pages("recordings", dataset=dataset)]
+
+    def shots(self, recording: Recording | int) -> list[Shot]:
+        """The shots of a recording, or of that of an id, in their order."""
+        number = recording if isinstance(recording, int) else recording.id
+        return [read(Shot, one) for one in self.pages(f"recordings/{number}/shots")]
+
+    def upload_recording(
+        self,
+        dataset: str,
+        path: Path | str,
+        *,
+        sent: SendProgress | None = None,
+        progress: Callable[[dict[str, Any]], object] | None = None,
+    ) -> Recording:
+        """Send a video of a match, and have it indexed and cut into shots.
+
+        Called again after an interruption, wherever it came, it goes on where it was.
+
+        Args:
+            dataset: Name; a dataset is made where there is none of that name.
+            path: The file.
+            sent: Called with bytes that the server has, and how many there are.
+            progress: Called with the document of the job that indexes it.
+
+        Raises:
+            DataError: The file cannot be read or changes meanwhile; HashError: the server has another.
+            JobError: It is no video that can be read.
+        """
         file = Path(path)
+        upload = self.upload(file, in_parts=True, sent=sent)
+        job = self.post("recordings", {"dataset": dataset, "source": {"upload": upload}})
+        number = self.wait(job, progress=progress)["result"]["recording"]
+        recording = read(Recording, self.get(f"recordings/{number}"))
+        require_same(file, recording)
+        return recording
+
+    def upload(
+        self,
+        path: Path | str,
+        name: str | None = None,
+        *,
+        in_parts: bool = False,
+        sent: SendProgress | None = None,
+    ) -> str:
+        """Send a file for an import or an evaluation; its id is the answer.
+
+        ``in_parts``: so that it goes on where it was when it is interrupted; ``sent`` is then called
+        with bytes that the server has, and how many there are.
+        """
+        file = Path(path)
+        if in_parts:
+            return send_in_parts(self.send, file, name, sent)
         headers = {"Content-Type": "application/octet-stream"}
         params = {"name": name or file.name}
-        sent = self.send("POST", "uploads", params=params, content=file, headers=headers)
-        return str(_value(sent)["id"])
+        answer = self.send("POST", "uploads", params=params, content=file, headers=headers)
+        return str(_value(answer)["id"])
 
     def download(self, path: str, out: Path | str) -> Path:
         """Fetch a file of any size; it appears whole or not at all."""
@@ -250,7 +303,7 @@ class Client:
         params: Mapping[str, Any] | None = None,
         json: Any = None,
         always: bool = False,
-        content: Path | None = None,
+        content: Path | bytes | None = None,
         into: Path | None = None,
         if_match: str | Mapping[str, Any] | None = None,
         key: str | None = None,
@@ -264,7 +317,7 @@ class Client:
             params: Of the query; None leaves one out.
             json: The body; None sends none.
             always: Send ``null`` for a body that is None.
-            content: A file to send instead.
+            content: A file, or bytes, to send instead.
             into: A file to write what comes into.
             if_match: The ETag that a change builds on, or the document that has it as ``etag``.
             key: Idempotency key; one is made for whatever changes something.
@@ -278,7 +331,7 @@ class Client:
             sent["If-Match"] = if_match if isinstance(if_match, str) else if_match["etag"]
         if method != "GET":
             sent["Idempotency-Key"] = key or uuid4().hex
-        body: dict[str, Any] = {}
+        body: dict[str, Any] = {"content": content} if isinstance(content, bytes) else {}
         if json is not None or always:
             # Not httpx's own: it takes None for no body at all.
             sent.setdefault("Content-Type", "application/json")
@@ -289,7 +342,7 @@ class Client:
             url, more = self._url(path), {"params": query, "headers": sent}
             if into is not None:
                 return self._fetch(into, method, url, more)
-            if content is None:
+            if not isinstance(content, Path):
                 return self._http.request(method, url, **more, **body)
             with content.open("rb") as file:
                 return self._http.request(method, url, **more, content=_chunks(file))

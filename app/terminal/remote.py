@@ -21,7 +21,7 @@ BATCH = (
     "state",
     "groups",
     "waiting",
-    "handed_in",
+    "submitted",
     "settled",
     "due",
     "annotators",

@@ -59,7 +59,7 @@ export function getComparison(group, other, signal) {
  */
 /** @typedef {{agreed: number, open: number, decided: number, limits: LimitsJson, alpha: CoefficientJson, overall: PeopleAgreementJson, pairs: PeopleAgreementJson[], groups: GroupAgreementJson[]}} AgreementJson */
 /** @typedef {{group: number, number: number, batch: number | null, people: string[], worst: number, disagreements: number, since: string}} WaitingJson */
-/** @typedef {{group: GroupDocument, batch: number | null, takes: {id: number, person: string, verdict: string | null, handed_in: string | null}[], comparison: ComparisonJson, refused: string | null, own: boolean}} CaseJson */
+/** @typedef {{group: GroupDocument, batch: number | null, annotations: {id: number, person: string, verdict: string | null, submitted: string | null}[], comparison: ComparisonJson, refused: string | null, own: boolean}} CaseJson */
 
 /** @param {number | null} batch null: all */
 const ofBatch = (batch) => (batch === null ? '' : `?of_batch=${batch}`);
@@ -87,12 +87,12 @@ export function getCase(group, signal) {
 	return request(`/groups/${group}/adjudication`, { signal });
 }
 
-/** @param {number} group @param {number} take @param {boolean} asStart @returns {Promise<GroupDocument>} */
-export function postDecision(group, take, asStart) {
-	return request(`/groups/${group}/adjudication`, { method: 'POST', body: { take, as_start: asStart }, key: idempotencyKey() });
+/** @param {number} group @param {number} annotation @param {boolean} asStart @returns {Promise<GroupDocument>} */
+export function postDecision(group, annotation, asStart) {
+	return request(`/groups/${group}/adjudication`, { method: 'POST', body: { annotation, as_start: asStart }, key: idempotencyKey() });
 }
 
-/** @param {number} group @param {number} take @param {string} reason @returns {Promise<void>} */
-export function postReturnForCorrection(group, take, reason) {
-	return request(`/groups/${group}/adjudication/return`, { method: 'POST', body: { take, reason } });
+/** @param {number} group @param {number} annotation @param {string} reason @returns {Promise<void>} */
+export function postReturnForCorrection(group, annotation, reason) {
+	return request(`/groups/${group}/adjudication/return`, { method: 'POST', body: { annotation, reason } });
 }

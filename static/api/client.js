@@ -175,13 +175,13 @@ export function getExport(id) {
  * Send a file as it is. `fetch` cannot tell how far an upload is, hence the older interface.
  *
  * @param {string} path below the API's root @param {Blob} file
- * @param {(share: number) => void} progress @param {AbortSignal} [signal]
+ * @param {(share: number) => void} progress @param {AbortSignal} [signal] @param {'POST' | 'PATCH'} [method]
  * @returns {Promise<any>}
  */
-export function upload(path, file, progress, signal) {
+export function upload(path, file, progress, signal, method = 'POST') {
 	return new Promise((resolve, reject) => {
 		const sending = new XMLHttpRequest();
-		sending.open('POST', ROOT + path);
+		sending.open(method, ROOT + path);
 		sending.setRequestHeader('accept', 'application/json');
 		sending.setRequestHeader('content-type', 'application/octet-stream');
 		sending.responseType = 'json';

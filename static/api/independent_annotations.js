@@ -5,11 +5,11 @@ import { request } from './client.js';
 
 /** @import {GroupDocument} from './types.js' */
 
-/** @typedef {{id: number, batch: number | null, group: number, dataset: number, of: number | null, number: number | null, title: string, person: string, place: number, begun: string, handed_in: string | null, verdict: string | null, settled: string | null, handed_back: ReturnedJson | null}} IndependentAnnotationJson */
+/** @typedef {{id: number, batch: number | null, group: number, dataset: number, of: number | null, number: number | null, title: string, person: string, place: number, begun: string, submitted: string | null, verdict: string | null, settled: string | null, returned: ReturnedJson | null}} IndependentAnnotationJson */
 /** @typedef {{group: number, title: string, by: string, at: string, reason: string}} ReturnedJson */
 /** @typedef {{count: number, median: number | null, low: number | null, high: number | null}} MedianIntervalJson */
 /** @typedef {{line_px: number | null, lines_missing: number, ball_px: number | null, balls_missing: number, ball_m: number | null}} ErrorJson */
-/** @typedef {{group: number, label: string, handed_in: string, verdict: string | null, true_verdict: string, right: boolean | null, error: ErrorJson, submissions: number}} GoldResultJson */
+/** @typedef {{group: number, label: string, submitted: string, verdict: string | null, true_verdict: string, right: boolean | null, error: ErrorJson, submissions: number}} GoldResultJson */
 /** @typedef {{person: string, results: GoldResultJson[], line_px: MedianIntervalJson, ball_px: MedianIntervalJson, ball_m: MedianIntervalJson, judged: number, right: number, right_low: number | null, right_high: number | null}} PersonResultsJson */
 /** @typedef {{group: number, label: string, start: string, marked: string, marked_by: string, source: 'verdict' | 'sample' | 'version'}} GoldGroupJson */
 /** @typedef {{groups: GoldGroupJson[], people: PersonResultsJson[]}} GoldReportJson */

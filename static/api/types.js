@@ -313,8 +313,8 @@
  * @property {string | null} override gate that failed when it was accepted all the same
  * @property {boolean} fixed
  * @property {number} comments threads that are open
- * @property {number | null} takes how many people handed in an annotation of their own; null: for reviewers alone
- * @property {'agreed' | 'open' | 'decided' | null} came_to what these came to; open: somebody has to decide
+ * @property {number | null} submissions how many people submitted an annotation of their own; null: for reviewers alone
+ * @property {'agreed' | 'open' | 'decided' | null} annotations what these came to; open: somebody has to decide
  * @property {string[]} findings
  * @property {string | null} thumbnail
  */

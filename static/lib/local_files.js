@@ -25,7 +25,12 @@ export async function droppedFiles(dropped) {
 
 /** Whether there are videos and nothing that they could belong to. @param {PathFile[]} files */
 export function areVideos(files) {
-	return files.length > 0 && files.every(({ path }) => VIDEO.test(path));
+	return files.length > 0 && files.every(({ path }) => isVideo(path));
+}
+
+/** Whether a file is called as a video is. @param {string} name */
+export function isVideo(name) {
+	return VIDEO.test(name);
 }
 
 /** Files of operating systems are nobody's. @param {PathFile} file */

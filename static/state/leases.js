@@ -50,7 +50,7 @@ export const others = computed(() => (lease.value?.here ?? []).filter(({ person 
 /** @param {LeaseJson} answer @param {number} id */
 function got(answer, id) {
 	batch.value = answer.batch;
-	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', submittedBy: answer.handed_in_by, back: answer.handed_back, place: answer.place, of: answer.of };
+	lease.value = { batch: answer.batch.id, group: id, state: 'mine', part: answer.part, here: answer.here, sentence: '', submittedBy: answer.submitted_by, back: answer.returned, place: answer.place, of: answer.of };
 }
 
 /** @param {number} id @param {number} group */

@@ -29,7 +29,7 @@ export const question = signal(/** @type {Question | null} */ (null));
 const isReady = computed(() => {
 	const [one, group] = [take.value, groupDocument.value];
 	return isTeam && one !== null && group?.id === one.group && one.person !== myName.value
-		&& one.handed_in !== null && one.settled === null && whyNot('lead', group.dataset.name) === '';
+		&& one.submitted !== null && one.settled === null && whyNot('lead', group.dataset.name) === '';
 });
 
 /** Why nobody judges the annotation on screen now; empty: it can be judged. */
@@ -38,7 +38,7 @@ export const frozen = computed(() => {
 	if (one === null || one.group !== groupDocument.value?.id) return '';
 	if (one.settled !== null) return 'This annotation was adjudicated already; it can no longer be changed.';
 	const mine = !isTeam || one.person === myName.value;
-	if (one.handed_in !== null) return mine ? 'This is submitted; only a lead can return it.' : `${one.person} has submitted this; return it, or take it over.`;
+	if (one.submitted !== null) return mine ? 'This is submitted; only a lead can return it.' : `${one.person} has submitted this; return it, or take it over.`;
 	return mine ? '' : `${one.person} reviews this annotation.`;
 });
 

@@ -40,14 +40,14 @@ function Bar({ group }) {
 	if (error || !take) return null;
 	const mine = !isTeam || take.person === myName.value;
 	const whose = mine ? 'your independent annotation' : `${take.person}’s annotation`;
-	const state = take.settled ? 'It is done: it is used in its group, or another one is.' : take.handed_in ? `It is submitted and can no longer be changed${mine && isTeam ? '; only a lead can return it' : ''}.` : mine ? 'Only you and the leads see it.' : 'It is not submitted yet.';
+	const state = take.settled ? 'It is done: it is used in its group, or another one is.' : take.submitted ? `It is submitted and can no longer be changed${mine && isTeam ? '; only a lead can return it' : ''}.` : mine ? 'Only you and the leads see it.' : 'It is not submitted yet.';
 	return html`
-		<div class="bar take-bar" data-tone=${take.handed_back ? 'info' : undefined} role="status">
-			<p><strong>${take.number === null || mine ? take.title : `${take.number} · ${take.title}`}</strong>, ${whose}. ${take.handed_back ? html`<${ReturnedNote} back=${take.handed_back} />` : state}</p>
+		<div class="bar take-bar" data-tone=${take.returned ? 'info' : undefined} role="status">
+			<p><strong>${take.number === null || mine ? take.title : `${take.number} · ${take.title}`}</strong>, ${whose}. ${take.returned ? html`<${ReturnedNote} back=${take.returned} />` : state}</p>
 			${canReturn.value ? html`<button class="button" type="button" onClick=${askReturn}>Return… <kbd>⇧U</kbd></button>` : null}
 			${canTakeOver.value ? html`<button class="button" type="button" onClick=${askTakeOver}>Take over… <kbd>⇧R</kbd></button>` : null}
 			${take.of && take.settled ? html`<a class="button" href=${`/review/${take.of}`}>Open the group</a>` : null}
-			${mine && !take.handed_in && take.batch === null ? html`<button class="button button--primary" type="button" disabled=${busy} onClick=${handIn}>Submit</button>` : null}
+			${mine && !take.submitted && take.batch === null ? html`<button class="button button--primary" type="button" disabled=${busy} onClick=${handIn}>Submit</button>` : null}
 		</div>
 	`;
 }

@@ -23,7 +23,7 @@ function statusOf(row) {
 	if (row.stale) return { status: 'stale', text: `${row.status}, stale` };
 	if (row.status === 'unreviewed' && row.findings.length > 0) return { status: 'flagged', text: 'flagged' };
 	// Annotations that agree settle what is drawn; the verdict is still somebody's.
-	if (row.status === 'unreviewed' && row.came_to === 'agreed') return { status: 'unreviewed', text: 'agreed, no verdict' };
+	if (row.status === 'unreviewed' && row.annotations === 'agreed') return { status: 'unreviewed', text: 'agreed, no verdict' };
 	return { status: row.status, text: row.status };
 }
 
@@ -47,11 +47,11 @@ const CAME_TO = { agreed: 'agree', open: 'differ', decided: 'differed' };
 
 /** How many people annotated it on their own, and what that came to. @param {{row: GroupRow}} props */
 function OwnAnnotations({ row }) {
-	if (!row.takes) return null;
-	const text = row.came_to ? `${row.takes} ${CAME_TO[row.came_to]}` : row.takes === 1 ? '1 annotation' : `${row.takes} annotations`;
-	const open = row.came_to === 'agreed' && row.status === 'unreviewed' ? '; they agree and the first one is used, but nobody has accepted or rejected the group' : '';
-	const title = `${row.takes === 1 ? 'One person has' : `${row.takes} people have`} submitted an independent annotation${row.came_to === 'open' ? '; they differ and need a decision' : open}`;
-	if (row.came_to !== 'open') return html`<span class="own-annotations" title=${title}>${text}</span>`;
+	if (!row.submissions) return null;
+	const text = row.annotations ? `${row.submissions} ${CAME_TO[row.annotations]}` : row.submissions === 1 ? '1 annotation' : `${row.submissions} annotations`;
+	const open = row.annotations === 'agreed' && row.status === 'unreviewed' ? '; they agree and the first one is used, but nobody has accepted or rejected the group' : '';
+	const title = `${row.submissions === 1 ? 'One person has' : `${row.submissions} people have`} submitted an independent annotation${row.annotations === 'open' ? '; they differ and need a decision' : open}`;
+	if (row.annotations !== 'open') return html`<span class="own-annotations" title=${title}>${text}</span>`;
 	return html`<a class="own-annotations" data-state="open" href=${`/adjudicate/${row.id}`} tabindex="-1" title=${title}>${text}</a>`;
 }
 

@@ -22,7 +22,6 @@ export function sizeText(bytes) {
 }
 
 const ELSEWHERE = 'Add it on the page Recordings: its shots are found there, and frames that you choose become groups.';
-const ONE_VIDEO = 'Choose one video: a recording is one file.';
 
 /** One file to send: the only one as it is, several in a zip. @param {PathFile[]} files @param {AbortSignal} signal */
 async function toSend(files, signal) {
@@ -32,8 +31,8 @@ async function toSend(files, signal) {
 	return packFiles(files, `${folder}.zip`, signal);
 }
 
-/** Sends files at once, and says how far they are. @param {(sent: UploadJson | null) => void} onUploaded @param {boolean} [videos] one video is wanted, and nothing else */
-function useUpload(onUploaded, videos = false) {
+/** Sends files at once, and says how far they are. @param {(sent: UploadJson | null) => void} onUploaded */
+function useUpload(onUploaded) {
 	const [state, setState] = useState({ share: 0, name: '', error: '', done: false });
 	const sending = useRef(/** @type {AbortController | null} */ (null));
 	/** @param {PathFile[] | Promise<PathFile[]>} given */
@@ -46,11 +45,7 @@ function useUpload(onUploaded, videos = false) {
 		try {
 			const files = await given;
 			if (files.length === 0) return;
-			if (videos && (files.length > 1 || !areVideos(files))) {
-				setState({ share: 0, name: '', error: ONE_VIDEO, done: false });
-				return;
-			}
-			if (!videos && areVideos(files)) {
+			if (areVideos(files)) {
 				const [{ path }] = files;
 				setState({ share: 0, name: '', error: `${files.length === 1 ? `${path} is a video.` : `${path} and ${plural(files.length - 1, 'other file')} are videos.`} ${ELSEWHERE}`, done: false });
 				return;
@@ -129,7 +124,7 @@ export function UploadField({ id, label, accept, hint = '', onUploaded }) {
 }
 
 /** How much of their room one's uploads take. @param {{sent: unknown}} props `sent`: another one asks again */
-function UploadRoom({ sent }) {
+export function UploadRoom({ sent }) {
 	const room = useResource((signal) => getUploadRoom(signal), [sent]).value;
 	if (!room) return null;
 	const { used_bytes: used, quota_bytes: quota, days, max_bytes: most } = room;
@@ -139,18 +134,17 @@ function UploadRoom({ sent }) {
 	`;
 }
 
-/** Any number of files or a folder, chosen here or dropped. @param {{dropped: Promise<PathFile[]> | null, over: boolean, videos: boolean, onUploaded: (sent: UploadJson | null) => void}} props */
-function DropField({ dropped, over, videos, onUploaded }) {
-	const { state, send } = useUpload(onUploaded, videos);
+/** Any number of files or a folder, chosen here or dropped. @param {{dropped: Promise<PathFile[]> | null, over: boolean, onUploaded: (sent: UploadJson | null) => void}} props */
+function DropField({ dropped, over, onUploaded }) {
+	const { state, send } = useUpload(onUploaded);
 	useEffect(() => { if (dropped) send(dropped); }, [dropped]);
 	return html`
 		<div class="form__row import__drop" data-over=${over}>
 			<label for="import-file">File</label>
-			<input class="field" id="import-file" type="file" multiple=${!videos} accept=${videos ? 'video/*,.mkv,.ts,.mts,.m2ts' : undefined} onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
-			${videos ? html`<small>Or drop a video anywhere on this page.</small>` : html`
-				<label for="import-folder">or a whole folder</label>
-				<input class="field" id="import-folder" type="file" webkitdirectory onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
-				<small>Or drop files, pictures or a folder anywhere on this page.</small>`}
+			<input class="field" id="import-file" type="file" multiple onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
+			<label for="import-folder">or a whole folder</label>
+			<input class="field" id="import-folder" type="file" webkitdirectory onChange=${(/** @type {Event} */ event) => send(filesOf(event))} />
+			<small>Or drop files, pictures or a folder anywhere on this page.</small>
 			<${UploadState} state=${state} />
 			<${UploadRoom} sent=${state.done} />
 		</div>
@@ -198,8 +192,12 @@ function FolderList({ chosen, choose, guess }) {
 	`;
 }
 
-/** @param {{onSource: (source: ImportSource | null) => void, guess: (format: string) => void, videos?: boolean}} props `guess`: what the files most likely are; `videos`: one video is wanted */
-export function SourceChoice({ onSource, guess, videos = false }) {
+/**
+ * `guess`: what the files most likely are; `videos`: sends files of this computer, where videos are wanted.
+ *
+ * @param {{onSource: (source: ImportSource | null) => void, guess: (format: string) => void, videos?: (props: {dropped: Promise<PathFile[]> | null, over: boolean}) => any}} props
+ */
+export function SourceChoice({ onSource, guess, videos }) {
 	const [kind, setKind] = useState('upload');
 	const [folder, setFolder] = useState('');
 	const [dropped, setDropped] = useState(/** @type {Promise<PathFile[]> | null} */ (null));
@@ -213,14 +211,18 @@ export function SourceChoice({ onSource, guess, videos = false }) {
 	return html`
 		<fieldset class="choice import__choice">
 			<legend>Source</legend>
-			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>${videos ? 'A file' : 'Files'} on this computer<small>${videos ? 'a video, which is sent' : 'zip, JSON, CSV or pictures'}</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>Files on this computer<small>${videos ? 'videos, which are sent' : 'zip, JSON, CSV or pictures'}</small></span></label>
 			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A ${videos ? 'file' : 'folder'} on the server<small>${videos ? 'it stays there' : 'or in an object store; frames stay there'}</small></span></label>
 		</fieldset>
-		${kind === 'upload'
-			? html`<${DropField} dropped=${dropped} over=${over} videos=${videos} onUploaded=${(/** @type {UploadJson | null} */ sent) => {
+		${kind === 'upload' && videos ? html`<${videos} dropped=${dropped} over=${over} />` : null}
+		${kind === 'upload' && !videos
+			? html`<${DropField} dropped=${dropped} over=${over} onUploaded=${(/** @type {UploadJson | null} */ sent) => {
 				onSource(sent && { upload: sent.id });
 				if (sent?.format) guess(sent.format);
 			}} />`
-			: html`<${FolderList} chosen=${folder} guess=${guess} choose=${(/** @type {string} */ path) => { setFolder(path); onSource({ folder: path }); }} />`}
+			: null}
+		${kind === 'folder'
+			? html`<${FolderList} chosen=${folder} guess=${guess} choose=${(/** @type {string} */ path) => { setFolder(path); onSource({ folder: path }); }} />`
+			: null}
 	`;
 }

@@ -44,7 +44,13 @@ NOBODY = "http://127.0.0.1:9/hook"
 def serving(home: Path, *options: str) -> Iterator[str]:
     """Address of a server over a home, with further options of ``serve``."""
     port = free_port()
-    address = f"http://127.0.0.1:{port}"
+    with killable(home, port, *options):
+        yield f"http://127.0.0.1:{port}"
+
+
+@contextmanager
+def killable(home: Path, port: int, *options: str) -> Iterator[Process]:
+    """A server over a home, at a port, that a test may end before its time."""
     with (home / "server.log").open("wb") as log:
         process = Process(
             [sys.executable, "-c", SERVE, "serve", *options],
@@ -54,8 +60,8 @@ def serving(home: Path, *options: str) -> Iterator[str]:
             stderr=log,
         )
         try:
-            _wait_for(address, process, home / "server.log")
-            yield address
+            _wait_for(f"http://127.0.0.1:{port}", process, home / "server.log")
+            yield process
         finally:
             process.terminate()
             process.wait(timeout=START_SECONDS)

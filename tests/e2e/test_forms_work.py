@@ -190,10 +190,10 @@ class TestBatches:
             batch = one["batch"]
             item = page.locator(f"{TEAM} .work__item")
             item = item.filter(has=page.get_by_role("link", name=batch["name"], exact=True))
-            handed = batch["handed_in"] and batch["annotators"] and batch["verdicts"] == 1
+            handed = batch["submitted"] and batch["annotators"] and batch["verdicts"] == 1
             words = [
                 f"{batch['settled']} of {batch['groups']} groups done",
-                f"{batch['handed_in']} submitted" if handed else "",
+                f"{batch['submitted']} submitted" if handed else "",
                 f"{batch['waiting']} open",
             ]
             expect(item).to_contain_text(" · ".join(filter(None, words)))
@@ -202,11 +202,11 @@ class TestBatches:
             if batch["due"]:
                 expect(item).to_contain_text("due 20 May 2040")
             if batch["name"] == "Friday":
-                assert (batch["settled"], batch["handed_in"], batch["waiting"]) == (1, 1, 1)
+                assert (batch["settled"], batch["submitted"], batch["waiting"]) == (1, 1, 1)
                 assert [pace["name"] for pace in one["people"]] == ["bob", "carl"]
             for pace in one["people"]:
                 line = item.get_by_role("row").filter(has_text=pace["name"])
-                numbers = [str(pace["handed_in"]), str(pace["judged"]), fixed(pace["minutes"], 0)]
+                numbers = [str(pace["submitted"]), str(pace["judged"]), fixed(pace["minutes"], 0)]
                 numbers += [fixed(pace["minutes_a_group"], 1), fixed(pace["groups_an_hour"], 0)]
                 expect(line.get_by_role("cell")).to_have_text(numbers)
         for mine in read(page, "/work")["items"]:

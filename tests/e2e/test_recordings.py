@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.screen import jobs_end, until
-from tests.e2e.service import delete_dataset
+from tests.e2e.service import delete_dataset, free_port, killable
 from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
     NESTED_SCROLLERS,
@@ -99,7 +99,7 @@ class TestAdding:
         page = open_page("/recordings")
         page.get_by_label("Dataset", exact=True).fill("sent")
         page.set_input_files("#import-file", film)
-        expect(page.get_by_text("is uploaded")).to_be_visible()
+        expect(page.get_by_role("list", name="Uploads")).to_contain_text("uploaded")
         page.get_by_role("button", name="Add and find its shots").click()
         page.get_by_role("link", name="Open cup final").click()
         shows(page, 0)
@@ -117,10 +117,98 @@ class TestAdding:
         cv2.imwrite(str(tmp_path / "a.png"), next(pictures()))
         page = open_page("/recordings")
         page.set_input_files("#import-file", tmp_path / "a.png")
-        expect(page.get_by_role("alert")).to_contain_text("Choose one video")
+        expect(page.get_by_role("alert")).to_contain_text("a.png is no video")
         page.goto("/import")
         page.set_input_files("#import-file", film)
         expect(page.get_by_role("alert")).to_contain_text("Add it on the page Recordings")
+
+
+SLOW = {"downloadThroughput": -1, "uploadThroughput": 4e6, "latency": 0}
+"""A network as Chromium imitates it: bytes a second."""
+
+
+class TestSending:
+    """Uploads go on where they were."""
+
+    @pytest.fixture
+    def films(self, film: Path, tmp_path: Path) -> list[Path]:
+        """Two videos, the first of 30 MB: readers pass over what follows its boxes."""
+        long, short = tmp_path / "long.mp4", tmp_path / "short.mp4"
+        short.write_bytes(film.read_bytes())
+        rest = 30_000_000
+        head = (rest + 8).to_bytes(4, "big") + b"free"
+        long.write_bytes(film.read_bytes() + head + bytes(rest))
+        return [long, short]
+
+    def test_several_are_dropped_and_each_becomes_a_recording_when_it_is_here(
+        self, films: list[Path], open_page: OpenPage, server: str
+    ) -> None:
+        page = open_page("/recordings")
+        uploads = page.get_by_role("list", name="Uploads")
+        page.get_by_label("Dataset", exact=True).fill("sent")
+        page.set_input_files("#import-file", films)
+        # Before they are here.
+        page.get_by_role("button", name="Add and find its shots").click()
+        page.get_by_role("link", name="Open long").wait_for()
+        page.get_by_role("link", name="Open short").wait_for()
+        expect(uploads.get_by_role("listitem")).to_have_count(2)
+        expect(page.get_by_role("row", name="short")).to_contain_text("640 × 360")
+        delete_dataset(server, "sent")
+
+    def test_one_goes_on_after_the_page_was_closed(
+        self, films: list[Path], open_page: OpenPage, server: str
+    ) -> None:
+        page = open_page("/recordings")
+        network = page.context.new_cdp_session(page)
+        network.send("Network.enable")
+        network.send("Network.emulateNetworkConditions", {**SLOW, "offline": False})
+        uploads = page.get_by_role("list", name="Uploads")
+        page.set_input_files("#import-file", films[0])
+        expect(uploads.get_by_role("progressbar")).not_to_have_attribute("aria-valuenow", "0")
+        until(page, lambda: half_sent(page) > 0)
+        network.detach()
+        page.reload()
+        expect(uploads).to_contain_text("Choose the file again to go on")
+        there = half_sent(page)
+        page.set_input_files("#import-file", films[0])
+        expect(uploads).to_contain_text("uploaded")
+        expect(uploads.get_by_role("listitem")).to_have_count(1)
+        assert 0 < there < films[0].stat().st_size
+        uploads.get_by_role("button", name="Remove").click()
+        expect(uploads).to_have_count(0)
+        items = page.request.get("/api/v1/uploads").json()["items"]
+        assert [one["name"] for one in items if not one["kept"]] == []
+
+    def test_one_goes_on_after_the_server_was_killed(
+        self, films: list[Path], tmp_path: Path, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("Failed to load resource")
+        home = tmp_path / "home"
+        home.mkdir()
+        port = free_port()
+        with killable(home, port) as server:
+            page = open_page("/recordings", address=f"http://127.0.0.1:{port}")
+            network = page.context.new_cdp_session(page)
+            network.send("Network.enable")
+            network.send("Network.emulateNetworkConditions", {**SLOW, "offline": False})
+            uploads = page.get_by_role("list", name="Uploads")
+            page.set_input_files("#import-file", films[0])
+            until(page, lambda: half_sent(page) > 0)
+            server.kill()
+            expect(uploads).to_contain_text("it goes on by itself")
+        with killable(home, port):
+            network.detach()
+            expect(uploads).to_contain_text("uploaded")
+            (sent,) = page.request.get(f"http://127.0.0.1:{port}/api/v1/uploads").json()["items"]
+            content = next((home / "uploads").glob("*/content/long.mp4")).read_bytes()
+            assert (sent["bytes"], content) == (sent["size"], films[0].read_bytes())
+
+
+def half_sent(page: Page) -> int:
+    """Bytes of the upload that the server has not all of."""
+    address = page.url.removesuffix("/recordings")
+    items = page.request.get(f"{address}/api/v1/uploads").json()["items"]
+    return sum(int(one["bytes"]) for one in items if one["bytes"] < one["size"])
 
 
 class TestWatching:

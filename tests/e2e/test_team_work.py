@@ -158,7 +158,7 @@ class TestWork:
         nora.keyboard.press("Shift+F")
         until(nora, lambda: "/review/7" in nora.url)
         groups = nora.request.get(f"/api/v1/batches/{given.id}/groups").json()["items"]
-        assert [one["handed_in_by"] for one in groups] == ["nora", None]
+        assert [one["submitted_by"] for one in groups] == ["nora", None]
 
     def test_two_who_annotate_the_same_group_blind_differ_and_the_lead_decides(
         self, open_page: OpenPage, team: str, team_home: Path, console: Any

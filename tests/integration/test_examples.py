@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.videos import write_video
 from touchline import Client
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -148,5 +149,6 @@ class TestPages:
         assert blocks
         text = "\n".join(blocks).replace("http://127.0.0.1:8000", address)
         text = text.replace("league-v1.zip", str(export)).replace('"league"', '"small"')
+        write_video(tmp_path / "final.mp4", "mp4v", 30)
         (script := tmp_path / "page.py").write_text(text.replace('"v1"', '"examples"'))
         assert "somebody was faster" not in run(tmp_path, script)

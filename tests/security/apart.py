@@ -161,6 +161,8 @@ class Apart:
                 inner[last] = value
         target = row.target(path).removeprefix(API) + ("?" + "&".join(query) if query else "")
         sent = body if row.kind == "body" else None
+        if row.kind == "upload" and mentioned(row):
+            sent = b"P"
         return self.ask(name, row.method, target, sent)
 
     def value(self, kind: OwnedKind, where: str) -> Any:

@@ -109,7 +109,8 @@ def asked(team: Team, row: Row, role: str | None, **headers: str) -> Answer:
     target = row.target({"ending": "csv", "tab": "keys"})
     kind, body = "application/json", None if row.kind in ("read", "page", "stream") else []
     if row.kind == "upload":
-        return team.ask("POST", f"{target}?name=a.zip", b"PK", role=role, kind=BYTES, **headers)
+        query = "?name=a.zip" if row.method == "POST" else ""
+        return team.ask(row.method, target + query, b"PK", role=role, kind=BYTES, **headers)
     stream = row.kind == "stream"
     return team.ask(
         "HEAD" if stream else row.method,

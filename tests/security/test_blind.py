@@ -110,17 +110,22 @@ def test_its_person_and_the_leads_see_it_and_no_list_has_it(team: Apart) -> None
 
 def test_an_annotator_does_not_learn_what_others_made_of_a_group(team: Apart) -> None:
     begun(team, "berta")
-    for query in ("annotations:waiting", "status:unreviewed -annotations:none", "takes>=1"):
+    for query in (
+        "annotations:waiting",
+        "status:unreviewed -annotations:none",
+        "submissions>=1",
+        "takes>=1",
+    ):
         for target in ("/groups?dataset=demo", "/groups/ids?dataset=demo", "/groups/1/neighbours?"):
             told = team.ask("olaf", "GET", f"{target}&q={quote(query)}")
             assert told.status_code == 403, "an annotator does not learn what others made of it"
     rows = [
         team.ask(name, "GET", "/groups?dataset=demo").json()["items"] for name in ("olaf", "lea")
     ]
-    assert [rows[0][0]["takes"] is None, rows[1][0]["takes"] is None] == [True, False]
+    assert [rows[0][0]["submissions"] is None, rows[1][0]["submissions"] is None] == [True, False]
 
 
-ASKS = "id:1 takes>=0"
+ASKS = "id:1 submissions>=0"
 """Of which the number of groups answers what others made of one."""
 
 
@@ -186,11 +191,11 @@ class TestQueries:
         assert team.ask("lea", "POST", f"{at}/verdicts", bulk).json()["changed"] == 1
         for name in ("vera", "olaf"):
             for target in (f"{at}/saved-views", f"{at}/batches", f"{at}/verdict-batches"):
-                assert "takes" not in team.ask(name, "GET", target).text, (name, target)
-            assert "takes" not in team.ask(name, "GET", f"/batches/{batch['id']}").text
+                assert "submissions" not in team.ask(name, "GET", target).text, (name, target)
+            assert "submissions" not in team.ask(name, "GET", f"/batches/{batch['id']}").text
             hidden = f"/saved-views/{view.json()['id']}"
             assert team.ask(name, "GET", hidden).status_code == 404
             assert team.ask(name, "GET", f"/saved-views/{plain.json()['id']}").status_code == 200
         assert team.ask("olaf", "DELETE", hidden).status_code == 404
-        assert "takes" in team.ask("anna", "GET", f"{at}/saved-views").text
+        assert "submissions" in team.ask("anna", "GET", f"{at}/saved-views").text
         assert team.ask("lea", "DELETE", hidden).status_code == 200

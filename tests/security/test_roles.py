@@ -44,7 +44,7 @@ LET_IN = {
     "page": {200, 404},
     "change": {200, 404, 409, 422, 428},
     "body": {422, 428},
-    "upload": {201},
+    "upload": {201, 404},
 }
 """How a route answers whom it lets in, by its kind: what is asked for is often not there, and
 the body of no shape."""

@@ -46,14 +46,14 @@ class Case:
     """A group that waits for a decision, with what it is to be decided between.
 
     Attributes:
-        takes: In the order in which they were handed in; ``comparison`` has the same order.
+        annotations: In the order in which they were submitted; ``comparison`` has the same order.
         refused: Why whoever asks may not decide; None: they may.
         own: Whether they decide about their own annotation, because nobody else is there.
     """
 
     original: GroupState
     batch: int | None
-    takes: tuple[IndependentAnnotation, ...]
+    annotations: tuple[IndependentAnnotation, ...]
     comparison: Comparison
     refused: str | None
     own: bool
@@ -111,7 +111,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
 def decide(
     store: Store,
     group_id: int,
-    take_id: int,
+    annotation_id: int,
     *,
     as_start: bool = False,
     actor: str,
@@ -130,15 +130,18 @@ def decide(
     case = get_case(store, group_id, actor=actor)
     if case.refused is not None:
         raise ForbiddenError(case.refused)
-    place = next((at for at, annotation in enumerate(case.takes) if annotation.id == take_id), None)
+    place = next(
+        (at for at, annotation in enumerate(case.annotations) if annotation.id == annotation_id),
+        None,
+    )
     if place is None:
-        raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
+        raise NotFoundError(f"annotation {annotation_id} is not one that waits for a decision here")
     return settle(
         store,
         group_id,
         case.batch,
-        case.takes,
-        case.takes[place],
+        case.annotations,
+        case.annotations[place],
         outcome="start" if as_start else "take",
         actor=actor,
         paint=paint,
@@ -156,7 +159,7 @@ def adopt_into_group(
     """Take an annotation and its verdict over into the group; where it waits for a decision, this is it.
 
     Raises:
-        ConflictError: It is not handed in, was decided about, or is of a gold group.
+        ConflictError: It is not submitted, was decided about, or is of a gold group.
     """
     with store.read() as session:
         waits = any(
@@ -179,9 +182,9 @@ def adopt_into_group(
 
 
 def return_for_correction(
-    store: Store, group_id: int, take_id: int, reason: str = "", *, actor: str
+    store: Store, group_id: int, annotation_id: int, reason: str = "", *, actor: str
 ) -> DisclosedAnnotation:
-    """Hand one of the annotations that disagree back to its person; the group waits no longer.
+    """Return one of the annotations that disagree to its person; the group waits no longer.
 
     Raises:
         NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
@@ -190,12 +193,12 @@ def return_for_correction(
     case = get_case(store, group_id, actor=actor)
     if case.refused is not None:
         raise ForbiddenError(case.refused)
-    annotation = next((one for one in case.takes if one.id == take_id), None)
+    annotation = next((one for one in case.annotations if one.id == annotation_id), None)
     if annotation is None:
-        raise NotFoundError(f"annotation {take_id} is not one that waits for a decision here")
+        raise NotFoundError(f"annotation {annotation_id} is not one that waits for a decision here")
     if annotation.person == person_of(actor) != LOCAL_USER:
         raise ForbiddenError("you submitted this annotation yourself", hint="A lead can return it.")
-    return return_annotation(store, take_id, reason, actor=actor)
+    return return_annotation(store, annotation_id, reason, actor=actor)
 
 
 def _possible_judges(

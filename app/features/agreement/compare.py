@@ -115,7 +115,7 @@ def read_limits(session: Session, dataset: int) -> AgreementLimits:
 def set_limits(
     store: Store, dataset: str | int, limits: AgreementLimits, *, actor: str
 ) -> AgreementLimits:
-    """Let other limits count for whatever is handed in from now on."""
+    """Let other limits count for whatever is submitted from now on."""
     number, at = dataset_id(store, dataset), now()
     with store.write() as session:
         put_limits(session, number, {**asdict(limits), "changed": at, "changed_by": actor})

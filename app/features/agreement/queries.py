@@ -97,14 +97,14 @@ def settle_rest(session: Session, take_ids: Sequence[int], at: str) -> None:
 
 
 def never_compared(session: Session) -> list[tuple[int, int | None]]:
-    """Group and batch (None: none) of annotations that several people handed in and nobody compared."""
+    """Group and batch (None: none) of annotations that several people submitted and nobody compared."""
     annotation, row = IndependentAnnotationModel, AgreementModel
     same = (row.group_id == annotation.group_id) & (
         row.batch_id == func.coalesce(annotation.batch_id, 0)
     )
     ready = (
         annotation.kind == INDEPENDENT,
-        annotation.handed_in.is_not(None),
+        annotation.submitted.is_not(None),
         annotation.settled.is_(None),
     )
     statement = (
@@ -123,7 +123,7 @@ def never_adopted(session: Session) -> list[int]:
     annotation = IndependentAnnotationModel
     ready = (
         annotation.kind == INDEPENDENT,
-        annotation.handed_in.is_not(None),
+        annotation.submitted.is_not(None),
         annotation.settled.is_(None),
     )
     statement = select(annotation.copy_id).join(BatchModel, BatchModel.id == annotation.batch_id)

@@ -98,7 +98,7 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
 def put_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
 ) -> AgreementLimits:
-    """How far annotations may lie apart and still agree; counts for what is handed in from now on."""
+    """How far annotations may lie apart and still agree; counts for what is submitted from now on."""
     wanted = AgreementLimits(**edit.model_dump())
     return limits.set_limits(store, dataset, wanted, actor=actor)
 
@@ -139,7 +139,7 @@ def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -
     return adjudicate.decide(
         services.store,
         group,
-        decision.take,
+        decision.annotation,
         as_start=decision.as_start,
         actor=actor,
         paint=services.paint,
@@ -157,5 +157,5 @@ def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -
 def return_annotation(
     group: Id, back: AnnotationReturn, store: AppStore, actor: Actor
 ) -> DisclosedAnnotation:
-    """Hand one of the annotations back to its person; it is compared again when it is handed in."""
-    return adjudicate.return_for_correction(store, group, back.take, back.reason, actor=actor)
+    """Return one of the annotations to its person; it is compared again when it is submitted."""
+    return adjudicate.return_for_correction(store, group, back.annotation, back.reason, actor=actor)

@@ -149,7 +149,7 @@ class CaseAnnotation(Document):
     id: int
     person: str
     verdict: str | None
-    handed_in: datetime | None
+    submitted: datetime | None
 
 
 class CaseDocument(Document):
@@ -157,7 +157,7 @@ class CaseDocument(Document):
 
     group: GroupDocument
     batch: int | None
-    takes: list[CaseAnnotation]
+    annotations: list[CaseAnnotation]
     comparison: GroupComparisonDocument
     refused: str | None = Field(
         description="Why the logged-in person may not decide; null: they may."
@@ -182,10 +182,11 @@ class Decision(BaseModel):
     """Which annotation is taken over."""
 
     model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"take": 7}, {"take": 7, "as_start": True}]}
+        extra="forbid",
+        json_schema_extra={"examples": [{"annotation": 7}, {"annotation": 7, "as_start": True}]},
     )
 
-    take: int = Field(ge=1, le=MAX_ID)
+    annotation: int = Field(ge=1, le=MAX_ID)
     as_start: bool = Field(
         default=False,
         description="It is where a third one begins: it is edited and judged in the group itself.",

@@ -1,4 +1,4 @@
-"""Weigh: compare the annotations of a group once enough are handed in, and settle what agrees."""
+"""Weigh: compare the annotations of a group once enough are submitted, and settle what agrees."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def after_submission(store: Store, copy_id: int, paint: PaintFollower | None = N
         ``agreed``: the first annotation was taken over; ``open``: somebody has to decide.
     """
     annotation = find_annotation_of_copy(store, copy_id)
-    if annotation is None or annotation.kind != INDEPENDENT or annotation.handed_in is None:
+    if annotation is None or annotation.kind != INDEPENDENT or annotation.submitted is None:
         return None
     try:
         if annotation.batch_id is not None:
@@ -96,7 +96,7 @@ def after_submission(store: Store, copy_id: int, paint: PaintFollower | None = N
 def compare_submitted(
     store: Store, group_id: int, batch_id: int | None, paint: PaintFollower | None = None
 ) -> str | None:
-    """Compare what was handed in of a group; where it agrees, the first annotation is taken over.
+    """Compare what was submitted of a group; where it agrees, the first annotation is taken over.
 
     Each pair is compared, and all of them have to agree. ``paint`` reads the paint of edited lines
     again, as for every edit. May be called again at any time: what was compared already stays.
@@ -139,7 +139,7 @@ def compare_submitted(
 
 
 def compare_left(store: Store, paint: PaintFollower | None = None) -> int:
-    """Compare what was handed in before a server was stopped, and was not compared any more; and
+    """Compare what was submitted before a server was stopped, and was not compared any more; and
     take over what waits for that.
 
     Returns:
@@ -161,7 +161,7 @@ def compare_left(store: Store, paint: PaintFollower | None = None) -> int:
 def submitted_annotations(
     store: Store, group_id: int, batch_id: int | None
 ) -> list[IndependentAnnotation]:
-    """What was handed in of a group in a batch (None: in none), and not decided about, in order."""
+    """What was submitted of a group in a batch (None: in none), and not decided about, in order."""
     with store.read() as session:
         annotations = annotations_of_group(session, group_id)
     found = [
@@ -169,9 +169,9 @@ def submitted_annotations(
         for annotation in annotations
         if (annotation.batch_id, annotation.kind, annotation.settled)
         == (batch_id, INDEPENDENT, None)
-        and annotation.handed_in is not None
+        and annotation.submitted is not None
     ]
-    return sorted(found, key=lambda annotation: (annotation.handed_in or "", annotation.id))
+    return sorted(found, key=lambda annotation: (annotation.submitted or "", annotation.id))
 
 
 def settle(

@@ -9,7 +9,7 @@ from app.db.base import Base
 
 
 class AgreementModel(Base):
-    """What the annotations of a group that were handed in came to; ``batch_id`` is 0 for no batch.
+    """What the annotations of a group that were submitted came to; ``batch_id`` is 0 for no batch.
 
     ``state`` is ``agreed``, ``open`` (it waits for somebody to decide) or ``decided``. ``takes`` names
     what was compared, ``pairs`` is how far they lie apart (compressed JSON), ``worst`` how many

@@ -188,7 +188,7 @@ def _line(value: dict[str, Any]) -> str:
     due = "" if value["due"] is None else f"   due {value['due']}"
     return (
         f"{value['id']:5} {value['name']:30} {value['state']:7}"
-        f"{value['settled']:6} of {value['groups']} settled, {value['handed_in']} to review"
+        f"{value['settled']:6} of {value['groups']} settled, {value['submitted']} to review"
         f"   {people}{due}"
     )
 

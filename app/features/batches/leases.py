@@ -78,8 +78,8 @@ class Lease:
         part: What they do with it.
         until: When it ends unless it is kept.
         here: People who have the group open.
-        handed_in_by: Who has handed it in; None: nobody.
-        handed_back: Why it was handed back to its annotator; None: it was not, or is handed in again.
+        submitted_by: Who has submitted it; None: nobody.
+        returned: Why it was returned to its annotator; None: it was not, or is submitted again.
         place: Of the groups that they annotate on their own: which this is, from 1; None otherwise.
         of: How many these are as the batch stands; None where gold groups are among them, for a
             count that stays would tell them.
@@ -90,8 +90,8 @@ class Lease:
     part: Part | None = None
     until: str | None = None
     here: tuple[Presence, ...] = ()
-    handed_in_by: str | None = None
-    handed_back: ReturnedGroup | None = None
+    submitted_by: str | None = None
+    returned: ReturnedGroup | None = None
     place: int | None = None
     of: int | None = None
 
@@ -193,7 +193,7 @@ class Leases:
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
-            ConflictError: They are not one of its annotators, somebody else has handed it in, or the
+            ConflictError: They are not one of its annotators, somebody else has submitted it, or the
                 batch is closed.
         """
         with self._store.read() as session:
@@ -211,9 +211,9 @@ class Leases:
             row = _group(session, batch, group)
             if Part.ANNOTATOR not in worker.parts(batch):
                 raise ConflictError(f'you are no annotator of the batch "{batch.name}"')
-            others = row.handed_in is not None and row.handed_in_by != worker.name
+            others = row.submitted is not None and row.submitted_by != worker.name
             if row.settled is not None or others:
-                by = row.handed_in_by or "somebody"
+                by = row.submitted_by or "somebody"
                 raise ConflictError(f"{by} has submitted this group", hint="Go on with the next.")
             mark_submitted(
                 session, batch_id, group, at=self._now() if done else None, by=worker.name
@@ -226,11 +226,11 @@ class Leases:
     def return_group(
         self, batch_id: int, group: int, worker: BatchMember, reason: str = "", *, actor: str
     ) -> Lease:
-        """Give a group that was handed in back to who did, and tell them why; they get it next.
+        """Give a group that was submitted back to who did, and tell them why; they get it next.
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
-            ConflictError: It is not handed in, its work is over, or the batch is closed.
+            ConflictError: It is not submitted, its work is over, or the batch is closed.
             InputError: The sentence is too long.
         """
         checked = checked_reason(reason)
@@ -239,9 +239,9 @@ class Leases:
             row = _group(session, batch, group)
             if row.settled is not None:
                 raise ConflictError("this group was judged", hint="Take the verdict back first.")
-            if row.handed_in is None:
+            if row.submitted is None:
                 raise ConflictError("this group is not submitted")
-            person = row.handed_in_by
+            person = row.submitted_by
             mark_submitted(session, batch_id, group, at=None, by=person, returned=True)
             log_return(session, WORK, group, person, checked, actor=actor, batch=batch_id)
             return self._ended_lease(session, batch_id, group, worker)
@@ -263,13 +263,13 @@ class Leases:
         until = text_of(at + LASTS)
         keep_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
         here = _presences(session, batch, group, text_of(at))
-        if row.handed_in_by is None:
+        if row.submitted_by is None:
             return Lease(batch, group, part, until, here)
-        if row.handed_in is not None:
-            return Lease(batch, group, part, until, here, row.handed_in_by)
-        # Who handed it in has it back; their name stays with it.
+        if row.submitted is not None:
+            return Lease(batch, group, part, until, here, row.submitted_by)
+        # Who submitted it has it back; their name stays with it.
         back = read_returned(session, [group]).get(group)
-        return Lease(batch, group, part, until, here, handed_back=back)
+        return Lease(batch, group, part, until, here, returned=back)
 
     def _now(self) -> str:
         return text_of(self._clock())
@@ -305,9 +305,9 @@ def open_for(
         if part not in parts:
             continue
         # Where nobody annotates, a reviewer gets everything that waits.
-        handed_in = (part is Part.REVIEWER) if batch.annotators else None
+        submitted = (part is Part.REVIEWER) if batch.annotators else None
         found = waiting_group(
-            session, batch.id, batch.dataset_id, worker.name, at, handed_in=handed_in, after=place
+            session, batch.id, batch.dataset_id, worker.name, at, submitted=submitted, after=place
         )
         if found is not None:
             return found, part
@@ -357,7 +357,7 @@ def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
 
 def _part_in(parts: set[Part], row: Any) -> Part:
     """What somebody with these parts does with a group of a batch, as far as it is by now."""
-    if Part.ANNOTATOR in parts and (row.handed_in is None or Part.REVIEWER not in parts):
+    if Part.ANNOTATOR in parts and (row.submitted is None or Part.REVIEWER not in parts):
         return Part.ANNOTATOR
     return Part.REVIEWER
 

@@ -47,7 +47,7 @@ def takes_part(batch: Batch, parts: Collection[Part]) -> bool:
 def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation | None:
     """The own annotation that somebody shall work on now; None: there is nothing left for them.
 
-    Where one annotation a group is asked for, what they have handed in is taken over first.
+    Where one annotation a group is asked for, what they have submitted is taken over first.
     """
     adopt_submitted(store, batch, person)
     with store.read() as session:
@@ -65,7 +65,7 @@ def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation |
 
 
 def returned_to(session: Session, batch: Batch, person: str) -> list[int]:
-    """Groups whose annotation somebody handed in, was taken over, and was handed back to them."""
+    """Groups whose annotation somebody submitted, was taken over, and was returned to them."""
     return [row.group_id for row in groups_returned(session, [batch.id], person_of(person))]
 
 
@@ -103,14 +103,14 @@ def own_part(session: Session, batch: Batch, person: str) -> Batch:
     name = person_of(person)
     back = set(returned_to(session, batch, person))
     done = [
-        annotation.handed_in
+        annotation.submitted
         for annotation in annotations
-        if annotation.person == name and annotation.handed_in and annotation.group_id not in back
+        if annotation.person == name and annotation.submitted and annotation.group_id not in back
     ]
     return replace(
         batch,
         groups=len(done) + own_left(session, batch, person),
-        handed_in=0,
+        submitted=0,
         settled=len(done),
         last=max(done, default=None),
         here=[],
@@ -132,11 +132,11 @@ def seen_batch(store: Store, batch_id: int) -> Batch:
 
 
 def _waiting(session: Session, batch: Batch) -> list[int]:
-    """The groups of a batch that wait; what was handed in otherwise waits for its reviewer."""
+    """The groups of a batch that wait; what was submitted otherwise waits for its reviewer."""
     return [
         row.group_id
         for row in groups_of(session, batch.id)
-        if row.settled is None and row.handed_in is None
+        if row.settled is None and row.submitted is None
     ]
 
 
@@ -149,14 +149,14 @@ def own_total(session: Session, batch: Batch, person: str) -> int | None:
         return None
     name = person_of(person)
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
-    done = len([row for row in annotations if row.person == name and row.handed_in is not None])
+    done = len([row for row in annotations if row.person == name and row.submitted is not None])
     return done + sum(count_left(session, batch.id, batch.dataset_id, name, batch.verdicts))
 
 
 def adopt_submitted(store: Store, batch: Batch, person: str) -> None:
-    """Take over what somebody handed in, where nobody else annotates the same groups.
+    """Take over what somebody submitted, where nobody else annotates the same groups.
 
-    What an annotator has not judged waits for a reviewer then, as if they had handed the group in.
+    What an annotator has not judged waits for a reviewer then, as if they had submitted the group.
     """
     if batch.verdicts > 1:
         return
@@ -166,7 +166,7 @@ def adopt_submitted(store: Store, batch: Batch, person: str) -> None:
             for row in annotations_of_batch(session, batch.id, batch.dataset_id)
             if row.person == person_of(person)
             and (row.kind, row.settled) == (INDEPENDENT, None)
-            and row.handed_in is not None
+            and row.submitted is not None
         ]
     for row in ready:
         waits = batch.annotators and row.verdict not in OVER

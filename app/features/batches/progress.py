@@ -118,12 +118,12 @@ PAUSE = timedelta(minutes=10)
 @dataclass(frozen=True)
 class MyBatch:
     """A batch of somebody's: ``left`` groups wait for them or for others beside them, and
-    ``handed_back`` are those that they had handed in and have back."""
+    ``returned`` are those that they had submitted and have back."""
 
     batch: Batch
     parts: list[Part]
     left: int
-    handed_back: list[ReturnedGroup] = field(default_factory=list)
+    returned: list[ReturnedGroup] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -131,12 +131,12 @@ class Pace:
     """What somebody has done in a batch.
 
     Attributes:
-        handed_in, judged: Groups.
+        submitted, judged: Groups.
         minutes: How long they worked: the time between any two things that they did, pauses left out.
     """
 
     name: str
-    handed_in: int
+    submitted: int
     judged: int
     groups: int
     minutes: float
@@ -210,7 +210,7 @@ def team_work(store: Store, dataset: str | int, *, at: datetime | None = None) -
 def _count_left(batch: Batch, parts: Iterable[Part]) -> int:
     """Groups that somebody with these parts may still get."""
     left = batch.waiting if Part.ANNOTATOR in parts or not batch.annotators else 0
-    return left + (batch.handed_in if Part.REVIEWER in parts else 0)
+    return left + (batch.submitted if Part.REVIEWER in parts else 0)
 
 
 def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:
@@ -222,14 +222,14 @@ def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> T
 
 
 def _paces(entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[Any]) -> list[Pace]:
-    """What each person did, from the log and from what was handed in; of groups, and of own copies.
+    """What each person did, from the log and from what was submitted; of groups, and of own copies.
 
     What stands in the original under the name of somebody who has a copy was taken over from it: it
     says nothing of when they worked.
     """
     times: dict[str, list[str]] = defaultdict(list)
     judged: dict[str, set[int]] = defaultdict(set)
-    handed_in: dict[str, set[int]] = defaultdict(set)
+    submitted: dict[str, set[int]] = defaultdict(set)
     taken_over = {(annotation.person, annotation.group_id) for annotation in annotations}
     for row in entries:
         name = person_of(row.actor)
@@ -238,24 +238,24 @@ def _paces(entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[
         times[name].append(row.at)
         if row.kind == "verdict":
             judged[name].add(row.group_id)
-    given = [(row.handed_in_by, row.group_id, row.handed_in) for row in groups]
+    given = [(row.submitted_by, row.group_id, row.submitted) for row in groups]
     given += [
-        (annotation.person, annotation.copy_id, annotation.handed_in) for annotation in annotations
+        (annotation.person, annotation.copy_id, annotation.submitted) for annotation in annotations
     ]
     for name, group, at in given:
         if at is not None:
-            handed_in[name].add(group)
+            submitted[name].add(group)
             times[name].append(at)
-    return [_pace(name, times[name], judged, handed_in) for name in sorted(times)]
+    return [_pace(name, times[name], judged, submitted) for name in sorted(times)]
 
 
 def _pace(
     name: str,
     times: Iterable[str],
     judged: Mapping[str, set[int]],
-    handed_in: Mapping[str, set[int]],
+    submitted: Mapping[str, set[int]],
 ) -> Pace:
-    done, given = judged.get(name, set()), handed_in.get(name, set())
+    done, given = judged.get(name, set()), submitted.get(name, set())
     return Pace(name, len(given), len(done), len(done | given), worked(times).total_seconds() / 60)
 
 

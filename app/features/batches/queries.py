@@ -42,7 +42,7 @@ _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
 # What each "next" and each minute of an open page asks is put together once: that takes longer than
 # to answer it.
 _BATCH = _BATCHES.where(BatchModel.id == bindparam("id"))
-_GROUP = select(*BatchGroupModel.__table__.columns).where(
+_GROUP = select(*(column.label(column.key) for column in BatchGroupModel.__table__.columns)).where(
     BatchGroupModel.batch_id == bindparam("batch"), BatchGroupModel.group_id == bindparam("group")
 )
 _LEASES_ON = _LEASES.where(
@@ -61,14 +61,14 @@ _PEOPLE = (
     .where(BatchPersonModel.batch_id.in_(_IDS))
     .order_by(PersonModel.name)
 )
-_WAITS = BatchGroupModel.handed_in.is_not(None) & BatchGroupModel.settled.is_(None)
+_WAITS = BatchGroupModel.submitted.is_not(None) & BatchGroupModel.settled.is_(None)
 _COUNT = (
     select(
         BatchGroupModel.batch_id,
         func.count().label("groups"),
-        func.sum(case((_WAITS, 1), else_=0)).label("handed_in"),
+        func.sum(case((_WAITS, 1), else_=0)).label("submitted"),
         func.count(BatchGroupModel.settled).label("settled"),
-        func.max(func.coalesce(BatchGroupModel.settled, BatchGroupModel.handed_in)).label("last"),
+        func.max(func.coalesce(BatchGroupModel.settled, BatchGroupModel.submitted)).label("last"),
     )
     .where(BatchGroupModel.batch_id.in_(_IDS))
     .group_by(BatchGroupModel.batch_id)
@@ -161,7 +161,10 @@ def groups_given(session: Session, dataset_id: int) -> set[int]:
 def groups_of(session: Session, batch_id: int) -> Sequence[Any]:
     """Every group of a batch in order, with its ``number``."""
     statement = (
-        select(*BatchGroupModel.__table__.columns, QueueModel.number)
+        select(
+            *(column.label(column.key) for column in BatchGroupModel.__table__.columns),
+            QueueModel.number,
+        )
         .join(QueueModel, QueueModel.group_id == BatchGroupModel.group_id)
         .where(BatchGroupModel.batch_id == batch_id)
         .order_by(BatchGroupModel.place)
@@ -175,15 +178,15 @@ def group_in(session: Session, batch_id: int, group_id: int) -> BatchGroupModel 
 
 
 def groups_returned(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
-    """Rows (batch_id, group_id) of what was handed back to a person and waits for them, in order."""
+    """Rows (batch_id, group_id) of what was returned to a person and waits for them, in order."""
     table = BatchGroupModel
-    back = (table.handed_in_by == person, table.handed_in.is_(None), table.settled.is_(None))
+    back = (table.submitted_by == person, table.submitted.is_(None), table.settled.is_(None))
     statement = select(table.batch_id, table.group_id).where(table.batch_id.in_(batch_ids), *back)
     return session.execute(statement.order_by(table.batch_id, table.place)).all()
 
 
 def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, Any]:
-    """Of each batch ``groups``, ``handed_in`` (and not settled), ``settled``, and ``last``, when
+    """Of each batch ``groups``, ``submitted`` (and not settled), ``settled``, and ``last``, when
     something of it was done last."""
     return {row.batch_id: row for row in session.execute(_COUNT, {"ids": list(batch_ids)})}
 
@@ -202,7 +205,7 @@ def mark_submitted(
     ``returned``: it goes back to them, so that their name stays with it.
     """
     where = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
-    values = {"handed_in": at, "handed_in_by": by if at is not None or returned else None}
+    values = {"submitted": at, "submitted_by": by if at is not None or returned else None}
     session.execute(update(BatchGroupModel).where(*where).values(**values))
 
 
@@ -213,10 +216,10 @@ def waiting_group(
     person: str,
     at: str,
     *,
-    handed_in: bool | None,
+    submitted: bool | None,
     after: int,
 ) -> Any | None:
-    """The group (group_id, handed_in, handed_in_by) that a person would take next, if there is one.
+    """The group (group_id, submitted, submitted_by) that a person would take next, if there is one.
 
     Args:
         session: A write session, so that nobody else takes it meanwhile.
@@ -225,20 +228,20 @@ def waiting_group(
         person: Who asks. What others have open, in any batch, is left out, and what is hidden from
             whoever asks.
         at: Now.
-        handed_in: Whether it must have been handed in, or must not; None: either.
+        submitted: Whether it must have been submitted, or must not; None: either.
         after: Place after which to look first, and which is never meant; what else the person has
             open comes last then: they may have it in another window, or had it in one that is gone.
             0: what they have open comes first.
     """
     given = {"batch": batch_id, "person": person, "at": at, "after": after}
-    waiting = _waiting(handed_in, bool(after))
+    waiting = _waiting(submitted, bool(after))
     if seen := seen_in(dataset_id, BatchGroupModel.group_id):
         waiting = waiting.where(*seen)
     return session.execute(waiting, given).one_or_none()
 
 
 @cache
-def _waiting(handed_in: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
+def _waiting(submitted: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
     """Made once for each case: it takes longer to put together than to answer."""
     table = BatchGroupModel
     person: BindParameter[str] = bindparam("person")
@@ -246,18 +249,22 @@ def _waiting(handed_in: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
     lasts = LeaseModel.until > bindparam("at")
     mine, others = _leased(LeaseModel.person == person, lasts), LeaseModel.person != person
     where = [table.batch_id == bindparam("batch"), table.settled.is_(None), ~_leased(others, lasts)]
-    if handed_in is not None:
-        where.append(table.handed_in.is_not(None) if handed_in else table.handed_in.is_(None))
-    # What somebody handed in themselves, and what was handed back to others, comes last for them.
-    theirs = table.handed_in_by == person
+    if submitted is not None:
+        where.append(table.submitted.is_not(None) if submitted else table.submitted.is_(None))
+    # What somebody submitted themselves, and what was returned to others, comes last for them.
+    theirs = table.submitted_by == person
     back = case((theirs, -1), else_=1)
-    waits = case((table.handed_in.is_not(None), case((theirs, 1), else_=0)), else_=back)
-    order: list[ColumnElement[Any]] = [case((table.handed_in_by.is_(None), 0), else_=waits)]
+    waits = case((table.submitted.is_not(None), case((theirs, 1), else_=0)), else_=back)
+    order: list[ColumnElement[Any]] = [case((table.submitted_by.is_(None), 0), else_=waits)]
     if goes_on:
         where.append(table.place != after)
         order.append(case((table.place > after, 0), else_=1))
     order.insert(0, case((mine, int(goes_on)), else_=int(not goes_on)))
-    row = (table.group_id, table.handed_in, table.handed_in_by)
+    row = (
+        table.group_id,
+        table.submitted.label("submitted"),
+        table.submitted_by.label("submitted_by"),
+    )
     return select(*row).where(*where).order_by(*order, table.place).limit(1)
 
 

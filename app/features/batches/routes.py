@@ -272,7 +272,7 @@ def withdraw_submission(
 def return_group(
     batch: Id, group: Id, why: ReturnReason, services: AppServices, actor: Actor, members: Members
 ) -> Lease:
-    """Give a group back to the annotator who handed it in, and tell them why."""
+    """Give a group back to the annotator who submitted it, and tell them why."""
     worker = members.of_batch(services.store, batch)
     lease = Leases(services.store).return_group(batch, group, worker, why.reason, actor=actor)
     return _announced(services, lease)

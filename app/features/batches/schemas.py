@@ -98,7 +98,7 @@ class WorkBatchDocument(Document):
     reviewers: list[str]
     groups: int
     waiting: int = Field(description="Groups that are neither submitted nor judged.")
-    handed_in: int = Field(description="Groups that wait for a verdict.")
+    submitted: int = Field(description="Groups that wait for a verdict.")
     settled: int = Field(description="Groups that are complete.")
     last: datetime | None = Field(description="When a group was last submitted or completed.")
 
@@ -141,8 +141,8 @@ class LeaseDocument(Document):
     part: Part | None = Field(description="What they do with it.")
     until: datetime | None = Field(description="When the lease ends unless it is taken again.")
     here: list[PresenceDocument] = Field(description="People who have the group open.")
-    handed_in_by: str | None = Field(description="Person who submitted it; null: not submitted.")
-    handed_back: ReturnedGroup | None = Field(
+    submitted_by: str | None = Field(description="Person who submitted it; null: not submitted.")
+    returned: ReturnedGroup | None = Field(
         description="Why its annotator has it back; null: they have not."
     )
     place: int | None = Field(
@@ -161,7 +161,7 @@ class MyBatchDocument(Document):
     batch: WorkBatchDocument
     parts: list[Part]
     left: int = Field(description="Groups that one may still get.")
-    handed_back: list[ReturnedGroup] = Field(
+    returned: list[ReturnedGroup] = Field(
         description="Submitted groups that were returned to the person, in the order of the batch."
     )
 

@@ -104,8 +104,8 @@ class Batch:
     Attributes:
         annotators, reviewers: Names; nobody: every reviewer of the dataset may review, and nobody
             is asked to annotate.
-        groups, handed_in, settled: How many there are, wait for a verdict, and are done.
-        last: When one of them was handed in or done last.
+        groups, submitted, settled: How many there are, wait for a verdict, and are done.
+        last: When one of them was submitted or done last.
         here: Who has which group open.
     """
 
@@ -125,7 +125,7 @@ class Batch:
     annotators: list[str] = field(default_factory=list)
     reviewers: list[str] = field(default_factory=list)
     groups: int = 0
-    handed_in: int = 0
+    submitted: int = 0
     settled: int = 0
     last: str | None = None
     here: list[Presence] = field(default_factory=list)
@@ -138,7 +138,7 @@ class Batch:
     @property
     def waiting(self) -> int:
         """Groups that are neither submitted nor judged."""
-        return self.groups - self.handed_in - self.settled
+        return self.groups - self.submitted - self.settled
 
 
 @dataclass(frozen=True)
@@ -148,15 +148,15 @@ class BatchGroup:
     Attributes:
         number: Its place in the dataset.
         place: Its place in the batch, from 1.
-        handed_in_by: Also after it was returned to them: then ``handed_in`` is None.
+        submitted_by: Also after it was returned to them: then ``submitted`` is None.
         here: Who has it open.
     """
 
     group: int
     number: int
     place: int
-    handed_in: Moment | None
-    handed_in_by: str | None
+    submitted: Moment | None
+    submitted_by: str | None
     settled: Moment | None
     here: list[str]
 
@@ -191,7 +191,7 @@ def list_batch_groups(store: Store, batch_id: int) -> list[BatchGroup]:
             here[one.group].append(one.person)
         return [
             BatchGroup(
-                row.group_id, row.number, row.place, row.handed_in, row.handed_in_by,
+                row.group_id, row.number, row.place, row.submitted, row.submitted_by,
                 row.settled, here[row.group_id],
             )
             for row in groups_of(session, batch_id)
@@ -353,7 +353,7 @@ def _batches(session: Session, rows: Sequence[Any], with_here: bool = True) -> l
                 reviewers=names[row.id, Part.REVIEWER],
                 # A dataset that begins again leaves a batch without groups.
                 groups=count.groups if count else 0,
-                handed_in=count.handed_in if count else 0,
+                submitted=count.submitted if count else 0,
                 settled=count.settled if count else 0,
                 last=count.last if count else None,
                 here=here[row.id],

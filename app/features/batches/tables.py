@@ -49,8 +49,8 @@ class BatchPersonModel(Base):
 class BatchGroupModel(Base):
     """A group of a batch, at its ``place`` (from 1).
 
-    ``handed_in`` is when an annotator said that it is done, NULL before; ``handed_in_by`` names them,
-    also after it was handed back to them. ``settled`` is when its work in this batch was over.
+    ``submitted`` is when an annotator said that it is done, NULL before; ``submitted_by`` names them,
+    also after it was returned to them. ``settled`` is when its work in this batch was over.
     """
 
     __tablename__ = "batch_group"
@@ -73,8 +73,8 @@ class BatchGroupModel(Base):
         ForeignKey("groups.id", ondelete="CASCADE"), primary_key=True
     )
     place: Mapped[int]
-    handed_in: Mapped[str | None]
-    handed_in_by: Mapped[str | None]
+    submitted: Mapped[str | None] = mapped_column("handed_in", key="submitted")
+    submitted_by: Mapped[str | None] = mapped_column("handed_in_by", key="submitted_by")
     settled: Mapped[str | None]
 
 

@@ -14,6 +14,8 @@ from app.db.idempotency import has_key, read_progress, save_progress
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
+from app.features.imports.upload_parts import PartWriter as PartWriter
+from app.features.imports.upload_parts import begin_in_parts as begin_in_parts
 from app.features.imports.upload_queries import Upload as Upload
 from app.features.imports.upload_queries import UploadWriter as UploadWriter
 from app.features.imports.upload_queries import (
@@ -179,6 +181,18 @@ def finish_upload(writer: UploadWriter) -> Upload:
         StorageError: The disk refuses.
     """
     return writer.finish(guess_format)
+
+
+def begin_part(settings: Settings, upload_id: str, offset: int, declared: int) -> PartWriter:
+    """Begin to take a part of an upload, of which its sender says how many bytes it has.
+
+    Raises:
+        TooLargeError: It is longer than the settings allow.
+        NotFoundError: There is no such upload.
+        ConflictError: Bytes before it are missing.
+    """
+    require_size(settings, declared)
+    return PartWriter(settings, upload_id, offset, guess_format)
 
 
 def find_upload(settings: Settings, upload_id: str) -> Upload:

@@ -15,6 +15,9 @@ from starlette.requests import ClientDisconnect
 from app.errors import InputError, OverloadedError
 from app.features.imports.folders import (
     FolderListing,
+    PartWriter,
+    begin_in_parts,
+    begin_part,
     begin_upload,
     delete_sent,
     find_upload,
@@ -27,6 +30,7 @@ from app.features.imports.schemas import FolderDocument, ImportBody, UploadDocum
 from app.features.imports.upload_queries import Upload, UploadWriter
 from app.features.imports.upload_quota import quota_of, used_bytes
 from app.features.jobs.queries import Job
+from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, DryRun, Sees
 from app.http.job_responses import by_job, job_answer
@@ -92,9 +96,12 @@ def start_import(
 
 uploads_router = APIRouter(prefix="/uploads", tags=["imports"], route_class=Route)
 T = TypeVar("T")
+Writer = TypeVar("Writer", UploadWriter, PartWriter)
 
 CHUNK = 1024 * 1024
 """Bytes that are gathered before they are written."""
+PART_CHUNK = 4 * CHUNK
+"""The same of a part, of which each writing is put on the disk: so much is sent again after a stop."""
 DISK_THREADS = 1
 """For the files of all uploads: each takes turns with the event loop at each call of the disk. Beside a
 flood of uploads an editor's slowest answers took 3.0 to 3.8 times as long as alone with two, and take
@@ -105,6 +112,25 @@ LOOK_SECONDS = 0.25
 UploadId = Annotated[str, Path(max_length=64)]
 FileName = Annotated[
     str, Query(min_length=1, max_length=255, description="Name of the file; its ending matters.")
+]
+Size = Annotated[
+    int | None,
+    Query(
+        ge=1,
+        le=MAX_ID,
+        description="Bytes of a file that is sent in parts, by PATCH; the body is then empty.",
+    ),
+]
+Mark = Annotated[
+    str,
+    Query(
+        max_length=200,
+        description="Tells a file that is sent in parts from others of its name and size: when it was "
+        "changed, or its digest.",
+    ),
+]
+PartOffset = Annotated[
+    int, Query(ge=0, le=MAX_ID, description="Place in the file of the first byte of the body.")
 ]
 BODY: dict[str, Any] = {
     "requestBody": {
@@ -131,18 +157,59 @@ BODY: dict[str, Any] = {
 @may(Action.LEAD, where=Where.SOMEWHERE)
 @limit(UPLOADS)
 async def upload_file(
-    request: Request, services: AppServices, actor: Actor, name: FileName, response: Response
+    request: Request,
+    services: AppServices,
+    actor: Actor,
+    name: FileName,
+    response: Response,
+    size: Size = None,
+    mark: Mark = "",
 ) -> UploadDocument:
-    """Take a file, to import it or its predictions; the same file again is the same upload."""
-    upload = await _receive(request, services, name, actor)
+    """Take a file, to import it or its predictions; the same file again is the same upload.
+
+    With `size` it comes in parts, and the answer's `bytes` says how many are here already.
+    """
+    settings = services.settings
+    if size is None:
+        begin = partial(begin_upload, settings, name, _declared(request), actor)
+        upload = await _receive(request, services, begin, finish_upload)
+    else:
+        upload = await _on_disk(partial(begin_in_parts, settings, name, size, mark, by=actor))
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
     return UploadDocument.model_validate(upload)
 
 
-async def _receive(request: Request, services: Services, name: str, actor: str) -> Upload:
-    """Write what comes, off the event loop; nothing stays of what does not come whole."""
-    writer = await _on_disk(begin_upload, services.settings, name, _declared(request), actor)
-    writing = asyncio.ensure_future(_write(request, writer))
+@uploads_router.patch(
+    "/{upload}",
+    operation_id="sendPart",
+    openapi_extra=BODY,
+    responses=responses(404, 409, 413, 415, 507),
+)
+@may(Action.LEAD, upload=OwnedKind.UPLOAD)
+@limit(UPLOADS)
+async def send_part(
+    upload: UploadId, request: Request, services: AppServices, offset: PartOffset = 0
+) -> UploadDocument:
+    """Add bytes to a file that is sent in parts; `bytes` of the answer are on the disk.
+
+    What is here already may be sent again. A part that was cut off stays as far as it came: ask how far
+    that is. When `bytes` is `size`, the file is whole.
+    """
+    begin = partial(begin_part, services.settings, upload, offset, _declared(request))
+    found = await _receive(request, services, begin, PartWriter.finish, PART_CHUNK)
+    return UploadDocument.model_validate(found)
+
+
+async def _receive(
+    request: Request,
+    services: Services,
+    begin: Callable[[], Writer],
+    finish: Callable[[Writer], Upload],
+    at_once: int = CHUNK,
+) -> Upload:
+    """Write what comes, off the event loop; of what does not come whole, what its writer leaves there."""
+    writer = await _on_disk(begin)
+    writing = asyncio.ensure_future(_write(request, writer, at_once))
     try:
         while not writing.done():
             await asyncio.wait({writing}, timeout=LOOK_SECONDS)
@@ -151,7 +218,7 @@ async def _receive(request: Request, services: Services, name: str, actor: str) 
                     "the server is shutting down", hint="Send the file again in a moment."
                 )
         writing.result()
-        return await _on_disk(finish_upload, writer)
+        return await _on_disk(finish, writer)
     except BaseException as error:
         with CancelScope(shield=True):
             writing.cancel()
@@ -169,13 +236,18 @@ def _declared(request: Request) -> int:
     return int(declared) if known else 0
 
 
-async def _write(request: Request, writer: UploadWriter) -> None:
+async def _write(request: Request, writer: UploadWriter | PartWriter, at_once: int) -> None:
     waiting = bytearray()
-    async for chunk in request.stream():
-        waiting += chunk
-        if len(waiting) >= CHUNK:
-            await _on_disk(writer.write, bytes(waiting))
-            waiting.clear()
+    try:
+        async for chunk in request.stream():
+            waiting += chunk
+            if len(waiting) >= at_once:
+                await _on_disk(writer.write, bytes(waiting))
+                waiting.clear()
+    except (ClientDisconnect, asyncio.CancelledError):
+        # Of a part that is cut off, what has come is kept.
+        await _on_disk(writer.write, bytes(waiting))
+        raise
     await _on_disk(writer.write, bytes(waiting))
 
 

@@ -143,9 +143,16 @@ class FolderDocument(ListDocument[FolderItem]):
 class UploadDocument(Document):
     """An uploaded file."""
 
-    id: str = Field(description="Digest of its name and content.")
+    id: str = Field(
+        description="Digest of its name and content; of one that comes in parts, of what its sender "
+        "says of it."
+    )
     name: str
-    bytes: int
+    bytes: int = Field(description="How many are here.")
+    size: int = Field(
+        validation_alias="whole_size",
+        description="How many the file has; more than `bytes` until the last part has come.",
+    )
     created: datetime
     kept: bool = Field(description="Whether a dataset reads frames from it; it then stays.")
     format: str | None = Field(description="Format that it most likely has.")

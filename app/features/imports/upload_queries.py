@@ -26,7 +26,7 @@ from app.db.leftovers import PART, clear
 from app.db.locks import require_lock
 from app.db.session import now
 from app.durable import replace_file, sync
-from app.errors import InputError, NotFoundError, StorageError, TooLargeError
+from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
 from app.features.imports.upload_quota import quota_of, require_room, used_bytes
 from app.finite import json_text
 
@@ -36,7 +36,7 @@ _MAX_NAME = 120
 _MAX_SUFFIX = 20
 """With its dot; what is longer tells no kind of file, and is cut like the rest of a name."""
 _RECORD = "upload.json"
-_CONTENT = "content"
+CONTENT = "content"
 _CHUNK = 1 << 20
 _STEP = 1 << 26
 """Bytes that are reserved at a time where nobody says how many come."""
@@ -54,6 +54,7 @@ class Upload:
         kept: Whether a dataset reads frames from it, so that it does not expire.
         format: What it most likely holds, as was seen when it came.
         by: Who sent it, each of whom it belongs to.
+        size: How many bytes it has once all parts of it are here; None: it came in one piece.
     """
 
     id: str
@@ -63,10 +64,16 @@ class Upload:
     kept: bool = False
     format: str | None = None
     by: tuple[str, ...] = ()
+    size: int | None = None
+
+    @property
+    def whole_size(self) -> int:
+        """How many bytes the file has."""
+        return self.bytes if self.size is None else self.size
 
 
 @contextmanager
-def _writing(settings: Settings) -> Iterator[None]:
+def writing(settings: Settings) -> Iterator[None]:
     """Held from reading a record until what follows from it is written, among all processes.
 
     Raises:
@@ -74,7 +81,7 @@ def _writing(settings: Settings) -> Iterator[None]:
     """
     with _WRITING:
         with _storage_errors():
-            _make_folder(settings)
+            make_folder(settings.uploads)
             folder = os.open(settings.uploads, os.O_RDONLY | os.O_CLOEXEC)
         try:
             require_lock(folder, "has been writing uploads", WRITING_SECONDS)
@@ -83,11 +90,11 @@ def _writing(settings: Settings) -> Iterator[None]:
             os.close(folder)
 
 
-def _make_folder(settings: Settings) -> None:
+def make_folder(uploads: Path) -> None:
     """Make the folder of all uploads, if need be, so that it is there after a power cut."""
-    if not settings.uploads.is_dir():
-        settings.uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
-        sync(settings.uploads.parent)
+    if not uploads.is_dir():
+        uploads.mkdir(mode=0o700, parents=True, exist_ok=True)
+        sync(uploads.parent)
 
 
 def upload_path(settings: Settings, upload_id: str) -> Path:
@@ -95,9 +102,20 @@ def upload_path(settings: Settings, upload_id: str) -> Path:
 
     Raises:
         NotFoundError: There is none of that id, or it has expired.
+        ConflictError: A part of it is missing.
     """
     upload = get_upload(settings, upload_id)
-    content = settings.uploads / upload.id / _CONTENT
+    if upload.bytes < upload.whole_size:
+        raise ConflictError(
+            f"only {upload.bytes:,} of {upload.whole_size:,} bytes of {upload.name} are here",
+            hint="Send the rest of it first.",
+        )
+    return content_path(settings, upload)
+
+
+def content_path(settings: Settings, upload: Upload) -> Path:
+    """Where the file of an upload is, which may not be whole."""
+    content = settings.uploads / upload.id / CONTENT
     # Uploads of earlier versions have their file beside the record.
     return (content if content.is_dir() else content.parent) / upload.name
 
@@ -108,7 +126,7 @@ def get_upload(settings: Settings, upload_id: str) -> Upload:
     Raises:
         NotFoundError: There is none of that id, or it has expired.
     """
-    upload = _read(settings.uploads / upload_id) if _ID.fullmatch(upload_id) else None
+    upload = read_upload(settings.uploads / upload_id) if _ID.fullmatch(upload_id) else None
     if upload is None:
         raise NotFoundError(
             "there is no such upload", hint="Uploads expire after some days; send the file again."
@@ -123,11 +141,11 @@ def list_uploads(settings: Settings) -> list[Upload]:
 
 def keep_upload(settings: Settings, upload_id: str) -> None:
     """Let an upload never expire: a dataset reads frames from it."""
-    with _writing(settings):
+    with writing(settings):
         upload = get_upload(settings, upload_id)
         if not upload.kept:
             with _storage_errors():
-                _write_record(settings.uploads / upload_id, replace(upload, kept=True))
+                write_record(settings.uploads / upload_id, replace(upload, kept=True))
 
 
 def delete_upload(
@@ -144,7 +162,7 @@ def delete_upload(
         NotFoundError: There is none of that id.
         InputError: A dataset reads frames from it.
     """
-    with _writing(settings):
+    with writing(settings):
         upload = get_upload(settings, upload_id)
         require_unread(upload)
         others = tuple(actor for actor in upload.by if not mine(actor))
@@ -154,7 +172,7 @@ def delete_upload(
                 sync(settings.uploads)
             return
         with _storage_errors():
-            _write_record(settings.uploads / upload_id, replace(upload, by=others))
+            write_record(settings.uploads / upload_id, replace(upload, by=others))
 
 
 def require_unread(upload: Upload) -> None:
@@ -169,7 +187,7 @@ def expire_uploads(settings: Settings) -> int:
     gone = 0
     for folder in [path for path in settings.uploads.glob("*") if _ID.fullmatch(path.name)]:
         if _is_over(folder, limit):
-            with _writing(settings):
+            with writing(settings):
                 if _is_over(folder, limit):
                     _remove(folder)
                     gone += 1
@@ -178,14 +196,17 @@ def expire_uploads(settings: Settings) -> int:
 
 def _is_over(folder: Path, limit: datetime) -> bool:
     """Whether nobody needs a folder that has been there since before some moment."""
-    upload = _read(folder)
-    if upload is not None:
-        return not upload.kept and datetime.fromisoformat(upload.created) < limit
+    upload = read_upload(folder)
     try:
+        # Each part that comes is written down.
         since = datetime.fromtimestamp(folder.lstat().st_mtime, UTC)
     except FileNotFoundError:
         return False
-    return since < limit and not _may_be_kept(folder)
+    if upload is None:
+        return since < limit and not _may_be_kept(folder)
+    if upload.size is None:
+        since = datetime.fromisoformat(upload.created)
+    return not upload.kept and since < limit
 
 
 def _may_be_kept(folder: Path) -> bool:
@@ -201,18 +222,22 @@ def _may_be_kept(folder: Path) -> bool:
 
 def _all_uploads(settings: Settings) -> Iterator[Upload]:
     for record in settings.uploads.glob(f"*/{_RECORD}"):
-        upload = _read(record.parent)
+        upload = read_upload(record.parent)
         if upload is not None:
             yield upload
 
 
-def _read(folder: Path) -> Upload | None:
+def read_upload(folder: Path) -> Upload | None:
     """The upload of a folder; None where its record is missing or is none of ours."""
     try:
         values = json.loads((folder / _RECORD).read_bytes())
         upload = Upload(**{**values, "by": tuple(values.get("by", ()))})
         named = upload.id == folder.name and upload.name == safe_name(upload.name)
         sound = named and datetime.fromisoformat(upload.created).tzinfo is not None
+        if sound and upload.size is not None:
+            # A copy of a home that was being written to may have the record of more than it has.
+            there = (folder / CONTENT / upload.name).stat().st_size
+            upload = replace(upload, bytes=min(upload.bytes, there))
     except (OSError, ValueError, TypeError, AttributeError, InputError):
         return None
     return upload if sound else None
@@ -290,7 +315,7 @@ class UploadWriter:
     def _reserve(self, size: int, quota: int) -> None:
         """Reserve so many bytes of the sender's quota, or some more where nobody says how many come."""
         by = self._by or ""
-        with _writing(self._settings):
+        with writing(self._settings):
             used = used_bytes(self._settings, by, but=self._folder)
             require_room(self._settings, size, quota, used)
             more = 0 if size > self.bytes else _STEP
@@ -300,13 +325,13 @@ class UploadWriter:
             # Without an id it is none that is listed; ``finish`` writes the one that counts.
             draft = Upload("", self._name, self._reserved, now(), by=(by,))
             with _storage_errors():
-                _write_record(self._folder, draft)
+                write_record(self._folder, draft)
 
     def _open(self) -> None:
         with _storage_errors():
             settings = self._settings
-            _make_folder(settings)
-            content = self._folder / _CONTENT
+            make_folder(settings.uploads)
+            content = self._folder / CONTENT
             content.mkdir(mode=0o700, parents=True)
             self._folder.chmod(0o700)
             self._file = (content / self._name).open("xb")
@@ -349,8 +374,8 @@ class UploadWriter:
             return shared
         upload = replace(upload, format=guess(Path(self._file.name)), by=(by,) if by else ())
         with _storage_errors():
-            sync(self._folder / _CONTENT)
-            _write_record(self._folder, upload)
+            sync(self._folder / CONTENT)
+            write_record(self._folder, upload)
             return self._publish(upload)
 
     def _publish(self, upload: Upload) -> Upload:
@@ -391,17 +416,18 @@ def require_size(settings: Settings, size: int) -> None:
 
 def _shared(settings: Settings, upload_id: str, by: str | None = None) -> Upload | None:
     """An upload that somebody has sent again, which is theirs as well; None where it is not there."""
-    with _writing(settings):
-        upload = _read(settings.uploads / upload_id)
+    with writing(settings):
+        upload = read_upload(settings.uploads / upload_id)
         if upload is None or by is None or by in upload.by:
             return upload
         shared = replace(upload, by=(*upload.by, by))
         with _storage_errors():
-            _write_record(settings.uploads / upload_id, shared)
+            write_record(settings.uploads / upload_id, shared)
         return shared
 
 
-def _write_record(folder: Path, upload: Upload) -> None:
+def write_record(folder: Path, upload: Upload) -> None:
+    """Put the record of an upload in its place, and on the disk."""
     replace_file(folder / _RECORD, json_text(asdict(upload), ascii_=True).encode())
 
 
@@ -413,12 +439,17 @@ def _remove(folder: Path) -> None:
     clear(aside)
 
 
+def is_full_disk(error: OSError) -> bool:
+    """Whether an error says that a disk, or what one user may have of it, is full."""
+    return error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
 @contextmanager
 def _storage_errors() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        full = is_full_disk(error)
         problem = "the disk is full" if full else f"the disk refuses ({error.strerror})"
         raise StorageError(
             f"{problem}: the upload was not kept", hint="Free some space and send it again."

@@ -56,7 +56,7 @@ def _bytes_for(record: Path, person: str) -> int:
     try:
         values = json.loads(record.read_bytes())
         theirs = any(person_of(actor) == person for actor in values["by"])
-        size = int(values["bytes"])
+        size = int(values.get("size") or values["bytes"])
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return 0
     if not theirs or not record.parent.name.endswith(".part"):

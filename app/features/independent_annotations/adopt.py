@@ -48,7 +48,7 @@ from app.soccer.group import Group, Station
 
 def adopt_annotation(
     store: Store,
-    take_id: int,
+    annotation_id: int,
     *,
     actor: str,
     paint: PaintFollower | None = None,
@@ -61,11 +61,11 @@ def adopt_annotation(
     ``also`` writes what becomes true with it into the same transaction.
 
     Raises:
-        NotFoundError: There is no such take.
-        ConflictError: It is not handed in, was decided about, or is of a gold group.
+        NotFoundError: There is no such annotation.
+        ConflictError: It is not submitted, was decided about, or is of a gold group.
         StaleRevisionError: Somebody changed the original at the same moment.
     """
-    annotation = get_annotation(store, take_id)
+    annotation = get_annotation(store, annotation_id)
     _require_ready(annotation)
     # First: what changes the original from here on is seen by the edit that builds on it.
     etag = current_etag(store, annotation.group_id)
@@ -77,12 +77,12 @@ def adopt_annotation(
     after: list[GroupState] = []
 
     def settle(session: Session) -> None:
-        _require_ready(read_annotation(session, take_id))
+        _require_ready(read_annotation(session, annotation_id))
         _adopt_stations(session, original, copy, annotation.person)
         give_verdict_of(session, annotation, actor=annotation.person)
         at = now()
-        update_annotation(session, take_id, settled=at)
-        body = {"take": take_id, "person": annotation.person, "did": "adopted"}
+        update_annotation(session, annotation_id, settled=at)
+        body = {"take": annotation_id, "person": annotation.person, "did": "adopted"}
         append(session, [Entry(KIND, actor, at, body, original.dataset_id, original.id)])
         if also is not None:
             also(session)
@@ -156,7 +156,7 @@ def _line_changes(before: Station, after: Station) -> SetStationLines | None:
 def _require_ready(annotation: IndependentAnnotation) -> None:
     if annotation.kind == GOLD:
         raise ConflictError("this is an annotation of a gold group, whose true values are known")
-    if annotation.handed_in is None:
+    if annotation.submitted is None:
         raise ConflictError(f"{annotation.person} has not submitted this yet")
     if annotation.settled is not None:
         raise ConflictError("this annotation was adjudicated already")
@@ -194,7 +194,7 @@ def give_verdict_of(
     """Give the original the verdict of an independent annotation's copy, where there is one.
 
     Args:
-        session: The write session that takes the take over; what waits for the verdict is told
+        session: The write session that takes the annotation over; what waits for the verdict is told
             once the queue is refreshed.
         annotation: The independent annotation.
         actor: Whose verdict it is.

@@ -90,14 +90,14 @@ class GoldResult:
     """What one person made of a gold group: what they submitted first, whatever was returned since.
 
     Attributes:
-        handed_in: When they submitted it first.
+        submitted: When they submitted it first.
         right: Whether they judged as is true, if they did.
         submissions: How often they submitted it: more than once where a lead returned it.
     """
 
     group: int
     label: str
-    handed_in: str
+    submitted: str
     verdict: str | None
     true_verdict: str
     right: bool | None
@@ -223,7 +223,7 @@ def read_report(store: Store, dataset: str | int) -> GoldReport:
         submitted = submissions_of(session, [annotation.copy_id for annotation in annotations])
         for annotation in annotations:
             made = submitted.get(annotation.copy_id, [])
-            if annotation.handed_in is None and not made:
+            if annotation.submitted is None and not made:
                 continue
             gold, truth = known[annotation.group_id]
             result = _result(
@@ -330,9 +330,9 @@ def _first_submission(
     """What somebody submitted first of a copy; as the copy is now where no entry holds it."""
     (state,) = read_states(session, [annotation.copy_id])
     if not made:
-        # Whoever has submitted nothing of it has handed it in.
-        assert annotation.handed_in is not None
-        return _Submission(annotation.handed_in, annotation.verdict, state.group, state.solution)
+        # Whoever has submitted nothing of it has submitted it.
+        assert annotation.submitted is not None
+        return _Submission(annotation.submitted, annotation.verdict, state.group, state.solution)
     first = made[0]
     stored = need_group(session, annotation.copy_id)
     if first["inputs_hash"] == stored.inputs_hash:
@@ -356,7 +356,7 @@ def _result(gold: GoldGroup, truth: Json, submission: _Submission, submissions: 
     return GoldResult(
         group=gold.group,
         label=gold.label,
-        handed_in=submission.at,
+        submitted=submission.at,
         verdict=verdict,
         true_verdict=truth["verdict"],
         right=verdict == truth["verdict"] if judged and verdict in JUDGED else None,
@@ -374,7 +374,7 @@ def true_views(truth: Json) -> dict[str, TrueView]:
 
 
 def _person(name: str, results: list[GoldResult]) -> PersonResults:
-    results.sort(key=lambda one: one.handed_in)
+    results.sort(key=lambda one: one.submitted)
     judged = [one.right for one in results if one.right is not None]
     low, high = wilson(sum(judged), len(judged))
     return PersonResults(

@@ -241,7 +241,7 @@ def begin_next(
 ) -> IndependentAnnotation | None:
     """The independent annotation that a person shall work on now: the one that is open, else a new one.
 
-    New are groups that they have no take of and that fewer than ``verdicts`` people have, in the
+    New are groups that they have no annotation of and that fewer than ``verdicts`` people have, in the
     batch's order; where gold groups are mixed in by chance, lest an order that is known tells which
     ones they are; or a gold group that they never had. Two who ask at once get what they would have
     got one after the other.
@@ -250,7 +250,7 @@ def begin_next(
         store: The database.
         terms: Of the batch.
         person: Who asks.
-        chance: Which of ``gold_every`` takes is a gold one; None: nobody can know.
+        chance: Which of ``gold_every`` annotations is a gold one; None: nobody can know.
 
     Returns:
         None where there is nothing left for them.
@@ -267,7 +267,7 @@ def _next(
 ) -> IndependentAnnotation | None:
     annotations = annotations_of_batch(session, terms.batch_id, terms.dataset_id)
     mine = [annotation for annotation in annotations if annotation.person == person]
-    waiting = next((annotation for annotation in mine if annotation.handed_in is None), None)
+    waiting = next((annotation for annotation in mine if annotation.submitted is None), None)
     if waiting is not None:
         return waiting
     begun = Counter(row.group_id for row in annotations if row.kind == INDEPENDENT)
@@ -305,12 +305,12 @@ def fresh_outside(
 def is_gold_turn(kinds: Sequence[str], every: int, free: int, chance: Random) -> bool:
     """Whether the independent annotation after these is a gold one: one of each ``every``, at a place by chance.
 
-    The last ones of a batch, which may be fewer, have one among them, too: the last take is a gold
+    The last ones of a batch, which may be fewer, have one among them, too: the last annotation is a gold
     one as often as any other.
 
     Args:
         kinds: Of the independent annotations of a person so far, in order.
-        every: How many takes have one gold group among them.
+        every: How many annotations have one gold group among them.
         free: How many ordinary groups there are left for them.
         chance: Decides where.
     """
@@ -326,7 +326,7 @@ def count_gold_left(kinds: Sequence[str], every: int, free: int, fresh: int) -> 
 
     Args:
         kinds: Of the independent annotations of a person so far, in order.
-        every: How many takes have one gold group among them.
+        every: How many annotations have one gold group among them.
         free: How many ordinary groups there are left for them.
         fresh: How many gold groups they never had.
     """

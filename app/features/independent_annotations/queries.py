@@ -18,11 +18,13 @@ from app.features.queue.tables import QueueModel
 
 GOLD = "gold"
 INDEPENDENT = "independent"
-_ANNOTATIONS = select(*IndependentAnnotationModel.__table__.columns)
+_ANNOTATIONS = select(
+    *(column.label(column.key) for column in IndependentAnnotationModel.__table__.columns)
+)
 # What somebody made of a gold group tells nothing of its own: nobody is to know which one it is.
 _READY = (
     IndependentAnnotationModel.kind == INDEPENDENT,
-    IndependentAnnotationModel.handed_in.is_not(None),
+    IndependentAnnotationModel.submitted.is_not(None),
 )
 _OF_COPY = _ANNOTATIONS.where(IndependentAnnotationModel.copy_id == bindparam("copy"))
 
@@ -48,7 +50,7 @@ class IndependentAnnotation:
     kind: str
     place: int
     begun: str
-    handed_in: str | None
+    submitted: str | None
     verdict: str | None
     settled: str | None
 
@@ -72,28 +74,29 @@ def insert_annotation(
     """Insert an independent annotation that begins now; returns its id."""
     identity = next_id(session, IndependentAnnotationModel)
     values = {"batch_id": batch_id, "group_id": group_id, "copy_id": copy_id, "person": person}
-    ends = dict.fromkeys(("handed_in", "verdict", "settled"))
+    ends = dict.fromkeys(("submitted", "verdict", "settled"))
     row = {"id": identity, **values, "kind": kind, "place": place, "begun": now(), **ends}
     session.execute(insert(IndependentAnnotationModel), [row])
     return identity
 
 
-def find_annotation(session: Session, take_id: int) -> IndependentAnnotation | None:
-    """A take by its id."""
+def find_annotation(session: Session, annotation_id: int) -> IndependentAnnotation | None:
+    """An independent annotation by its id."""
     return next(
-        iter(_takes(session, _ANNOTATIONS.where(IndependentAnnotationModel.id == take_id))), None
+        iter(_takes(session, _ANNOTATIONS.where(IndependentAnnotationModel.id == annotation_id))),
+        None,
     )
 
 
 def annotation_of_copy(session: Session, copy_id: int) -> IndependentAnnotation | None:
-    """The take whose copy a group is; None for an ordinary group."""
+    """The independent annotation whose copy a group is; None for an ordinary group."""
     return next(iter(_takes(session, _OF_COPY, {"copy": copy_id})), None)
 
 
 def closed_copies(session: Session, dataset_id: int) -> set[int]:
-    """Ids of the copies in a dataset that were handed in or settled: nothing in them changes."""
+    """Ids of the copies in a dataset that were submitted or settled: nothing in them changes."""
     closed = or_(
-        IndependentAnnotationModel.handed_in.is_not(None),
+        IndependentAnnotationModel.submitted.is_not(None),
         IndependentAnnotationModel.settled.is_not(None),
     )
     statement = select(IndependentAnnotationModel.copy_id).join(
@@ -103,7 +106,7 @@ def closed_copies(session: Session, dataset_id: int) -> set[int]:
 
 
 def annotations_of_group(session: Session, group_id: int) -> list[IndependentAnnotation]:
-    """The takes of a group in the order in which they began."""
+    """The independent annotations of a group in the order in which they began."""
     mine = IndependentAnnotationModel.group_id == group_id
     return _takes(session, _ANNOTATIONS.where(mine).order_by(IndependentAnnotationModel.id))
 
@@ -111,7 +114,7 @@ def annotations_of_group(session: Session, group_id: int) -> list[IndependentAnn
 def annotations_of_batch(
     session: Session, batch_id: int | None, dataset_id: int
 ) -> list[IndependentAnnotation]:
-    """The takes of a batch (None: of none) of a dataset, in the order in which they began."""
+    """The independent annotations of a batch (None: of none) of a dataset, in the order in which they began."""
     batch = IndependentAnnotationModel.batch_id
     mine = batch.is_(None) if batch_id is None else batch == batch_id
     statement = _ANNOTATIONS.where(
@@ -123,21 +126,21 @@ def annotations_of_batch(
 def count_left(
     session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int
 ) -> tuple[int, int]:
-    """How many takes of a batch a person has begun, and of how many of its groups they may make one.
+    """How many independent annotations of a batch a person has begun, and of how many of its groups they may make one.
 
     ``verdicts`` people may have a group.
     """
     annotation, group = IndependentAnnotationModel, BatchGroupModel
     here = (annotation.batch_id == batch_id, annotation.copy_id.in_(_copies_of(dataset_id)))
     mine, this = annotation.person == person, annotation.group_id == group.group_id
-    ends = (annotation.handed_in.is_(None), annotation.settled.is_(None))
+    ends = (annotation.submitted.is_(None), annotation.settled.is_(None))
     begun_by_others = (
         select(func.count()).where(*here, this, annotation.kind == INDEPENDENT).scalar_subquery()
     )
     free = select(func.count()).where(
         group.batch_id == batch_id,
         group.settled.is_(None),
-        group.handed_in.is_(None),
+        group.submitted.is_(None),
         ~exists().where(*here, this, mine),
         begun_by_others < verdicts,
     )
@@ -156,7 +159,7 @@ def _copies_of(dataset_id: int) -> Select[int]:
 def groups_with_annotations(
     compare: Callable[[Any, float], Any] | None = None, number: float = 0
 ) -> Select[int]:
-    """Ids of groups of which somebody handed in an annotation of their own, or so many people did."""
+    """Ids of groups of which somebody submitted an annotation of their own, or so many people did."""
     statement = (
         select(IndependentAnnotationModel.group_id)
         .where(*_READY)
@@ -166,7 +169,7 @@ def groups_with_annotations(
 
 
 def count_submitted(session: Session, group_ids: Sequence[int]) -> dict[int, int]:
-    """How many people handed in an annotation of their own, by group; groups without are left out."""
+    """How many people submitted an annotation of their own, by group; groups without are left out."""
     statement = select(IndependentAnnotationModel.group_id, func.count()).where(*_READY)
     rows = session.execute(
         statement.where(IndependentAnnotationModel.group_id.in_(group_ids)).group_by(
@@ -177,10 +180,10 @@ def count_submitted(session: Session, group_ids: Sequence[int]) -> dict[int, int
 
 
 def open_annotations(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
-    """Rows (batch_id, group_id) of the copies in batches that somebody has begun and not handed in."""
+    """Rows (batch_id, group_id) of the copies in batches that somebody has begun and not submitted."""
     mine = (
         IndependentAnnotationModel.person == person,
-        IndependentAnnotationModel.handed_in.is_(None),
+        IndependentAnnotationModel.submitted.is_(None),
         IndependentAnnotationModel.settled.is_(None),
     )
     columns = (
@@ -194,7 +197,7 @@ def open_annotations(session: Session, batch_ids: Collection[int], person: str) 
 def annotations_in(
     session: Session, dataset_id: int, person: str | None = None, kind: str | None = None
 ) -> list[IndependentAnnotation]:
-    """The takes of a dataset, of one person or one kind where these are named, oldest first."""
+    """The independent annotations of a dataset, of one person or one kind where these are named, oldest first."""
     statement = _ANNOTATIONS.join(
         GroupModel, GroupModel.id == IndependentAnnotationModel.copy_id
     ).join(CopyDatasetModel, CopyDatasetModel.dataset_id == GroupModel.dataset_id)
@@ -237,11 +240,11 @@ def count_annotations(session: Session, batch_id: int | None, person: str) -> in
     return session.scalar(statement) or 0
 
 
-def update_annotation(session: Session, take_id: int, **values: str | None) -> None:
-    """Write when an independent annotation was handed in, judged or settled."""
+def update_annotation(session: Session, annotation_id: int, **values: str | None) -> None:
+    """Write when an independent annotation was submitted, judged or settled."""
     session.execute(
         update(IndependentAnnotationModel)
-        .where(IndependentAnnotationModel.id == take_id)
+        .where(IndependentAnnotationModel.id == annotation_id)
         .values(**values)
     )
 

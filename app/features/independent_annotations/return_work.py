@@ -1,4 +1,4 @@
-"""Hand back: work that was handed in goes back to its person, with a sentence that says why."""
+"""Return: work that was submitted goes back to its person, with a sentence that says why."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ MAX_REASON = 500
 
 
 def return_annotation(
-    store: Store, take_id: int, reason: str = "", *, actor: str
+    store: Store, annotation_id: int, reason: str = "", *, actor: str
 ) -> DisclosedAnnotation:
-    """Let the person of an annotation that was handed in go on with it, and tell them why.
+    """Let the person of an annotation that was submitted go on with it, and tell them why.
 
     A comparison of it that waits for a decision waits no longer: it is made anew once it is handed
     in again.
 
     Raises:
-        NotFoundError: There is no such take.
-        ConflictError: It is not handed in, or it was decided about.
+        NotFoundError: There is no such annotation.
+        ConflictError: It is not submitted, or it was decided about.
         InputError: There is no sentence, or it is too long.
     """
     checked = checked_reason(reason)
@@ -41,13 +41,13 @@ def return_annotation(
             pointer="/reason",
         )
     with store.write() as session:
-        annotation = read_annotation(session, take_id)
+        annotation = read_annotation(session, annotation_id)
         return_copy(session, annotation)
         copy = annotation.copy_id
         log_return(
             session, KIND, copy, annotation.person, checked, actor=actor, batch=annotation.batch_id
         )
-        back = show(session, read_annotation(session, take_id))
+        back = show(session, read_annotation(session, annotation_id))
         session.respond(back)
         return back
 
@@ -62,7 +62,7 @@ def log_return(
     actor: str,
     batch: int | None,
 ) -> None:
-    """Write into the log that a group was handed back to somebody, and tell them.
+    """Write into the log that a group was returned to somebody, and tell them.
 
     The entry names the group: its history says so, and a page that has it open hears of it.
 
@@ -72,7 +72,7 @@ def log_return(
         group_id: What they worked on; for an annotation of their own, its copy.
         person: Whom it goes back to.
         reason: Why; may be empty.
-        actor: Who hands it back.
+        actor: Who returns it.
         batch: Of which batch it is; None: of none.
     """
     group = need_group(session, group_id)

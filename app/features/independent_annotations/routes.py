@@ -9,8 +9,7 @@ from app.features.agreement.service import after_submission
 from app.features.groups.routes import ETAG, group_answer
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
-from app.features.independent_annotations import gold
-from app.features.independent_annotations import service as takes
+from app.features.independent_annotations import gold, service
 from app.features.independent_annotations.gold import GoldGroup
 from app.features.independent_annotations.known_truth import (
     GoldChoice,
@@ -51,7 +50,7 @@ def list_independent_annotations(
 ) -> IndependentAnnotationList:
     """Own annotations of a dataset's groups: for a lead everybody's, else those of whoever asks."""
     login = login_of(request.scope)
-    found = takes.list_annotations(
+    found = service.list_annotations(
         store,
         dataset,
         lambda dataset_id: login is None or lets(login.roles.role_in(dataset_id), Action.LEAD),
@@ -60,8 +59,8 @@ def list_independent_annotations(
     return IndependentAnnotationList(items=found)
 
 
-def _begun(take: DisclosedAnnotation) -> Response:
-    return document(take, 201)
+def _begun(annotation: DisclosedAnnotation) -> Response:
+    return document(annotation, 201)
 
 
 @annotations_router.post(
@@ -73,9 +72,9 @@ def _begun(take: DisclosedAnnotation) -> Response:
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @responds(_begun)
-def begin(group: Id, store: AppStore, actor: Actor) -> takes.DisclosedAnnotation:
+def begin(group: Id, store: AppStore, actor: Actor) -> service.DisclosedAnnotation:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
-    return takes.begin_annotation(store, group, person=actor)
+    return service.begin_annotation(store, group, person=actor)
 
 
 @annotations_router.get(
@@ -86,9 +85,9 @@ def begin(group: Id, store: AppStore, actor: Actor) -> takes.DisclosedAnnotation
 )
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(LOOKS)
-def get_independent_annotation(group: Id, store: AppStore) -> takes.DisclosedAnnotation:
+def get_independent_annotation(group: Id, store: AppStore) -> service.DisclosedAnnotation:
     """Whose own annotation a group is; 404 for an ordinary group."""
-    return takes.shown(store, takes.get_annotation_of_copy(store, group))
+    return service.shown(store, service.get_annotation_of_copy(store, group))
 
 
 @annotations_router.post(
@@ -101,12 +100,12 @@ def get_independent_annotation(group: Id, store: AppStore) -> takes.DisclosedAnn
 @responds(document)
 def hand_in(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
-) -> takes.DisclosedAnnotation:
+) -> service.DisclosedAnnotation:
     """Submit an independent annotation; a verdict on it does the same. Only a lead can return it."""
     store = services.store
-    annotation = takes.get_annotation_of_copy(store, group)
+    annotation = service.get_annotation_of_copy(store, group)
     background.add_task(after_submission, store, group, services.paint)
-    return takes.submit_annotation(store, annotation.id, actor=actor)
+    return service.submit_annotation(store, annotation.id, actor=actor)
 
 
 @annotations_router.post(
@@ -119,10 +118,10 @@ def hand_in(
 @responds(document)
 def hand_back(
     group: Id, store: AppStore, actor: Actor, why: ReturnReason | None = None
-) -> takes.DisclosedAnnotation:
-    """Let the person of an annotation that was handed in go on with it, and tell them why."""
+) -> service.DisclosedAnnotation:
+    """Let the person of an annotation that was submitted go on with it, and tell them why."""
     annotation, reason = (
-        takes.get_annotation_of_copy(store, group),
+        service.get_annotation_of_copy(store, group),
         "" if why is None else why.reason,
     )
     return return_annotation(store, annotation.id, reason, actor=actor)
@@ -141,7 +140,7 @@ def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
 
     They are its person's there, as one edit that undo takes back.
     """
-    annotation = takes.get_annotation_of_copy(services.store, group)
+    annotation = service.get_annotation_of_copy(services.store, group)
     return adopt_into_group(services.store, annotation, actor=actor, paint=services.paint)
 
 

@@ -25,7 +25,7 @@ from app.soccer.choices import GoldStart
 
 
 class ReturnReason(BaseModel):
-    """Why something that was handed in goes back."""
+    """Why something that was submitted goes back."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -42,10 +42,10 @@ class AnnotationReturn(ReturnReason):
 
     model_config = ConfigDict(
         extra="forbid",
-        json_schema_extra={"examples": [{"take": 7, "reason": "The ball in B is the spot."}]},
+        json_schema_extra={"examples": [{"annotation": 7, "reason": "The ball in B is the spot."}]},
     )
 
-    take: Annotated[int, Field(ge=1, le=MAX_ID)]
+    annotation: Annotated[int, Field(ge=1, le=MAX_ID)]
 
 
 class IndependentAnnotationList(ListDocument[DisclosedAnnotation]):
@@ -99,7 +99,7 @@ class GoldChoiceDocument(BaseModel):
 class GoldResultDocument(Document, shows=GoldResult):
     """What one person made of a gold group."""
 
-    handed_in: datetime = Field(description="When they submitted it first.")
+    submitted: datetime = Field(description="When they submitted it first.")
     true_verdict: str = Field(title="Known Verdict")
     right: bool | None = Field(description="Whether they judged as is true; null: not judged.")
     error: DistanceFromTruth

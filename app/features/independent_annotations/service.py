@@ -46,11 +46,11 @@ _KINDS = ("work", "take")
 
 @dataclass(frozen=True)
 class ReturnedGroup:
-    """A group that was handed back: by whom, when, and why; the reason may be empty.
+    """A group that was returned: by whom, when, and why; the reason may be empty.
 
     Attributes:
         group: What they work on; of an annotation of their own, the copy.
-        by: Who handed it back.
+        by: Who returned it.
         reason: Why; may be empty.
     """
 
@@ -62,7 +62,7 @@ class ReturnedGroup:
 
 
 def read_returned(session: Session, group_ids: Sequence[int]) -> dict[int, ReturnedGroup]:
-    """How groups were handed back last, by their ids; the caller knows that they wait again."""
+    """How groups were returned last, by their ids; the caller knows that they wait again."""
     last = {
         entry.group_id: entry
         for entry in read_entries_of(session, group_ids, _KINDS)
@@ -82,7 +82,7 @@ def read_returned(session: Session, group_ids: Sequence[int]) -> dict[int, Retur
 
 @dataclass(frozen=True)
 class DisclosedAnnotation:
-    """A take as everybody may see it who sees its copy; that it is a gold one it does not say.
+    """An independent annotation as everybody may see it who sees its copy; that it is a gold one it does not say.
 
     Attributes:
         batch: The batch that it is for; None: none.
@@ -92,7 +92,7 @@ class DisclosedAnnotation:
         title: What people call the group; where its person is not told, what they call the copy.
         place: Which one of this person in this batch, from 1.
         settled: When something was decided about it; None: not yet, or its person is not told.
-        handed_back: Why its person has it back; None: they have not, or handed it in again.
+        returned: Why its person has it back; None: they have not, or submitted it again.
     """
 
     id: int
@@ -105,10 +105,10 @@ class DisclosedAnnotation:
     person: str
     place: int
     begun: Moment
-    handed_in: Moment | None
+    submitted: Moment | None
     verdict: str | None
     settled: Moment | None
-    handed_back: ReturnedGroup | None = None
+    returned: ReturnedGroup | None = None
 
 
 def begin_annotation(store: Store, group_id: int, *, person: str) -> DisclosedAnnotation:
@@ -151,7 +151,7 @@ def begin(
         batch_id: For which batch; None: for none.
         kind: ``independent`` or ``gold``.
         since: When the batch began: edits of the original from then on are not seen.
-        blind: Begin with the group as it was then, else as the last take of it left it.
+        blind: Begin with the group as it was then, else as the last annotation of it left it.
         nameless: The copy is of a batch with gold groups: it does not say which group it is of, and
             begins with what all copies of such a batch begin with.
     """
@@ -165,7 +165,7 @@ def begin(
             "this is an own annotation already", hint="Begin from the group that it is of."
         )
     place = count_annotations(session, batch_id, person) + 1
-    ready = [one.copy_id for one in others if one.handed_in is not None]
+    ready = [one.copy_id for one in others if one.submitted is not None]
     start = stored.group
     if kind == GOLD:
         start = gold_start_of(session, stored)
@@ -178,7 +178,7 @@ def begin(
         start = without_extras(start, common)
     order = CopyRequest(stored, batch_id, person, f"{batch_id or 0}-{place}" if nameless else None)
     copy_id = copy_group(session, order, start)
-    take_id = insert_annotation(
+    annotation_id = insert_annotation(
         session,
         batch_id=batch_id,
         group_id=group_id,
@@ -187,29 +187,29 @@ def begin(
         kind=kind,
         place=place,
     )
-    return read_annotation(session, take_id)
+    return read_annotation(session, annotation_id)
 
 
-def submit_annotation(store: Store, take_id: int, *, actor: str) -> DisclosedAnnotation:
+def submit_annotation(store: Store, annotation_id: int, *, actor: str) -> DisclosedAnnotation:
     """Submit an independent annotation; from then on it stays as it is.
 
     Raises:
-        NotFoundError: There is no such take.
+        NotFoundError: There is no such annotation.
         ForbiddenError: It is somebody else's.
         ConflictError: It was submitted already.
     """
     with store.write() as session:
-        annotation = read_annotation(session, take_id)
+        annotation = read_annotation(session, annotation_id)
         submit_copy(session, annotation, actor=actor, at=now())
-        handed = show(session, read_annotation(session, take_id))
+        handed = show(session, read_annotation(session, annotation_id))
         session.respond(handed)
         return handed
 
 
-def get_annotation(store: Store, take_id: int) -> IndependentAnnotation:
+def get_annotation(store: Store, annotation_id: int) -> IndependentAnnotation:
     """An independent annotation; raises NotFoundError where there is none."""
     with store.read() as session:
-        return read_annotation(session, take_id)
+        return read_annotation(session, annotation_id)
 
 
 def get_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation:
@@ -229,7 +229,7 @@ def get_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation:
 
 
 def find_annotation_of_copy(store: Store, copy_id: int) -> IndependentAnnotation | None:
-    """The take whose copy a group is; None for an ordinary group."""
+    """The independent annotation whose copy a group is; None for an ordinary group."""
     with store.read_one() as session:
         return annotation_of_copy(session, copy_id)
 
@@ -272,7 +272,7 @@ def _disclosed_annotations(
     heads = {row.id: row for row in names_of(session, [one.copy_id for one in annotations])}
     reader = READER.get()
     blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
-    waiting = [one.copy_id for one in annotations if one.handed_in is None and one.settled is None]
+    waiting = [one.copy_id for one in annotations if one.submitted is None and one.settled is None]
     back = read_returned(session, waiting)
 
     def is_told(one: IndependentAnnotation) -> bool:
@@ -295,11 +295,11 @@ def _disclosed_annotations(
             person=one.person,
             place=one.place,
             begun=one.begun,
-            handed_in=one.handed_in,
+            submitted=one.submitted,
             verdict=one.verdict,
             # Of a gold group nothing is ever decided.
             settled=one.settled if disclosed else None,
-            handed_back=back.get(one.copy_id),
+            returned=back.get(one.copy_id),
         )
         for one, disclosed in ((one, is_told(one)) for one in annotations)
     ]
@@ -309,9 +309,9 @@ def _title(head: Any, disclosed: bool) -> str:
     return str((head.of_label or head.of_key) if disclosed else (head.label or head.key))
 
 
-def read_annotation(session: Session, take_id: int) -> IndependentAnnotation:
+def read_annotation(session: Session, annotation_id: int) -> IndependentAnnotation:
     """``get_annotation`` within a session."""
-    row = find_annotation(session, take_id)
+    row = find_annotation(session, annotation_id)
     if row is None:
-        raise NotFoundError(f"there is no annotation {take_id}")
+        raise NotFoundError(f"there is no annotation {annotation_id}")
     return row

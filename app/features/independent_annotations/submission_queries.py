@@ -37,7 +37,7 @@ def require_open(annotation: IndependentAnnotation | None) -> None:
     Whether it was adjudicated since the sentence does not say: copies of gold groups never are.
     """
     if annotation is not None and (
-        annotation.handed_in is not None or annotation.settled is not None
+        annotation.submitted is not None or annotation.settled is not None
     ):
         raise ConflictError(
             "this annotation was submitted, and can no longer be changed", hint=_ONLY_LEADS
@@ -70,7 +70,7 @@ def submit_copy(
     (stored,) = read_groups(session, [annotation.copy_id]).values()
     # Of a copy that was returned the verdict stays, unless its person gives another one.
     verdict = verdict or annotation.verdict
-    update_annotation(session, annotation.id, handed_in=at, verdict=verdict)
+    update_annotation(session, annotation.id, submitted=at, verdict=verdict)
     body: dict[str, Json] = {
         "take": annotation.id,
         "person": annotation.person,
@@ -110,9 +110,9 @@ def return_copy(session: Session, annotation: IndependentAnnotation) -> None:
     """
     if annotation.settled is not None:
         raise ConflictError("this annotation was adjudicated already")
-    if annotation.handed_in is None:
+    if annotation.submitted is None:
         raise ConflictError(f"{annotation.person} has not submitted this yet")
-    update_annotation(session, annotation.id, handed_in=None)
+    update_annotation(session, annotation.id, submitted=None)
     forget_open(session, annotation.group_id, annotation.batch_id or 0)
 
 

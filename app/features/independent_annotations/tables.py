@@ -43,7 +43,7 @@ class IndependentAnnotationModel(Base):
         UniqueConstraint("copy_id", name="take_copy"),
         Index("take_group", "group_id"),
         # Each request asks what its sender has begun, also in a batch of thousands.
-        Index("take_of_person", "batch_id", "person", "handed_in", "settled"),
+        Index("take_of_person", "batch_id", "person", "submitted", "settled"),
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -54,7 +54,7 @@ class IndependentAnnotationModel(Base):
     kind: Mapped[str]
     place: Mapped[int]
     begun: Mapped[str]
-    handed_in: Mapped[str | None]
+    submitted: Mapped[str | None] = mapped_column("handed_in", key="submitted")
     verdict: Mapped[str | None]
     settled: Mapped[str | None]
 

@@ -215,11 +215,11 @@ def _blind() -> ColumnElement[Any]:
     free = _exists(
         group.batch_id == batch.id,
         group.settled.is_(None),
-        group.handed_in.is_(None),
+        group.submitted.is_(None),
         ~_exists(here, mine, annotation.group_id == group.group_id),
         own_count.correlate(BatchModel, BatchGroupModel).scalar_subquery() < batch.verdicts,
     )
-    begun = _exists(here, mine, annotation.handed_in.is_(None), annotation.settled.is_(None))
+    begun = _exists(here, mine, annotation.submitted.is_(None), annotation.settled.is_(None))
     waits = case((free | begun, 1), else_=0)
     found = select(pairs_of(batch.id, batch.dataset_id, waits))
     return _list(found.where(batch.state == OPEN, copies, annotates | _exists(here, mine)))

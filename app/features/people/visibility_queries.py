@@ -40,8 +40,8 @@ class RestrictedReader:
         )
         returned = (
             BatchGroupModel.batch_id.in_(ids),
-            BatchGroupModel.handed_in_by == self.person,
-            BatchGroupModel.handed_in.is_(None),
+            BatchGroupModel.submitted_by == self.person,
+            BatchGroupModel.submitted.is_(None),
             BatchGroupModel.settled.is_(None),
         )
         inside = select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id.in_(ids))

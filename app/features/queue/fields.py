@@ -116,8 +116,8 @@ _HIDDEN_FIELDS = (
         values=(*WHETHER, "agreed", "waiting", "decided"),
     ),
     QueryField(
-        "takes", "number", "how many independent annotations were submitted (reviewers)",
-        values=("none",),
+        "submissions", "number", "how many independent annotations were submitted (reviewers)",
+        values=("none",), also=("takes",),
     ),
     QueryField("id", "ids", "groups one by one: id:12,15,19"),
     QueryField("batch", "ids", "assigned work: batch:3, in its order unless another is given"),
@@ -181,7 +181,7 @@ FIELDS = (
         values=tuple(text for order in ORDERS for text in (order.name, f"{order.name}-desc")),
     ),
 )  # fmt: skip
-BLIND = ("annotations", "takes")
+BLIND = ("annotations", "submissions", "takes")
 """Fields that tell what others made of a group: for those alone who judge."""
 _BLIND = re.compile(rf"\b({'|'.join(BLIND)})[:=<>]")
 BY_NAME = {name: field for field in FIELDS for name in (field.name, *field.also)}
@@ -192,7 +192,7 @@ def reads_hidden_work(query: str) -> bool:
     """Whether a query asks what others made of groups; also within quotes: rather once too often.
 
     Example:
-        >>> [asks_blind(text) for text in ("status:accepted takes>=2", "sort:value")]
+        >>> [asks_blind(text) for text in ("status:accepted submissions>=2", "sort:value")]
         [True, False]
     """
     return _BLIND.search(query) is not None

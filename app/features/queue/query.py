@@ -168,9 +168,9 @@ def _condition(term: _Term) -> Condition:
         term = replace(term, field=field_.name)
     if term.field in NUMBERS:
         return _number(term)
-    if term.field == "takes" and term.value == "none":
+    if term.field == "submissions" and term.value == "none":
         return conditions.has_annotations("=", 0)
-    if term.field == "takes":
+    if term.field == "submissions":
         return conditions.has_annotations("=" if term.op == ":" else term.op, _value(term))
     if term.field == "id":
         return _listed_groups(term)

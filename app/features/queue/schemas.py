@@ -102,10 +102,10 @@ class GroupRow(Document):
     override: str | None = Field(description="The gate that was overridden with a reason.")
     fixed: bool
     comments: int = Field(description="Threads of comments that are open.")
-    takes: int | None = Field(
+    submissions: int | None = Field(
         description="How many people submitted an independent annotation; null: shown to reviewers only."
     )
-    came_to: Literal["agreed", "open", "decided"] | None = Field(
+    annotations: Literal["agreed", "open", "decided"] | None = Field(
         description="Outcome of comparing them; `open`: they differ, and a reviewer has to decide."
     )
     changed: datetime
@@ -116,7 +116,7 @@ class GroupRow(Document):
         """The document of a row of the queue; ``judges``: its reader may know what others made of it."""
         values: dict[str, Any] = {name: getattr(row, name) for name in _SAME}
         if not judges:
-            values |= dict.fromkeys(("takes", "came_to"))
+            values |= dict.fromkeys(("submissions", "annotations"))
         failing = None
         if row.gate is not None:
             failing = FailingGate(

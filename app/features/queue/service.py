@@ -81,8 +81,8 @@ class GroupRow:
         findings: Kinds that are open.
         dismissed: Kinds that somebody has checked.
         comments: Threads that are open.
-        takes: How many people handed in an annotation of their own.
-        came_to: What these came to: ``agreed``, ``open`` (somebody has to decide), ``decided``; None:
+        submissions: How many people submitted an annotation of their own.
+        annotations: What these came to: ``agreed``, ``open`` (somebody has to decide), ``decided``; None:
             they were not compared.
     """
 
@@ -124,8 +124,8 @@ class GroupRow:
     findings: tuple[str, ...]
     dismissed: tuple[str, ...] = ()
     comments: int = 0
-    takes: int = 0
-    came_to: str | None = None
+    submissions: int = 0
+    annotations: str | None = None
 
 
 @dataclass(frozen=True)
@@ -209,8 +209,8 @@ def list_groups(
     found = [
         replace(
             _row(row, comments),
-            takes=annotations.get(row.group_id, 0),
-            came_to=states.get(row.group_id),
+            submissions=annotations.get(row.group_id, 0),
+            annotations=states.get(row.group_id),
         )
         if annotations
         else _row(row, comments)
@@ -259,7 +259,7 @@ def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
 _STORED = [
     item.name
     for item in fields(GroupRow)
-    if item.name not in ("id", "findings", "dismissed", "comments", "takes", "came_to")
+    if item.name not in ("id", "findings", "dismissed", "comments", "submissions", "annotations")
 ]
 
 

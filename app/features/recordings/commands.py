@@ -9,7 +9,6 @@ from typing import Any
 from app.terminal.opened import opened_store
 from app.terminal.options import acting
 from app.terminal.remote import follow, some
-from app.terminal.remote_files import send_file
 from app.terminal.server import connected, given_server
 from app.terminal.terminal import print_json, print_values, show_progress
 
@@ -25,7 +24,8 @@ def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:
         found = []
         with connected(server) as client, show_progress("Indexing") as progress:
             for path in paths:
-                body = {"dataset": dataset, "source": {"upload": send_file(client, path)}}
+                upload = client.upload(path, in_parts=True, sent=progress)
+                body = {"dataset": dataset, "source": {"upload": upload}}
                 job = follow(client, client.post("recordings", body), progress)
                 found.append(client.get(f"recordings/{job['result']['recording']}"))
     rows = [some(one, *TOLD) for one in found]

@@ -28,6 +28,7 @@ from app.features.recordings.service import (
     list_recordings,
     put_shots,
     remove_recording,
+    shots_csv,
 )
 from app.finite import MAX_ID
 from app.http.conflicts import current_state
@@ -43,6 +44,7 @@ from app.media.images import JPEG
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
 
+CSV_FILE = "text/csv"
 TAGGED = {
     "headers": {"ETag": {"description": "Of the list of shots.", "schema": {"type": "string"}}}
 }
@@ -161,6 +163,22 @@ def list_shots(recording: Id, store: AppStore, response: Response) -> ShotList:
     found = ShotList.of(get_shots(store, recording))
     response.headers["ETag"] = found.etag
     return found
+
+
+@router.get(
+    "/{recording}/shots.csv",
+    operation_id="getShotsFile",
+    response_class=Response,
+    responses={
+        **responses(404, 409),
+        200: {"content": {CSV_FILE: {}}, "description": "A row for each shot."},
+    },
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+def get_shots_file(recording: Id, store: AppStore) -> Response:
+    """The same as CSV, a row for each shot."""
+    headers = {"Content-Disposition": 'attachment; filename="touchline-shots.csv"'}
+    return Response(shots_csv(get_shots(store, recording)), headers=headers, media_type=CSV_FILE)
 
 
 @router.put(

@@ -36,6 +36,7 @@ from app.features.recordings.queries import (
     taken_frames,
     update_recording,
 )
+from app.formats.csv_text import csv_line
 from app.formats.frame_names import VIDEO_SUFFIXES
 from app.geometry.arrays import FloatArray
 from app.media.frames import refused_picture
@@ -383,6 +384,16 @@ def get_shots(store: Store, recording_id: int) -> RecordingShots:
     with store.read() as session:
         row = need_recording(session, recording_id)
     return _shots(store.settings, row)
+
+
+def shots_csv(found: RecordingShots) -> str:
+    """The shots of a recording as CSV, a row for each."""
+    columns = ("first", "last", "start_s", "end_s", "kind", "entered_by", "kept")
+    lines = [csv_line(("recording", "shot", *columns))]
+    for number, (shot, times) in enumerate(zip(found.items, found.times, strict=True), 1):
+        place = (found.recording.name, number, shot.first, shot.last, *times)
+        lines.append(csv_line((*place, shot.kind, shot.entered_by, shot.kept)))
+    return "".join(lines)
 
 
 def put_shots(

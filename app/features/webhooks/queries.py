@@ -291,7 +291,7 @@ def batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
         "annotators": [name for part, name in people if part == "annotator"],
         "reviewers": [name for part, name in people if part == "reviewer"],
         "groups": count.groups if count else 0,
-        "handed_in": count.handed_in if count else 0,
+        "submitted": count.submitted if count else 0,
         "settled": count.settled if count else 0,
     }
 

@@ -36,7 +36,7 @@ async function goOn(dataset, after) {
 
 /** @param {{found: CaseJson, chosen: number | null, third: boolean, busy: boolean, decide: () => void, flipThird: () => void, back: () => void}} props */
 function DecisionCard({ found, chosen, third, busy, decide, flipThird, back }) {
-	const taken = chosen === null ? null : found.takes[chosen];
+	const taken = chosen === null ? null : found.annotations[chosen];
 	const of = found.group.dataset.name;
 	const say = taken === null ? 'Compare both, then choose one: 1, 2 …' : third
 		? `${taken.person}’s annotation goes into the group, and you continue from it`
@@ -48,11 +48,11 @@ function DecisionCard({ found, chosen, third, busy, decide, flipThird, back }) {
 				${found.own ? html`<p class="compare__own">You annotated this group yourself. No other reviewer is available, so you may decide; the history records it.</p>` : null}
 				<p class="compare__say" role="status">${say}${say.endsWith('…') ? '' : '.'}</p>
 				<p class="compare__links">
-					<button class="button" type="button" data-needs="review" data-of=${of} aria-pressed=${third} onClick=${flipThird}>Continue from it <kbd>${found.takes.length + 1}</kbd></button>
+					<button class="button" type="button" data-needs="review" data-of=${of} aria-pressed=${third} onClick=${flipThird}>Continue from it <kbd>${found.annotations.length + 1}</kbd></button>
 					${isTeam ? html`<button class="button" type="button" data-needs="review" data-of=${of} disabled=${taken === null} title=${taken === null ? 'Choose one first' : 'Its annotator changes it and submits it again'} onClick=${back}>Return… <kbd>⇧U</kbd></button>` : null}
 					<button class="button button--primary" type="button" data-needs="review" data-of=${of} disabled=${taken === null || busy} title=${taken === null ? 'Choose one first' : ''} onClick=${decide}>Decide <kbd>Enter</kbd></button>
 				</p>`}
-			<p class="compare__verdicts">${found.takes.map(({ id, person, verdict }) => html`<span key=${id}>${person}: <strong>${words(verdict ?? 'no verdict')}</strong></span>`)}</p>
+			<p class="compare__verdicts">${found.annotations.map(({ id, person, verdict }) => html`<span key=${id}>${person}: <strong>${words(verdict ?? 'no verdict')}</strong></span>`)}</p>
 		</section>
 	`;
 }
@@ -62,18 +62,18 @@ function Adjudication({ found }) {
 	const [chosen, setChosen] = useState(/** @type {number | null} */ (null));
 	const [third, setThird] = useState(false);
 	const [busy, setBusy] = useState(false);
-	const { group, takes, refused } = found;
+	const { group, annotations, refused } = found;
 
 	const choose = useCallback((/** @type {number} */ place) => {
-		if (place >= takes.length) return;
+		if (place >= annotations.length) return;
 		setChosen(place);
-		announce(`${takes[place].person}’s annotation is chosen. Enter decides.`);
-	}, [takes]);
+		announce(`${annotations[place].person}’s annotation is chosen. Enter decides.`);
+	}, [annotations]);
 	const decide = useCallback(async () => {
 		if (chosen === null || refused || busy) return;
 		setBusy(true);
 		try {
-			await postDecision(group.id, takes[chosen].id, third);
+			await postDecision(group.id, annotations[chosen].id, third);
 			if (third) navigate(reviewAddress(group.id));
 			else await goOn(group.dataset.name, group.id);
 		} catch (error) {
@@ -82,10 +82,10 @@ function Adjudication({ found }) {
 		} finally {
 			setBusy(false);
 		}
-	}, [chosen, third, refused, busy, group, takes]);
+	}, [chosen, third, refused, busy, group, annotations]);
 	const flipThird = useCallback(() => setThird((on) => !on), []);
 	const back = useCallback(() => {
-		const take = chosen === null ? null : takes[chosen];
+		const take = chosen === null ? null : annotations[chosen];
 		if (!take || refused || !isTeam) return;
 		const mine = take.person === myName.value;
 		question.value = {
@@ -97,18 +97,18 @@ function Adjudication({ found }) {
 				await goOn(group.dataset.name, group.id);
 			},
 		};
-	}, [chosen, refused, group, takes]);
+	}, [chosen, refused, group, annotations]);
 	// The key after the last annotation's.
 	const keys = useMemo(() => /** @type {Binding[]} */ ([
-		...takes.map((_, place) => ({
-			keys: [String(place + 1)], label: 'Choose that annotation', group: 'Decide', shown: place === 0 ? `1 … ${takes.length}` : 'hidden',
+		...annotations.map((_, place) => ({
+			keys: [String(place + 1)], label: 'Choose that annotation', group: 'Decide', shown: place === 0 ? `1 … ${annotations.length}` : 'hidden',
 			needs: /** @type {const} */ ('review'), run: () => choose(place),
 		})),
-		{ keys: [String(takes.length + 1)], label: 'Continue from the chosen annotation', group: 'Decide', needs: 'review', run: flipThird },
+		{ keys: [String(annotations.length + 1)], label: 'Continue from the chosen annotation', group: 'Decide', needs: 'review', run: flipThird },
 		{ keys: ['Enter'], label: 'Decide', group: 'Decide', needs: 'review', run: decide },
 		{ keys: ['Shift+u'], label: 'Return the chosen one to its annotator, with a reason', group: 'Decide', needs: 'review', run: back },
 		{ keys: ['Escape'], label: 'Back to the list', group: 'Decide', run: () => navigate(agreementAddress(group.dataset.name)) },
-	]), [takes, choose, decide, flipThird, back, group]);
+	]), [annotations, choose, decide, flipThird, back, group]);
 	useKeys(keys);
 	useEffect(() => {
 		show(found.comparison);
@@ -117,7 +117,7 @@ function Adjudication({ found }) {
 	if (!comparison.value) return null;
 	return html`
 		<${CompareWorkspace}
-			names=${takes.map(({ person }) => person)} images=${new Map(group.views.map((view) => [view.key, view.image]))}
+			names=${annotations.map(({ person }) => person)} images=${new Map(group.views.map((view) => [view.key, view.image]))}
 			chosen=${chosen} choose=${refused ? null : choose}
 		><${DecisionCard} found=${found} chosen=${chosen} third=${third} busy=${busy} decide=${decide} flipThird=${flipThird} back=${back} /><//>
 		${question.value ? html`<${ReturnDialog} />` : null}

@@ -167,7 +167,7 @@ function GroupsCard({ found }) {
 }
 
 /** @param {IndependentAnnotationJson} one */
-function stateOf({ handed_in: handed, settled, handed_back: back }) {
+function stateOf({ submitted: handed, settled, returned: back }) {
 	if (settled) return html`<span title="It is used in its group, or another one is">done</span> <small><${When} at=${settled} /></small>`;
 	if (handed) return html`<strong>submitted</strong> <small><${When} at=${handed} /></small>`;
 	return back ? html`returned by ${back.by}${back.reason ? html`<small>“${back.reason}”</small>` : null}` : 'in progress';
@@ -180,7 +180,7 @@ function TakesCard({ dataset, batch }) {
 	if (found.error) return html`<${Trouble} title="The annotations cannot be shown" error=${found.error} retry=${found.reload} />`;
 	if (items.length === 0) return null;
 	/** @param {IndependentAnnotationJson} one */
-	const rank = (one) => (one.settled ? 2 : one.handed_in ? 0 : 1);
+	const rank = (one) => (one.settled ? 2 : one.submitted ? 0 : 1);
 	const sorted = items.toSorted((a, b) => rank(a) - rank(b) || b.id - a.id);
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-takes">

@@ -13,11 +13,13 @@ import { useResource } from '../../lib/resource.js';
 import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { lengthText } from '../../state/shots.js';
+import { addVideos, videoUploads } from '../../state/video_uploads.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { SourceChoice } from '../source_choice.js';
 import { When } from '../when.js';
+import { VideoField } from './video_uploads.js';
 
 /** @import {ImportSource} from '../../api/imports.js' */
 /** @import {JobJson} from '../../api/jobs.js' */
@@ -51,14 +53,19 @@ function AddCard({ added }) {
 	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
 	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
 	const { error, attempt } = useAttempt();
-	const busy = job !== null && !isOver(job);
-	const why = busy ? 'A recording is being indexed' : source ? '' : 'Choose a file first';
+	const waiting = videoUploads.value.some(({ state, dataset: its }) => its === null && ['queued', 'sending', 'waiting', 'here'].includes(state));
+	const busy = job !== null && !isOver(job) && source !== null;
+	const why = busy ? 'A recording is being indexed' : source || waiting ? '' : 'Choose a file first';
 	const send = withForm((said) => {
-		if (why || !source) return;
-		attempt(postRecording({ dataset: String(said.get('dataset')).trim(), source }), async (begun) => {
-			await follow(begun, setJob);
-			added();
-		});
+		if (why) return;
+		const name = String(said.get('dataset')).trim();
+		if (!source) addVideos(name);
+		else {
+			attempt(postRecording({ dataset: name, source }), async (begun) => {
+				await follow(begun, setJob);
+				added();
+			});
+		}
 	});
 	return html`
 		<section class="card" aria-labelledby="add-title">
@@ -70,7 +77,7 @@ function AddCard({ added }) {
 					<datalist id="recording-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
 					<small>A new name makes a new dataset. Groups that you take from the recording go there.</small>
 				</div>
-				<${SourceChoice} videos=${true} onSource=${setSource} guess=${() => {}} />
+				<${SourceChoice} videos=${VideoField} onSource=${setSource} guess=${() => {}} />
 				<p class="buttons"><button class="button button--primary" type="submit" data-needs="lead" data-of="" aria-disabled=${why !== ''} title=${why}>Add and find its shots</button></p>
 				${error ? html`<${FormError} error=${error} />` : null}
 				${job ? html`<${JobProgress} job=${job} />` : null}

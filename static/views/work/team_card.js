@@ -30,7 +30,7 @@ function Paces({ people, name }) {
 			<caption class="hidden-text">Progress of each person in ${name}</caption>
 			<thead><tr><th>Name</th><th>Submitted</th><th>Reviewed</th><th title="Time between actions; pauses of more than ten minutes do not count">Minutes</th><th>Minutes a group</th><th>Groups an hour</th></tr></thead>
 			<tbody>${people.map((one) => html`
-				<tr key=${one.name}><th scope="row">${one.name}</th><td>${one.handed_in}</td><td>${one.judged}</td><td>${fixed(one.minutes, 0)}</td><td>${fixed(one.minutes_a_group, 1)}</td><td>${fixed(one.groups_an_hour, 0)}</td></tr>`)}
+				<tr key=${one.name}><th scope="row">${one.name}</th><td>${one.submitted}</td><td>${one.judged}</td><td>${fixed(one.minutes, 0)}</td><td>${fixed(one.minutes_a_group, 1)}</td><td>${fixed(one.groups_an_hour, 0)}</td></tr>`)}
 			</tbody>
 		</table></div>
 	`;

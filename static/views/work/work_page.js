@@ -23,7 +23,7 @@ import { TeamCard } from './team_card.js';
 /** @import {MyBatchJson} from '../../api/work.js' */
 
 /** @param {{one: MyBatchJson, first: boolean}} props `first`: Enter goes on with it */
-function MyBatch({ one: { batch, parts, left, handed_back: back }, first }) {
+function MyBatch({ one: { batch, parts, left, returned: back }, first }) {
 	const button = useRef(/** @type {HTMLButtonElement | null} */ (null));
 	const { error, attempt } = useAttempt();
 	const hides = datasets.value?.find(({ name }) => name === batch.dataset)?.hides_groups ?? false;

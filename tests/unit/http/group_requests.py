@@ -190,13 +190,13 @@ def own_annotations(api: Any) -> list[int]:
 def adjudication(api: Any) -> Request:
     own_annotations(api)
     case = api.get(f"{API}/groups/1/adjudication").json()
-    return "POST", "/groups/1/adjudication", {"take": case["takes"][1]["id"]}, {}
+    return "POST", "/groups/1/adjudication", {"annotation": case["annotations"][1]["id"]}, {}
 
 
 def adjudication_back(api: Any) -> Request:
     own_annotations(api)
     case = api.get(f"{API}/groups/1/adjudication").json()
-    body = {"take": case["takes"][1]["id"], "reason": "The ball in B is the spot."}
+    body = {"annotation": case["annotations"][1]["id"], "reason": "The ball in B is the spot."}
     return "POST", "/groups/1/adjudication/return", body, {}
 
 
@@ -241,7 +241,7 @@ def own_of_batch(api: Any) -> str:
     return f"/batches/{made.id}/groups/{taken['group']}"
 
 
-def handed_in(api: Any) -> Request:
+def submitted(api: Any) -> Request:
     return "PUT", f"{own_of_batch(api)}/submission", None, {}
 
 
@@ -256,7 +256,7 @@ def hand_in_taken_back(api: Any) -> Request:
     return "DELETE", f"/batches/{made.id}/groups/1/submission", None, {}
 
 
-def handed_back(api: Any) -> Request:
+def returned_group(api: Any) -> Request:
     store = store_of(api)
     invite(store, "ann", Role.ANNOTATOR, actor="local")
     made = make_batch(store, "broadcast", NewBatch("Once", annotators=["ann"]), actor="local")

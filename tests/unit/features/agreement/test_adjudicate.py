@@ -81,7 +81,7 @@ class TestAfterHandIn:
     ) -> None:
         judged(store, state.id, "ann", 1.0)
         second = judged(store, state.id, "ben", moved)
-        assert get_annotation(store, second.id).handed_in is not None
+        assert get_annotation(store, second.id).submitted is not None
 
         def fail(*_: object) -> None:
             raise OSError("the power went")
@@ -144,7 +144,7 @@ class TestDecide:
 
     def test_takes_one_with_the_verdict_of_who_decided(self, store, state, takes) -> None:
         case = get_case(store, state.id, actor="lea")
-        assert [take.person for take in case.takes] == ["ann", "ben"]
+        assert [take.person for take in case.annotations] == ["ann", "ben"]
         assert not case.own and case.refused is None
         after = decide(store, state.id, takes[1].id, actor="lea")
         assert ball_x(after) == ball_x(state) + 40
@@ -207,12 +207,12 @@ class TestHandBack:
         assert (
             return_for_correction(
                 store, state.id, takes[1].id, " the  spot ", actor="lea"
-            ).handed_in
+            ).submitted
             is None
         )
         assert list_waiting(store, state.dataset) == []
         shown = list_annotations(store, state.dataset, lambda _: True, person="lea")
-        assert [one.handed_back and one.handed_back.reason for one in shown] == [None, "the spot"]
+        assert [one.returned and one.returned.reason for one in shown] == [None, "the spot"]
         again = load(store, takes[1].copy_id)
         set_verdict(
             store, takes[1].copy_id, "deferred", None, "x", if_match=again.etag, actor="ben"
@@ -221,7 +221,7 @@ class TestHandBack:
         (waiting,) = list_waiting(store, state.dataset)
         assert waiting.people == ("ann", "ben")
         shown = list_annotations(store, state.dataset, lambda _: True, person="lea")
-        assert [one.handed_back for one in shown] == [None, None]
+        assert [one.returned for one in shown] == [None, None]
 
     def test_the_queue_finds_it_and_says_what_it_came_to(
         self, store, state, takes, make_group
@@ -234,16 +234,18 @@ class TestHandBack:
         every = found("")
         assert every == 2
         (row,) = list_groups(store, state.dataset_id, "annotations:waiting").items
-        assert (row.id, row.takes, row.came_to) == (state.id, 2, "open")
+        assert (row.id, row.submissions, row.annotations) == (state.id, 2, "open")
         asked = {
             "annotations:any": 1, "annotations:none": every - 1, "annotations:agreed": 0,
-            "-annotations:waiting": every - 1, "takes:2": 1, "takes>2": 0, "takes<2": every - 1,
-            "takes:none": every - 1, "takes>=0": every,
+            "-annotations:waiting": every - 1, "submissions:2": 1, "submissions>2": 0, "submissions<2": every - 1,
+            "submissions:none": every - 1, "submissions>=0": every,
         }  # fmt: skip
         assert {query: found(query) for query in asked} == asked
         decide(store, state.id, takes[1].id, actor="lea")
         assert [found(f"annotations:{one}") for one in ("waiting", "decided")] == [0, 1]
-        assert list_groups(store, state.dataset_id, "takes:2").items[0].came_to == "decided"
+        assert (
+            list_groups(store, state.dataset_id, "submissions:2").items[0].annotations == "decided"
+        )
 
     def test_what_a_lead_returned_leaves_nothing_that_waits(self, store, state, takes) -> None:
         return_annotation(store, takes[0].id, "the ball", actor="lea")

@@ -73,7 +73,7 @@ def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> N
     group = waiting[0].group
     assert load(store, group).verdict.state == "unreviewed"
     case = get_case(store, group, actor="cy")
-    after = decide(store, group, case.takes[1].id, actor="cy")
+    after = decide(store, group, case.annotations[1].id, actor="cy")
     assert (after.verdict.state, after.verdict.actor) == ("accepted", "cy")
     assert get_batch(store, batch.id).settled == 2
     assert list_waiting(store, batch.dataset_id) == []

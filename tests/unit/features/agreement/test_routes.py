@@ -40,7 +40,7 @@ class TestAdjudication:
         assert pair["distance"]["views"] and case["refused"] is None
         kinds = [item["kind"] for item in pair["disagreements"]]
         assert "ball_px" in kinds
-        body = {"take": case["takes"][1]["id"]}
+        body = {"annotation": case["annotations"][1]["id"]}
         done = api.post(f"/api/v1/groups/{group}/adjudication", json=body)
         assert done.status_code == 200 and done.json()["verdict"]["by"] == "local"
         assert api.get(f"/api/v1/groups/{group}/adjudication").status_code == 404

@@ -251,7 +251,7 @@ class TestLeases:
         assert leases.next(batch, BO).group is None
         lease = leases.next(batch, ADA)
         assert (lease.group, lease.part) == (groups[0], Part.ANNOTATOR)
-        assert leases.submit(batch, groups[0], ADA, actor="ada").batch.handed_in == 1
+        assert leases.submit(batch, groups[0], ADA, actor="ada").batch.submitted == 1
         assert leases.next(batch, ADA, after=groups[0]).group == groups[1]
         review = leases.next(batch, BO)
         assert (review.group, review.part) == (groups[0], Part.REVIEWER)
@@ -262,7 +262,7 @@ class TestLeases:
         with pytest.raises(NotFoundError):
             leases.take(batch, 99, BO)
         leases.submit(batch, groups[0], ADA, actor="ada", done=False)
-        assert get_batch(store, batch).handed_in == 0
+        assert get_batch(store, batch).submitted == 0
 
     @pytest.mark.parametrize("done", [True, False])
     def test_a_hand_in_keeps_its_answer_in_its_transaction(
@@ -273,7 +273,7 @@ class TestLeases:
         kept = []
 
         def keep(session: Session, lease: Lease) -> None:
-            kept.append((lease, read_batch(session, batch).handed_in))
+            kept.append((lease, read_batch(session, batch).submitted))
 
         with stored_by(keep):
             lease = leases.submit(batch, groups[0], ADA, actor="ada", done=done)
@@ -291,11 +291,11 @@ class TestLeases:
         leases.submit(batch, groups[3], ADA, actor="ada")
         assert leases.next(batch, BO).group == groups[3]
         back = leases.return_group(batch, groups[3], BO, "the far goal  line", actor="bo")
-        assert (back.batch.handed_in, back.here) == (0, ())
+        assert (back.batch.submitted, back.here) == (0, ())
         (mine,) = my_work(store, lambda _: ADA)
-        said = [(one.group, one.by, one.reason) for one in mine.handed_back]
+        said = [(one.group, one.by, one.reason) for one in mine.returned]
         assert said == [(groups[3], "bo", "the far goal line")]
-        assert my_work(store, lambda _: dan)[0].handed_back == []
+        assert my_work(store, lambda _: dan)[0].returned == []
         with store.read() as session:
             person = person_by_name(session, "ada")
             rings = select_notifications(session, person.id, EVERYTHING, "", 9)
@@ -305,9 +305,9 @@ class TestLeases:
         assert leases.next(batch, dan).group == groups[0]
         assert leases.next(batch, dan, after=groups[2]).group == groups[4]
         lease = leases.next(batch, ADA)
-        assert lease.group == groups[3] and lease.handed_back is not None
+        assert lease.group == groups[3] and lease.returned is not None
         lease = leases.submit(batch, groups[3], ADA, actor="ada")
-        assert lease.batch.handed_in == 1 and my_work(store, lambda _: ADA)[0].handed_back == []
+        assert lease.batch.submitted == 1 and my_work(store, lambda _: ADA)[0].returned == []
         with store.read() as session:
             assert groups[3] in replay(session).groups
 
@@ -343,15 +343,15 @@ class TestLeases:
                 3 - had,
             )
         assert had == 3
-        assert get_batch(store, batch).handed_in == 2
+        assert get_batch(store, batch).submitted == 2
         found = leases.next(batch, BO)
-        assert (found.group, found.part, found.handed_in_by) == (groups[0], Part.REVIEWER, "ada")
+        assert (found.group, found.part, found.submitted_by) == (groups[0], Part.REVIEWER, "ada")
         leases.return_group(batch, groups[0], BO, "too wide", actor="bo")
         (mine,) = my_work(store, lambda _: ADA)
-        assert (mine.left, [one.group for one in mine.handed_back]) == (1, [groups[0]])
+        assert (mine.left, [one.group for one in mine.returned]) == (1, [groups[0]])
         assert (mine.batch.groups, mine.batch.settled, mine.batch.waiting) == (3, 2, 1)
         back = leases.next(batch, ADA)
-        assert (back.group, back.handed_back.reason) == (groups[0], "too wide")
+        assert (back.group, back.returned.reason) == (groups[0], "too wide")
         leases.submit(batch, groups[0], ADA, actor="ada")
         assert leases.next(batch, ADA).group is None
         judge(store, groups[0], "bo")
@@ -370,9 +370,9 @@ class TestLeases:
             with store.read() as session:
                 ordinary = annotation_of_copy(session, copy).kind == INDEPENDENT
             leases.submit(batch, copy, ADA, actor="ada")
-        assert get_batch(store, batch).handed_in == 0
+        assert get_batch(store, batch).submitted == 0
         compare_left(store)
-        assert get_batch(store, batch).handed_in == 1
+        assert get_batch(store, batch).submitted == 1
 
     def test_nothing_is_given_out_of_a_closed_one(self, store, dataset, groups, leases):
         batch = make_batch(store, dataset, NewBatch("a"), actor="lead").id
@@ -406,7 +406,7 @@ class TestLeases:
         with pytest.raises(ConflictError, match="ada has submitted this group"):
             leases.submit(batch, groups[0], BO, actor="bo", done=done)
         (row,) = [one for one in list_batch_groups(store, batch) if one.group == groups[0]]
-        assert row.handed_in_by == "ada"
+        assert row.submitted_by == "ada"
 
     def test_a_group_that_was_judged_is_not_handed_back(self, store, dataset, groups, leases):
         new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
@@ -466,7 +466,7 @@ class TestProgress:
             Leases(store, lambda at=at: at).submit(batch, group, ADA, actor="ada")
         (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
         (pace,) = team.people
-        assert (pace.name, pace.handed_in, pace.minutes) == ("ada", 4, pytest.approx(9))
+        assert (pace.name, pace.submitted, pace.minutes) == ("ada", 4, pytest.approx(9))
         assert pace.groups_an_hour == pytest.approx(60 * 4 / 9)
         assert team.stalled is None
         (later,) = team_work(store, dataset, at=clock.at + timedelta(hours=27))
@@ -487,7 +487,7 @@ class TestProgress:
             monkeypatch.setattr("app.features.verdicts.service.now", lambda at=at: at)
             judge(store, copies[minutes], who.name)
         (team,) = team_work(store, dataset, at=clock.at + timedelta(hours=2))
-        paces = {one.name: (one.handed_in, one.judged, one.groups) for one in team.people}
+        paces = {one.name: (one.submitted, one.judged, one.groups) for one in team.people}
         assert paces == {"ada": (2, 2, 2), "bo": (1, 1, 1)}
         assert team.people[0].minutes_a_group == pytest.approx(2)
         # Ada's comes into the group under her name, an hour later: she did not work then.

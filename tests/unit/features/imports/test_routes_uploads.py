@@ -108,3 +108,49 @@ class TestDeleteUpload:
         assert api.delete(place).status_code == 204
         assert api.delete(place).status_code == 404
         assert api.get(place).status_code == 404
+
+
+class TestSendPart:
+    FILM = b"0123456789" * 1000
+
+    def begin(self, api: Any) -> Any:
+        params = {"name": "final.mp4", "size": len(self.FILM), "mark": "1700000000"}
+        return api.post(API, params=params, headers=BYTES)
+
+    def part(self, api: Any, place: str, offset: int, content: Any) -> Any:
+        return api.patch(place, params={"offset": offset}, content=content, headers=BYTES)
+
+    def test_a_file_comes_in_parts_and_goes_on_where_it_stopped(self, app, api) -> None:
+        begun = self.begin(api)
+        assert (begun.status_code, begun.json()["bytes"]) == (201, 0)
+        place = begun.headers["location"]
+        first = self.part(api, place, 0, self.FILM[:4000])
+        assert (first.status_code, first.json()["bytes"], first.json()["size"]) == (
+            200,
+            4000,
+            10000,
+        )
+        assert self.begin(api).json() == first.json() == api.get(place).json()
+        gap = self.part(api, place, 5000, self.FILM[5000:])
+        assert (gap.status_code, "4,000 bytes of final.mp4 are here" in gap.text) == (409, True)
+        last = self.part(api, place, 4000, self.FILM[4000:])
+        assert last.json()["bytes"] == 10000
+        folder = app.state.services.settings.uploads / last.json()["id"]
+        assert (folder / "content" / "final.mp4").read_bytes() == self.FILM
+
+    def test_nothing_is_made_of_what_is_not_whole(self, api) -> None:
+        upload = self.begin(api).json()["id"]
+        body = {"dataset": "cup", "source": {"upload": upload}}
+        answer = api.post("/api/v1/recordings", json=body)
+        assert (answer.status_code, "only 0 of 10,000 bytes" in answer.text) == (409, True)
+        body["format"] = "soccernet-v3"
+        assert api.post("/api/v1/imports", json=body).status_code == 409
+
+    def test_what_is_larger_than_allowed_is_refused_before_it_comes(self, app, api) -> None:
+        place = self.begin(api).headers["location"]
+        object.__setattr__(app.state.services.settings, "max_upload_bytes", 9999)
+        assert self.begin(api).status_code == 413
+        assert self.part(api, place, 0, self.FILM).status_code == 413
+
+    def test_a_part_of_nothing_is_404(self, api) -> None:
+        assert self.part(api, f"{API}/{'a' * 32}", 0, b"x").status_code == 404

@@ -92,7 +92,7 @@ class TestGoldInAFilm:
             leases.submit(batch, copy, ANN, actor="ann")
         assert (kinds.count("gold"), kinds.count("independent")) == (1, 3)
         assert len(shapes) == 1
-        assert get_batch(store, batch).handed_in == 3
+        assert get_batch(store, batch).submitted == 3
         (person,) = read_report(store, "film").people
         (result,) = person.results
         assert (person.person, result.group) == ("ann", film[GOLD])

@@ -224,7 +224,7 @@ class TestStart:
 class TestHandIn:
     def test_it_changes_no_more(self, store, state) -> None:
         take = begin_take(store, state.id, person="ann")
-        assert submit_annotation(store, take.id, actor="ann").handed_in is not None
+        assert submit_annotation(store, take.id, actor="ann").submitted is not None
         with pytest.raises(ConflictError):
             change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
         return_annotation(store, take.id, "the ball", actor="lea")
@@ -239,7 +239,7 @@ class TestHandIn:
         take = begin_take(store, state.id, person="ann")
         judge(store, take.copy_id, "rejected", reason="other")
         found = get_annotation_of_copy(store, take.copy_id)
-        assert (found.verdict, found.handed_in is not None) == ("rejected", True)
+        assert (found.verdict, found.submitted is not None) == ("rejected", True)
         for verdict in ("unreviewed", "accepted", "deferred"):
             with pytest.raises(ConflictError, match="submitted"):
                 judge(store, take.copy_id, verdict)

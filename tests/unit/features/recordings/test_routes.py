@@ -148,6 +148,21 @@ class TestShots:
             (told,) = [e for e in read_log(session) if e.body.get("did") == "shots changed"]
         assert (told.actor, told.body["shots"]) == ("local", 2)
 
+    def test_they_are_a_table_too(self, api, recording: str) -> None:
+        tag = {"If-Match": api.get(f"{recording}/shots").headers["etag"]}
+        shots = [
+            {"first": 0, "last": 9, "kind": "main", "entered_by": "start", "kept": True},
+            {"first": 12, "last": 59, "kind": "replay", "entered_by": "wipe"},
+        ]
+        api.put(f"{recording}/shots", json={"shots": shots}, headers=tag)
+        answer = api.get(f"{recording}/shots.csv")
+        assert answer.headers["content-type"].startswith("text/csv")
+        assert answer.text.splitlines() == [
+            "recording,shot,first,last,start_s,end_s,kind,entered_by,kept",
+            "final,1,0,9,0.0,0.36,main,start,True",
+            "final,2,12,59,0.48,2.36,replay,wipe,",
+        ]
+
     @pytest.mark.parametrize("places", [[(5, 4)], [(0, 60)], [(0, 9), (9, 20)], [(10, 20), (0, 5)]])
     def test_shots_that_cannot_be_are_refused(
         self, api, recording: str, places: list[tuple[int, int]]

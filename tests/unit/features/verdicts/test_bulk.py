@@ -214,7 +214,7 @@ class TestGiveVerdicts:
         self, store, ids, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         for number in range(5):
-            asked = "takes<9" if number in (1, 2, 3) else ""
+            asked = "submissions<9" if number in (1, 2, 3) else ""
             give_verdicts(store, 1, asked, "deferred", note=f"round {number}", actor="ben")
         monkeypatch.setattr(bulk, "judges_in", lambda _: False)
         shown = list_batches(store, 1, 2)

@@ -89,7 +89,7 @@ def test_a_batch_is_told_of_from_giving_out_until_it_is_done(allowed, told, grou
     (made, (kind, handed_on)) = told.new()
     assert made[0] == Kind.GIVEN_OUT and kind == Kind.HANDED_ON
     said = {"id": batch, "name": "Derby", "due": "2031-01-02", "verdicts": 1, "blind": True}
-    counts = {"annotators": ["ada"], "reviewers": [], "groups": 2, "handed_in": 0, "settled": 0}
+    counts = {"annotators": ["ada"], "reviewers": [], "groups": 2, "submitted": 0, "settled": 0}
     assert made[1] == {"dataset": "demo", "actor": "lea", "batch": {**said, **counts}}
     assert handed_on["batch"]["annotators"] == ["bo"] and handed_on["batch"]["name"] == "Derby day"
 
@@ -120,7 +120,7 @@ def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, to
     assert (kind, case["group"], case["people"]) == (Kind.DISPUTED, groups[0], ["ada", "bo"])
     assert case["batch"]["id"] == batch and case["disagreements"] > 0 and case["worst"] > 1
     bo = next(
-        take for take in get_case(allowed, groups[0], actor="cy").takes if take.person == "bo"
+        take for take in get_case(allowed, groups[0], actor="cy").annotations if take.person == "bo"
     )
     return_for_correction(allowed, groups[0], bo.id, "look again", actor="cy")
     ((kind, back),) = told.new()
