@@ -28,6 +28,7 @@ from app.features.policies.noise import NoiseStore
 from app.features.practice.service import resume_practice
 from app.features.predictions.jobs import resume_evaluations
 from app.features.predictions.reader import PredictionReader
+from app.features.recordings.camera_jobs import resume_cameras
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
 from app.features.solve.jobs import resume_solving, solve_leftovers
@@ -131,6 +132,7 @@ class Services:
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_recordings(self.jobs, self.store)
+        resume_cameras(self.jobs, self.store)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
         self.jobs.on_leadership(self._start_leading)

@@ -41,6 +41,7 @@ from app.features.policies.service import read_policy
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
+from app.features.recordings.cameras import Tracked, save_cameras
 from app.features.recordings.links import add_link, get_link
 from app.features.recordings.service import Shot, add_recording, get_shots, index_now, put_shots
 from app.features.solutions.service import solve_dataset
@@ -53,6 +54,7 @@ from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.main import create_app
 from tests.flights import add_flight
+from tests.tracked_frames import frame
 from tests.videos import write_video
 from tests.waiting import SECONDS
 
@@ -152,7 +154,9 @@ def add_recordings(store: Store) -> None:
     for path in (film, film.with_name("gone.mp4")):
         number = add_recording(store, "small", path, actor="local").id
     assert str(number) == DELETED_RECORDING
-    index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
+    found = index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
+    frames = [frame(number, "tracked") for number in range(6)]
+    save_cameras(store, found, (0, 5), Tracked(frames, ()), [], "local")
     put_shots(store, 1, [Shot(0, 19, "replay", "start")], None, actor="local")
     for first in (0, 1):
         number = add_link(store, (1, first, 9), (1, 10, 19), actor="local").id
@@ -347,6 +351,10 @@ class Attack:
             case.body = {"shots": [{"first": 0, "last": 5, "kind": "main"}]}
         if case.operation.path.endswith("/{recording}/groups"):
             case.body = {"frames": [1], "propose": False}
+        if case.operation.path.endswith("/{recording}/cameras") and case.method == "POST":
+            case.body = {"first": 10, "last": 12}
+        if "/cameras/{frame}" in case.operation.path:
+            case.path_parameters["frame"] = "3"
 
     def upload(self, name: str = "predictions.csv") -> str:
         """A file of predictions that fits, or another one of the home."""

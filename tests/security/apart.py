@@ -59,6 +59,7 @@ BODIES: Mapping[str, dict[str, Any]] = {
     "POST /api/v1/recordings": {"source": {}},
     "PUT /api/v1/recordings/{recording}/shots": {"shots": []},
     "POST /api/v1/recordings/{recording}/groups": {"frames": [0]},
+    "POST /api/v1/recordings/{recording}/cameras": {"first": 0, "last": 0},
     "POST /api/v1/recordings/{recording}/links": {
         "live": {"first": 0, "last": 0},
         "replay": {"first": 0, "last": 0},

@@ -27,7 +27,8 @@ JobKind = Literal[
     "pictures",
     "recording",
     "instants",
-    "tracks",
+    "ball",
+    "track",
 ]
 
 

@@ -37,4 +37,4 @@ def _track(call: MatchCall, progress: JobProgress) -> Json:
     )
 
 
-TRACKS = MatchJob("tracks", "Track the ball of {}", _track)
+TRACKS = MatchJob("ball", "Track the ball of {}", _track)

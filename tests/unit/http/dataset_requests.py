@@ -116,6 +116,10 @@ def tracks(api: Any) -> Request:
     return "POST", "/datasets/flight/tracks", {}, {}
 
 
+def tracked_cameras(api: Any) -> Request:
+    return "POST", f"{recording(api)}/cameras", {"first": 0, "last": 9}, {}
+
+
 def link(api: Any) -> Request:
     path = recording(api)
     replay = {"recording": int(path.rpartition("/")[2]), "first": 10, "last": 19}

@@ -96,6 +96,7 @@ KEPT: dict[str, Made] = {
     "changeTrack": dataset_requests.track_verdict,
     "makeTracks": dataset_requests.tracks,
     "takeInstants": dataset_requests.instants,
+    "trackCameras": dataset_requests.tracked_cameras,
     "withdrawSubmission": group_requests.hand_in_taken_back,
     "revertNoise": dataset_requests.no_noise,
     "revertPositions": dataset_requests.no_positions,

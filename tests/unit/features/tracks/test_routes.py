@@ -31,7 +31,7 @@ def track(api: Any, services: Services) -> dict[str, Any]:
     answer = api.post(TRACKS, json={})
     assert answer.status_code == 202, answer.text
     job = services.jobs.wait(answer.json()["id"], SECONDS)
-    assert (job.state, job.kind) == ("done", "tracks"), job.problem
+    assert (job.state, job.kind) == ("done", "ball"), job.problem
     assert job.sentence == "The ball was tracked over 1 stretch."
     (found,) = api.get(TRACKS).json()["items"]
     return dict(found)

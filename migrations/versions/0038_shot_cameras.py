@@ -1,4 +1,4 @@
-"""Tracks of the ball over stretches."""
+"""Cameras of the shots of recordings."""
 
 from collections.abc import Sequence
 
@@ -13,27 +13,22 @@ depends_on: str | Sequence[str] | None = None
 
 def upgrade() -> None:
     op.create_table(
-        "track",
+        "shot_cameras",
         sa.Column("id", sa.Integer(), nullable=False),
         sa.Column("dataset_id", sa.Integer(), nullable=False),
-        sa.Column("key", sa.String(), nullable=False),
-        sa.Column("match", sa.String(), nullable=False),
+        sa.Column("recording_id", sa.Integer(), nullable=False),
         sa.Column("first", sa.Integer(), nullable=False),
         sa.Column("last", sa.Integer(), nullable=False),
-        sa.Column("stamp", sa.String(), nullable=False),
+        sa.Column("sha256", sa.String(), nullable=False),
         sa.Column("digest", sa.String(), nullable=False),
-        sa.Column("inputs", sa.LargeBinary(), nullable=False),
-        sa.Column("body", sa.LargeBinary(), nullable=False),
         sa.Column("summary", sa.String(), nullable=False),
-        sa.Column("corrections", sa.String(), nullable=False),
+        sa.Column("before", sa.String(), nullable=True),
+        sa.Column("before_summary", sa.String(), nullable=True),
         sa.Column("revision", sa.Integer(), nullable=False),
-        sa.Column("verdict", sa.String(), nullable=True),
-        sa.Column("note", sa.String(), nullable=True),
-        sa.Column("judged_by", sa.String(), nullable=True),
-        sa.Column("judged_at", sa.String(), nullable=True),
         sa.Column("actor", sa.String(), nullable=False),
         sa.Column("created", sa.String(), nullable=False),
         sa.ForeignKeyConstraint(["dataset_id"], ["dataset.id"]),
+        sa.ForeignKeyConstraint(["recording_id"], ["recording.id"], ondelete="CASCADE"),
         sa.PrimaryKeyConstraint("id"),
-        sa.UniqueConstraint("dataset_id", "key", name="track_key"),
+        sa.UniqueConstraint("recording_id", "first", name="shot_cameras_first"),
     )
