@@ -56,6 +56,7 @@ KNOWN_REVISIONS = (
     "0036",
     "0037",
     "0038",
+    "0039",
 )
 """Every revision that this version can migrate, oldest first."""
 SCHEMA_REVISION = KNOWN_REVISIONS[-1]
