@@ -20,7 +20,7 @@ from app.features.recordings.service import (
     read_index_at,
 )
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.tracking.link import SLOWEST
+from app.tracking.link_fit import SLOWEST
 from app.video.repeats import blended, repeated
 
 SUGGESTED = 6
