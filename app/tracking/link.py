@@ -35,7 +35,7 @@ def find_time_map(
             a frame. Two say a map where the ball says none.
     """
     given = np.array(hints, dtype=float).reshape(-1, 2)
-    made = _from_ball(live, replay, given)
+    made = map_of_ball(live, replay, given)
     if made.pieces:
         return made
     if made.reason is not None and len(given) > 1 and np.ptp(given[:, 1]) > 0:
@@ -43,8 +43,8 @@ def find_time_map(
     return made
 
 
-def _from_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool = True) -> TimeMap:
-    """The map that the ball says; with its pieces where a ``whole`` replay has several."""
+def map_of_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool = True) -> TimeMap:
+    """The map that the ball says, near the hints, shape (N, 2); with its pieces where a ``whole`` replay has several."""
     for name, rays in (("live", live), ("replay", replay)):
         if len(rays) < FEWEST_PAIRS:
             reason = (
@@ -61,6 +61,21 @@ def _from_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool 
     best = max(found, key=fit.evidence)
     made = judged(fit, best, found)
     return _in_pieces(fit, made, best, found) if whole else made
+
+
+def ray_misses(live: BallRays, replay: BallRays, made: TimeMap) -> tuple[FloatArray, FloatArray]:
+    """Times of the rays of a replay that have live ones beside them under a map, and how far they miss, metres."""
+    times, misses = [np.zeros(0)], [np.zeros(0)]
+    for piece in made.pieces or (made,):
+        assert piece.offset is not None and piece.speed is not None
+        inside = (replay.times >= piece.first) & (replay.times <= piece.last)
+        part = replay.part(np.flatnonzero(inside))
+        if len(part):
+            fit = Fit(live, part, np.zeros((0, 2)))
+            pairs = fit.pairs(Map(piece.offset, piece.speed, 0.0))
+            times.append(part.times[pairs.replay])
+            misses.append(np.abs(pairs.miss))
+    return np.concatenate(times), np.concatenate(misses)
 
 
 def _by_hand(live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
@@ -100,7 +115,7 @@ def _in_pieces(fit: Fit, made: TimeMap, best: Map, found: Sequence[Map]) -> Time
     parts = [replay.part(rows) for rows in _stretches(fit, maps)]
     pieces: list[TimeMap] = []
     for part in parts if len(parts) > 1 else ():
-        piece = _from_ball(live, part, fit.hints[:0], whole=False)
+        piece = map_of_ball(live, part, fit.hints[:0], whole=False)
         if piece.reason is None and (not pieces or _differ(pieces[-1], piece)):
             pieces.append(piece)
     if len(pieces) > 1:

@@ -10,7 +10,8 @@ import numpy as np
 
 from app.db.store import Store
 from app.errors import InputError
-from app.features.recordings.links import ShotLink, list_links, need_link, shot_seconds, step_of
+from app.features.recordings.link_values import ShotLink
+from app.features.recordings.links import list_links, need_link, shot_seconds, step_of
 from app.features.recordings.service import (
     Recording,
     Shot,

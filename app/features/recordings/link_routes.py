@@ -6,8 +6,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
+from app.features.jobs.queries import Job
+from app.features.recordings.link_ball import request_ball_link
 from app.features.recordings.link_frames import linked_frames, suggest_live
 from app.features.recordings.link_schemas import (
+    BallLinkRequest,
     InstantsEdit,
     LinkDocument,
     LinkedFramesDocument,
@@ -15,18 +18,13 @@ from app.features.recordings.link_schemas import (
     LiveSuggestions,
     NewLink,
 )
-from app.features.recordings.links import (
-    ShotLink,
-    add_link,
-    get_link,
-    list_links,
-    remove_link,
-    set_instants,
-)
+from app.features.recordings.link_values import ShotLink
+from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
 from app.finite import MAX_ID
 from app.http.conflicts import current_state
 from app.http.cursor import paged
-from app.http.deps import Actor, AppStore, Id, IfMatch
+from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
+from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import document, no_content, responds
@@ -144,6 +142,24 @@ def put_instants(
             if_match,
             actor=actor,
         )
+
+
+@router.post("/links/{link}/ball", operation_id="linkByBall", **by_job(404, 413, 415))
+@may(
+    Action.LEAD,
+    recording=OwnedKind.RECORDING,
+    body={"live_upload": OwnedKind.UPLOAD, "replay_upload": OwnedKind.UPLOAD},
+)
+@responds(job_answer)
+def link_by_ball(
+    recording: Id, link: LinkId, wanted: BallLinkRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Find the times of a link from the ball, near its instants: rays of the same instant meet.
+
+    Both shots need cameras over time, or groups with given cameras. What the ball does not tell is refused in words.
+    """
+    uploads = {"live": wanted.live_upload, "replay": wanted.replay_upload}
+    return request_ball_link(services.jobs, services.store, recording, link, uploads, actor=actor)
 
 
 @router.delete(

@@ -8,13 +8,8 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.recordings.link_frames import LinkedFrames, LiveSuggestion
-from app.features.recordings.links import (
-    MAX_INSTANTS,
-    Instant,
-    LinkedShot,
-    LinkMap,
-    LinkPiece,
-)
+from app.features.recordings.link_values import Instant, LinkedShot, LinkMap, LinkPiece, RayMiss
+from app.features.recordings.links import MAX_INSTANTS
 from app.features.recordings.schemas import Frame
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
@@ -89,6 +84,21 @@ class InstantsEdit(BaseModel):
         return [(one.live, one.replay) for one in self.instants]
 
 
+class BallLinkRequest(BaseModel):
+    """Where the ball is seen in the two shots."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
+
+    live_upload: Annotated[str, Field(max_length=64)] | None = Field(
+        default=None,
+        description="Id of an upload: `ball.csv` (`frame,time_s,x,y`, pixels) of the live recording; null: the balls of "
+        "the groups that were taken from the shots.",
+    )
+    replay_upload: Annotated[str, Field(max_length=64)] | None = Field(
+        default=None, description="The same of the recording of the replay."
+    )
+
+
 class LinkedShotDocument(Document, shows=LinkedShot):
     """One side of a link."""
 
@@ -121,6 +131,13 @@ class LinkPieceDocument(Document, shows=LinkPiece):
     speed_sigma: float = Field(description="Standard deviation of the speed.")
 
 
+class RayMissDocument(Document, shows=RayMiss):
+    """How far a ray of the ball misses those of the live shot."""
+
+    frame: int = Field(description="Frame of the replay.")
+    miss_m: float = Field(description="Distance of the rays, metres.")
+
+
 class LinkMapDocument(Document, shows=LinkMap):
     """Which time of the live shot each time of a replay shows: `live = offset_s + speed * replay`.
 
@@ -145,6 +162,12 @@ class LinkMapDocument(Document, shows=LinkMap):
     )
     pieces: list[LinkPieceDocument] = Field(
         description="Where the speed changes: the parts with one speed each."
+    )
+    misses: list[RayMissDocument] = Field(
+        description="Of the ball's rays, where the times were found from them."
+    )
+    ball_reason: str | None = Field(
+        description="Why the ball did not tell the times, where instants do; null: it was not asked."
     )
 
 
