@@ -8,12 +8,11 @@ from fastapi import APIRouter, Path, Response
 
 from app.features.jobs.queries import Job
 from app.features.recordings.link_ball import request_ball_link
-from app.features.recordings.link_frames import linked_frames, suggest_live
+from app.features.recordings.link_frames import LinkedFrames, linked_frames, suggest_live
 from app.features.recordings.link_schemas import (
     BallLinkRequest,
     InstantsEdit,
     LinkDocument,
-    LinkedFramesDocument,
     LinkList,
     LiveSuggestions,
     NewLink,
@@ -53,7 +52,9 @@ def _made(found: ShotLink) -> Response:
 @paged()
 def get_links(recording: Id, store: AppStore) -> LinkList:
     """The links of a recording, in which it has the live shot or the replay."""
-    return LinkList.model_validate({"items": list_links(store, recording)})
+    return LinkList(
+        items=[LinkDocument.model_validate(one) for one in list_links(store, recording)]
+    )
 
 
 @router.post(
@@ -91,7 +92,7 @@ def add_one(recording: Id, wanted: NewLink, store: AppStore, actor: Actor) -> Sh
 @paged()
 def get_suggestions(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveSuggestions:
     """Live shots that the replay at a frame may show, the likeliest first, and why."""
-    return LiveSuggestions.model_validate({"items": suggest_live(store, recording, frame)})
+    return LiveSuggestions(items=suggest_live(store, recording, frame))
 
 
 @router.get("/links/{link}", operation_id="getLink", responses={**responses(404), 200: TAGGED})
@@ -105,10 +106,9 @@ def get_one(recording: Id, link: LinkId, store: AppStore, response: Response) ->
 
 @router.get("/links/{link}/frames", operation_id="getLinkedFrames", responses=responses(404, 409))
 @may(Action.READ, recording=OwnedKind.RECORDING)
-def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFramesDocument:
+def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
     """Which frame of the replay shows the same as each live frame."""
-    found = linked_frames(store, get_link(store, recording, link))
-    return LinkedFramesDocument.model_validate(found)
+    return linked_frames(store, get_link(store, recording, link))
 
 
 @router.put(
