@@ -51,9 +51,10 @@ def write_tracab(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
 def write_cdf(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     """Write ``tracking.jsonl`` of each track: a JSON object a frame, the ball alone.
 
-    Metres from the centre spot, x along the pitch, y across it away from the main stand, z up; null in
-    gaps and beyond what the format has room for. Its frames count from 0, the first of the stretch. Times of the stretch count from 1970-01-01; both
-    teams have no players.
+    Metres from the centre spot, x along the pitch, y across it away from the main stand, z up. Frames in
+    gaps, and with a ball beyond what the format has room for, are left out: its validator takes no null.
+    Frames count from 0, the first that is written; times of the stretch from 1970-01-01; both teams
+    have no players.
 
     Returns:
         Counts: ``tracks``, ``frames`` and ``balls``.
@@ -62,13 +63,11 @@ def write_cdf(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     """
     counts = {"tracks": 0, "frames": 0, "balls": 0}
     for folder, record in track_folders(root, records):
-        lines = list(_cdf_lines(record))
-        (folder / CDF).write_text(
-            "".join(f"{json_text(line)}\n" for line in lines), encoding="utf-8"
-        )
+        lines = [f"{json_text(line)}\n" for line in _cdf_lines(record)]
+        (folder / CDF).write_text("".join(lines), encoding="utf-8")
         counts["tracks"] += 1
-        counts["frames"] += len(lines)
-        counts["balls"] += sum(line["ball"]["x"] is not None for line in lines)
+        counts["frames"] += len(record.track.frames)
+        counts["balls"] += len(lines)
     return counts
 
 
@@ -91,18 +90,17 @@ def _metadata(record: TrackRecord) -> str:
 def _cdf_lines(record: TrackRecord) -> Iterator[dict[str, Any]]:
     track = record.track
     nobody = {side: {"id": side, "players": list[Any]()} for side in ("home", "away")}
-    for row in range(len(track.frames)):
+    there = record.there & (np.abs(np.nan_to_num(track.position[:, :2])) <= CDF_LIMITS).all(axis=1)
+    rows = np.flatnonzero(there).tolist()
+    for row in rows:
         x, y, z = (track.position[row] * (1, -1, -1)).tolist()
-        inside = abs(x) <= CDF_LIMITS[0] and abs(y) <= CDF_LIMITS[1]
-        ball = {"x": x, "y": y, "z": max(z, 0.0)} if inside else dict.fromkeys("xyz")
-        status = {"status": track.mode[row] != "out"} if track.mode[row] else {}
         yield {
-            "frame_id": row,
+            "frame_id": int(track.frames[row] - track.frames[rows[0]]),
             "timestamp": _timestamp(float(track.times[row])),
             "period": "first_half",
             "match": {"id": record.key},
             "teams": nobody,
-            "ball": {**ball, **status},
+            "ball": {"x": x, "y": y, "z": max(z, 0.0), "status": track.mode[row] != "out"},
         }
 
 

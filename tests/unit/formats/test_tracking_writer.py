@@ -79,18 +79,18 @@ class TestWriteCdf:
         assert write_cdf(tmp_path, [record]) == {"tracks": 1, "frames": 60, "balls": 58}
         assert read_by(VALIDATOR, tmp_path, tmp_path) == {"valid": True, "raised": []}
 
-    def test_the_ball_is_z_up_and_null_in_gaps(self, record: TrackRecord, tmp_path: Path) -> None:
+    def test_the_ball_is_z_up_and_frames_in_gaps_are_left_out(
+        self, record: TrackRecord, tmp_path: Path
+    ) -> None:
         write_cdf(tmp_path, [record])
-        lines = [
-            json.loads(line) for line in (tmp_path / "tracking.jsonl").read_text().splitlines()
-        ]
+        lines = list(map(json.loads, (tmp_path / "tracking.jsonl").read_text().splitlines()))
         assert lines[0]["timestamp"] == "1970-01-01T00:00:04.000+00:00"
-        x, y, z = record.track.position[30]
+        assert [line["frame_id"] for line in lines] == [n for n in range(60) if n not in (20, 21)]
+        x, y, z = record.track.position[32]
         assert lines[30]["ball"] == {"x": x, "y": -y, "z": -z, "status": True}
-        assert lines[20]["ball"] == {"x": None, "y": None, "z": None}
-        assert lines[59]["ball"]["status"] is False
+        assert lines[-1]["ball"]["status"] is False
 
-    def test_a_ball_beyond_what_it_has_room_for_is_null(
+    def test_a_ball_beyond_what_it_has_room_for_is_left_out(
         self, record: TrackRecord, tmp_path: Path
     ) -> None:
         position = record.track.position.copy()
