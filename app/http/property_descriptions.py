@@ -181,7 +181,8 @@ PROPERTIES: Mapping[str, str] = {
     "gamma_percent": "Tolerance in per cent of the image diagonal.",
     "gate": "Name of the gate.",
     "gates": "The gates in their order, and which of them the group passes.",
-    "goal": "Which line of a goal lines are fitted to: `inner` edges or `middle` of posts and bar.",
+    "goal": "What lines are fitted to: `inner` edges or `middle` of posts and bar, or `laws`, "
+    "the middle and lines that lie half their width inside the plan.",
     "group": "Id of the group.",
     "AuditEntry.group": "Key of the group; null where it concerns none.",
     "CaseDocument.group": "The group.",

@@ -96,6 +96,7 @@ def paint_of(
         people: Boxes in which nothing is believed, pixels of ``size``; what is larger than people
             are is looked into all the same.
     """
+    pitch = policy.fitted(pitch)
     why = why_unreadable(image, size)
     if why is not None:
         return ViewPaint("nothing", sentence=why)

@@ -25,7 +25,7 @@ CIRCLE_RADIUS = 9.15
 GOAL_WIDTH = 7.32
 GOAL_HEIGHT = 2.44
 FRAME_WIDTH = 0.12
-"""Of posts and crossbar: the Laws allow no more, and nobody builds less."""
+"""Of posts and crossbar: the Laws allow no more, and nobody builds less. Lines are as wide."""
 LENGTH_RANGE = (90.0, 120.0)
 WIDTH_RANGE = (45.0, 90.0)
 
@@ -133,16 +133,18 @@ class Arc:
         return self.last - self.first >= 2 * math.pi - 1e-12
 
 
-GoalEdge = Literal["inner", "middle"]
-"""Which line along posts and crossbar stands for them: their inner edges, 7.32 x 2.44 m, as the
-public evaluator has it, or their middle, 7.44 x 2.50 m, where people click."""
+GoalEdge = Literal["inner", "middle", "laws"]
+"""What stands for posts, crossbar and lines. ``inner``: the inner edges of a goal, 7.32 x 2.44 m, as the
+public evaluator has it; ``middle``: the middle of its frame, 7.44 x 2.50 m, where people click; ``laws``:
+that, and the middle of each line's paint, which lies half a line inside the plan, because the Laws
+measure to the outer edges."""
 
 
 @dataclass(frozen=True)
 class Pitch:
     """A pitch of the given size; everything else is fixed by the Laws of the Game.
 
-    ``goal`` says which line of a goal's frame its markings are. It is no property of a pitch, so
+    ``goal`` says which line of a goal's frame and of the paint its markings are. It is no property of a pitch, so
     nothing of it is stored: ``CalibrationPolicy.fitted`` chooses it where lines are fitted.
     """
 
@@ -161,11 +163,12 @@ class Pitch:
     @cached_property
     def shapes(self) -> dict[str, Segment | Arc]:
         """Geometry of each marking, by name."""
-        beside = FRAME_WIDTH / 2 if self.goal == "middle" else 0.0
-        return _shapes(self.length / 2, self.width / 2, beside)
+        half = FRAME_WIDTH / 2
+        beside, inside = half * (self.goal != "inner"), half * (self.goal == "laws")
+        return _shapes(self.length / 2, self.width / 2, beside, inside)
 
     def with_goal(self, goal: GoalEdge) -> Pitch:
-        """The same pitch with that line of its goals."""
+        """The same pitch with that line of its goals, and of its lines."""
         return self if goal == self.goal else replace(self, goal=goal)
 
     def sample(self, marking: str, spacing: float, circle_spacing: float) -> FloatArray:
@@ -199,34 +202,40 @@ def _sample_arc(arc: Arc, spacing: float) -> FloatArray:
     return np.column_stack([x, y, np.zeros_like(x)])
 
 
-def _shapes(half_length: float, half_width: float, beside: float) -> dict[str, Segment | Arc]:
-    """All shapes; those of goals lie ``beside`` their inner edges, metres."""
+def _shapes(
+    half_length: float, half_width: float, beside: float, inside: float
+) -> dict[str, Segment | Arc]:
+    """All shapes; those of goals lie ``beside`` their inner edges, lines ``inside`` the plan, metres.
+
+    Goals stand on the outer edge of the goal line, and marks lie where the plan has them.
+    """
+    end, side_line, radius = half_length - inside, half_width - inside, CIRCLE_RADIUS - inside
     shapes: dict[str, Segment | Arc] = {
-        "Side line top": _grass((-half_length, -half_width), (half_length, -half_width)),
-        "Side line bottom": _grass((-half_length, half_width), (half_length, half_width)),
-        "Side line left": _grass((-half_length, -half_width), (-half_length, half_width)),
-        "Side line right": _grass((half_length, -half_width), (half_length, half_width)),
-        "Middle line": _grass((0.0, -half_width), (0.0, half_width)),
-        "Circle central": Arc((0.0, 0.0), CIRCLE_RADIUS, 0.0, 2 * math.pi),
+        "Side line top": _grass((-end, -side_line), (end, -side_line)),
+        "Side line bottom": _grass((-end, side_line), (end, side_line)),
+        "Side line left": _grass((-end, -side_line), (-end, side_line)),
+        "Side line right": _grass((end, -side_line), (end, side_line)),
+        "Middle line": _grass((0.0, -side_line), (0.0, side_line)),
+        "Circle central": Arc((0.0, 0.0), radius, 0.0, 2 * math.pi),
     }
     # The penalty arc is what lies outside the penalty area.
-    half_opening = math.acos((PENALTY_AREA_LENGTH - PENALTY_MARK_DISTANCE) / CIRCLE_RADIUS)
+    half_opening = math.acos((PENALTY_AREA_LENGTH - inside - PENALTY_MARK_DISTANCE) / radius)
     for side, sign in (("left", -1.0), ("right", 1.0)):
         goal_line = sign * half_length
         for name, depth, width in (
             ("Big rect.", PENALTY_AREA_LENGTH, PENALTY_AREA_WIDTH),
             ("Small rect.", GOAL_AREA_LENGTH, GOAL_AREA_WIDTH),
         ):
-            front = goal_line - sign * depth
-            left, right = sorted((goal_line, front))
-            half = width / 2
+            front = goal_line - sign * (depth - inside)
+            left, right = sorted((sign * end, front))
+            half = width / 2 - inside
             shapes[f"{name} {side} top"] = _grass((left, -half), (right, -half))
             shapes[f"{name} {side} bottom"] = _grass((left, half), (right, half))
             shapes[f"{name} {side} main"] = _grass((front, -half), (front, half))
         mark = goal_line - sign * PENALTY_MARK_DISTANCE
         facing = 0.0 if side == "left" else math.pi
         shapes[f"Circle {side}"] = Arc(
-            (mark, 0.0), CIRCLE_RADIUS, facing - half_opening, facing + half_opening
+            (mark, 0.0), radius, facing - half_opening, facing + half_opening
         )
         # Posts are named as seen from the pitch.
         half, height = GOAL_WIDTH / 2 + beside, GOAL_HEIGHT + beside

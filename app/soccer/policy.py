@@ -129,20 +129,21 @@ class CalibrationPolicy:
     as the Laws allow, and the picture may have been stretched or cropped. Not in the ``repr``: what
     it makes of a calibration has a key of its own."""
 
-    goal: Literal["inner", "middle"] = _threshold(
+    goal: Literal["inner", "middle", "laws"] = _threshold(
         "inner",
         CALIBRATION,
-        "What people click of a goal's frame",
-        choices=("inner", "middle"),
+        "What people click of goals and lines",
+        choices=("inner", "middle", "laws"),
         later=True,
         shown=False,
     )
     """``inner``: the inner edges of posts and crossbar, as the public evaluator has them;
-    ``middle``: their middle, where people click. JaC asks for the inner edges in either case. Not
-    in the ``repr``: ``calibration_key`` knows it where it is the middle."""
+    ``middle``: their middle, where people click; ``laws``: that, and lines half their width
+    inside the plan, as the Laws measure to outer edges. JaC asks for the inner edges and the plan
+    in any case. Not in the ``repr``: ``calibration_key`` knows it where it is another."""
 
     def fitted(self, pitch: Pitch) -> Pitch:
-        """A pitch with the goals that lines are fitted to."""
+        """A pitch with the goals and lines that are fitted."""
         return pitch.with_goal(self.goal)
 
     @cached_property

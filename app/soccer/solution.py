@@ -143,7 +143,8 @@ class Calibration:
         pitch_covariance: What ``covariance`` lacks where a camera was placed by paint: what nobody
             knows of the pitch (its size, how it is laid and painted), 8 x 8, row by row. All cameras
             of a match have it in common, so it says nothing of how their rays miss each other.
-        goal: Which line of the goals the distances are to; JaC is told by their inner edges.
+        goal: Which line of the goals and of the paint the distances are to; JaC is told by inner edges
+            and the plan.
     """
 
     source: str

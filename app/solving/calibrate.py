@@ -301,7 +301,7 @@ def calibrate_paint(
     resection = ResectionProblem.of(size, policy)
     known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
     problem = PaintProblem.of(resection, resection.parameters(clicked.camera), known)
-    found = solve_paint(problem, reading.evidence, pitch)
+    found = solve_paint(problem, reading.evidence, policy.fitted(pitch))
     if found is None:
         return replace(clicked, paint=replace(fit, reason=PAINT_DISAGREES))
     painted = replace(
@@ -423,8 +423,8 @@ def measure(
     """The calibration with JaC and the distances of the annotated points filled in.
 
     Without lines there is no JaC; the projected markings are there all the same, but for those that
-    nobody drew and that are ``not_missing``. Distances are those to the goals of ``pitch``, JaC and
-    the outcomes that it counts are told by the evaluator's goals.
+    nobody drew and that are ``not_missing``. Distances are those to the goals and lines of ``pitch``,
+    JaC and the outcomes that it counts are told by the evaluator's.
     """
     if calibration.camera is None:
         return calibration

@@ -95,11 +95,11 @@ def evaluated(
     lines: Lines,
     measured: Mapping[str, ProjectedMarking],
 ) -> dict[str, ProjectedMarking]:
-    """Visible markings as the public evaluator has them: its goals are their inner edges.
+    """Visible markings as the public evaluator has them: inner edges of goals, lines of the plan.
 
     Args:
         camera: In the pitch frame.
-        pitch: The pitch with the goals that ``measured`` is about.
+        pitch: The pitch with the goals and lines that ``measured`` is about.
         size: Of the picture, pixels.
         lines: The annotated points of each marking, pixels.
         measured: Of ``measure_markings`` for that pitch.
@@ -107,9 +107,10 @@ def evaluated(
     judged = pitch.with_goal("inner")
     if judged == pitch:
         return dict(measured)
-    projected = project_markings(camera, judged, size, GOAL_PARTS)
-    goals = measure_markings(projected, lines)
-    both = {name: one for name, one in measured.items() if name not in GOAL_PARTS} | goals
+    others = MARKINGS if pitch.goal == "laws" else GOAL_PARTS
+    projected = project_markings(camera, judged, size, others)
+    again = measure_markings(projected, lines)
+    both = {name: one for name, one in measured.items() if name not in others} | again
     return {name: both[name] for name in MARKINGS if name in both}
 
 

@@ -20,6 +20,8 @@ TOUCH_SPEED = 6.0
 """Change of each horizontal component by a touch after which the ball rolls on, m/s."""
 KICKS_A_SECOND, HOLDS_A_SECOND = 0.6, 0.05
 """How often a ball is touched, and taken into somebody's keeping."""
+LEAST_CHANGE = 2.5
+"""Of the velocity by what is called an event; hops of a rolling ball are less, m/s."""
 REACH = 2.7
 """Height above which nobody but a keeper touches a ball, metres."""
 GRASS_SIGMA = 0.07

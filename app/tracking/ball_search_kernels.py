@@ -352,6 +352,10 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
                 off = max(room[i, 0] - m[i], m[i] - room[i, 1]) - slack
                 if off > 0:
                     cs[c] -= min(off / 0.2, 8.0) ** 2 / 2
+            if cmode[c] == HELD:
+                off = -m[2] - REACH - 2 * np.sqrt(max(P[2, 2], 0.0))
+                if off > 0:
+                    cs[c] -= min(off / 0.2, 8.0) ** 2 / 2
             best = max(best, cs[c])
         order = np.argsort(-cs[:made])
         kept = 0

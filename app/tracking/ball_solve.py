@@ -12,7 +12,7 @@ from scipy.stats import norm
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_fit import Fitted, fit
-from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, NOTHING, REST, ROLL
+from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, LEAST_CHANGE, NOTHING, REST, ROLL
 from app.tracking.ball_prediction import left_out, summed
 from app.tracking.ball_search import History, Knots, knots_of, search
 from app.tracking.ball_track import (
@@ -347,8 +347,11 @@ def _events(
     frames: IntArray,
     times: FloatArray,
 ) -> Iterator[BallEvent]:
-    """Kicks and bounces, where the track is known."""
+    """Kicks and bounces that change the velocity clearly, where the track is known."""
     for at in np.flatnonzero((history.event != NOTHING) & known):
+        change = fitted.state[at, 3:6] - fitted.state[at - 1, 3:6]
+        if np.linalg.norm(change) < LEAST_CHANGE:
+            continue
         kind: EventKind = "bounce" if history.event[at] == BOUNCE else "kick"
         when = float(fitted.event_time[at])
         before = fitted.state[at - 1]

@@ -12,6 +12,7 @@ from pathlib import Path
 from tests.bench.annotators import bench_annotators
 from tests.bench.ball import bench_ball
 from tests.bench.ball_noise import bench_ball_noise
+from tests.bench.ball_track import bench_ball_track
 from tests.bench.browser import bench_browser
 from tests.bench.calibration import bench_calibration
 from tests.bench.clips import bench_clips
@@ -70,6 +71,7 @@ def main() -> None:
     bench_shots(REAL_DATA)
     bench_track(REAL_DATA)
     bench_link(REAL_DATA)
+    bench_ball_track(REAL_DATA)
     bench_requests()
     bench_listeners()
     bench_browser()

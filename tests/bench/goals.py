@@ -1,4 +1,4 @@
-"""What the middle of a goal's frame is worth: grass markings that were left out of real frames with goals.
+"""What the middle of a goal's frame, and of lines, is worth: grass markings that were left out of real frames with goals.
 
 ``python -m tests.bench.goals`` takes the dev half of sn22-dev, every other frame; ``4`` every fourth
 of these.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,11 @@ from tests.bench.table import print_table
 SIZE, PITCH = ImageSize(960, 540), Pitch()
 LIMIT_PX = 5.5
 DEV_HALF = slice(None, None, 2)
-POLICIES = {"inner edges (paper)": CalibrationPolicy(), "middle (all others)": CLICKED}
+POLICIES = {
+    "inner edges (paper)": CalibrationPolicy(),
+    "middle (all others)": CLICKED,
+    "middle, lines by the Laws (calibrate --goal laws)": replace(CLICKED, goal="laws"),
+}
 
 
 def bench_goals(data: Path, every: int = 1) -> None:

@@ -30,7 +30,7 @@ from app.progress import ReportProgress
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
-from app.soccer.pitch import Pitch
+from app.soccer.pitch import GoalEdge, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import as_lone, calibrate, look_alone
@@ -70,6 +70,7 @@ def calibrate_files(
     *,
     size: ImageSize,
     labels: str = "checked",
+    goal: GoalEdge = "middle",
     with_leave_one_out: bool = False,
     matches: Path | None = None,
     guess: bool = False,
@@ -86,6 +87,7 @@ def calibrate_files(
             if asked, ``leave_one_out.json``. What an earlier run left there is replaced.
         size: Size of the annotated images.
         labels: ``checked`` leaves out markings found mislabelled, ``given`` trusts all.
+        goal: What people click of goals and lines.
         with_leave_one_out: Also drop each marking in turn.
         matches: File that names the match of each frame (``read_matches``): frames of a match
             share what they say of the main camera's position.
@@ -113,7 +115,7 @@ def calibrate_files(
         files = as_taken(files, geometry)
     named = None if matches is None else read_matches(matches)
     sharing = guess or named is not None
-    policy = replace(CLICKED, check_labels=labels == "checked", lone_frames="any")
+    policy = replace(CLICKED, goal=goal, check_labels=labels == "checked", lone_frames="any")
     chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
     rounds = 2 if sharing else 1
 

@@ -38,6 +38,14 @@ class Labels(StrEnum):
     GIVEN = "given"
 
 
+class Goal(StrEnum):
+    """What people click of goals and lines (``soccer.pitch.GoalEdge``)."""
+
+    INNER = "inner"
+    MIDDLE = "middle"
+    LAWS = "laws"
+
+
 @commands.command()
 def calibrate(
     source: LineFiles,
@@ -46,6 +54,13 @@ def calibrate(
     labels: Annotated[Labels, typer.Option(help="checked leaves out wrong labels.")] = (
         Labels.CHECKED
     ),
+    goal: Annotated[
+        Goal,
+        typer.Option(
+            help="What is clicked of goals: their inner edges, or their middle; laws is the middle, "
+            "and lines whose outer edges make the pitch, as on grass."
+        ),
+    ] = Goal.MIDDLE,
     leave_one_out: Annotated[
         bool, typer.Option("--leave-one-out", help="Also calibrate without each marking in turn.")
     ] = False,
@@ -80,6 +95,7 @@ def calibrate(
             out,
             size=size,
             labels=labels.value,
+            goal=goal.value,
             with_leave_one_out=leave_one_out,
             matches=named,
             guess=matches == "auto",

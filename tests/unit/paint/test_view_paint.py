@@ -38,6 +38,19 @@ def test_paint_lies_on_the_markings_of_the_true_camera(rendered) -> None:
     assert np.median(apart) < 0.2
 
 
+def test_paint_is_sought_and_judged_on_the_lines_that_the_policy_fits(rendered) -> None:
+    """The picture shows a pitch whose lines lie where the plan has them, not by the Laws."""
+    laws = replace(POLICY, goal="laws")
+    found = paint_of(rendered.image, SIZE, rendered.clicked, Pitch(), laws)
+    plan = seen(rendered.image, rendered.clicked)
+    assert found.error_px > 1.5 * plan.error_px
+    assert replace(found, error_px=None) != replace(plan, error_px=None)
+    middle = paint_of(
+        rendered.image, SIZE, rendered.clicked, Pitch(), replace(POLICY, goal="middle")
+    )
+    assert middle == plan
+
+
 def test_a_smaller_picture_is_told_in_the_pixels_of_its_annotations(rendered) -> None:
     small = np.asarray(cv2.resize(rendered.image, (960, 540), interpolation=cv2.INTER_AREA))
     whole, found = seen(rendered.image, rendered.clicked), seen(small, rendered.clicked)

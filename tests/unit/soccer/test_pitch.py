@@ -49,6 +49,36 @@ class TestConventions:
         assert left[:, 0].max() == pytest.approx(-41.5 + 9.15, abs=1e-3)
 
 
+class TestByTheLaws:
+    """Outer edges make the pitch: the middle of each line lies half a line inside the plan."""
+
+    LAWS = Pitch(100.0, 64.0).with_goal("laws")
+
+    def test_every_line_moves_half_its_width_into_the_area_that_it_bounds(self):
+        shapes = self.LAWS.shapes
+        assert shapes["Side line top"].start == pytest.approx((-49.94, -31.94, 0.0))
+        assert shapes["Side line right"].end == pytest.approx((49.94, 31.94, 0.0))
+        assert shapes["Big rect. left main"].start == pytest.approx((-33.56, -20.10, 0.0))
+        assert shapes["Small rect. right bottom"].end == pytest.approx((49.94, 9.10, 0.0))
+        assert shapes["Middle line"].start == pytest.approx((0.0, -31.94, 0.0))
+        assert shapes["Circle central"].radius == pytest.approx(9.09)
+
+    def test_the_penalty_arc_ends_on_the_middle_of_the_penalty_areas_line(self):
+        arc = self.LAWS.sample("Circle right", 0.9, 0.2)
+        assert arc[[0, -1], 0] == pytest.approx([33.56, 33.56])
+        assert self.LAWS.shapes["Circle right"].center == (39.0, 0.0)
+
+    def test_goals_have_their_middle_and_stand_on_the_goal_lines_outer_edge(self):
+        post = self.LAWS.shapes["Goal right post right"]
+        assert post.start == pytest.approx((50.0, 3.72, -2.50))
+
+    def test_nothing_else_moves_a_line(self):
+        middle = PITCH.with_goal("middle").shapes
+        assert {name for name in MARKINGS if middle[name] != PITCH.shapes[name]} == {
+            name for name in MARKINGS if name.startswith("Goal")
+        }
+
+
 class TestTwinMarking:
     @pytest.mark.parametrize("marking", MARKINGS)
     def test_is_the_marking_that_a_half_turn_puts_there(self, marking):

@@ -82,6 +82,13 @@ class TestHash:
         assert isinstance(post, Segment) and post.start == pytest.approx((-50.0, 3.72, -2.5))
         assert PAPER.calibration.fitted(Pitch()) == Pitch()
 
+    def test_lines_by_the_laws_are_asked_for_by_no_shipped_policy(self):
+        laws = replace(CLICKED, goal="laws")
+        assert laws.fitted(Pitch()).shapes["Side line left"].start[0] == pytest.approx(-52.44)
+        assert CLICKED.fitted(Pitch()).shapes["Side line left"].start[0] == -52.5
+        keys = {replace(PAPER, calibration=one).hash for one in (CLICKED, laws, PAPER.calibration)}
+        assert len(keys) == 3
+
     def test_sharing_positions_has_no_part_in_what_keys_calibrations(self):
         """Those that were kept before it came stay known; the position itself keys the others."""
         assert repr(CalibrationPolicy(share_position=True)) == repr(CalibrationPolicy())

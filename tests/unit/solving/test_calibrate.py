@@ -259,6 +259,20 @@ class TestGoals:
         for pitch in (PITCH, PITCH.with_goal("middle")):
             assert found.jac == camera_jaccard(found.camera, self.LINES, pitch, SIZE, gammas)
 
+    def test_lines_of_a_pitch_by_the_laws_are_fitted_where_the_policy_says_so(self):
+        laws = replace(CLICKED, goal="laws")
+        lines = click(self.NEAR, pitch=PITCH.with_goal("laws"))
+        found = calibrate(lines, PITCH, SIZE, laws)
+        assert found.goal == "laws" and found.error_px < 0.05
+        off = [
+            np.linalg.norm(calibrate(lines, PITCH, SIZE, one).camera.position - self.NEAR.position)
+            for one in (laws, CLICKED)
+        ]
+        assert off[0] < 0.05 < off[1]
+        gammas = tuple(gamma / 100 * SIZE.diagonal for gamma in (0.05, 0.5, 1.0))
+        of_the_plan = camera_jaccard(found.camera, lines, PITCH, SIZE, gammas)
+        assert of_the_plan[0] < 0.8 and of_the_plan[1:] == found.jac[:2]
+
     def test_near_goals_do_not_fit_the_evaluator_though_they_fit_the_camera(self):
         # From here 6 cm of a goal are farther apart than the smallest gamma.
         closer = looking((45.0, -12.0, -4.0), (52.5, 0.0, -1.2), 3500.0)

@@ -32,16 +32,15 @@ TOLD = TOUCHLINE.calibration
 CLICKS = replace(TOLD, source="lines")
 
 
-def painted(camera: Camera, moved_px: float = 0.0) -> PaintEvidence:
+def painted(camera: Camera, moved_px: float = 0.0, pitch: Pitch | None = None) -> PaintEvidence:
     """Paint every few pixels along each marking that a camera sees, to a tenth of a pixel."""
     generator = np.random.default_rng(5)
     points = {}
     for marking in sorted(MARKINGS):
         if marking.startswith("Goal"):
             continue
-        seen = clip_polyline(
-            camera.project(Pitch().sample(marking, 0.3, 0.1)), SIZE.width, SIZE.height
-        )
+        places = (pitch or Pitch()).sample(marking, 0.3, 0.1)
+        seen = clip_polyline(camera.project(places), SIZE.width, SIZE.height)
         if len(seen) < 10:
             continue
         near = seen[:: max(len(seen) // 40, 1)] + generator.normal(0, SIGMA_PX, (1, 2))
@@ -102,6 +101,17 @@ class TestCamera:
         ))  # fmt: skip
         assert 0.5 < np.linalg.norm(told) < 2 and np.linalg.norm(own) < 0.3
         assert camera_sigma(found).position_meters == pytest.approx(tuple(told))
+
+    def test_paint_of_a_pitch_by_the_laws_is_fitted_where_the_policy_says_so(self):
+        pitch, apart = Pitch(goal="laws"), {}
+        for policy in (TOLD, replace(TOLD, goal="laws")):
+            group = clicked()
+            key = paint_search_key(group, group.views[0], replace(policy, source="lines"))
+            reading = PaintReading("f" * 32, key, painted(MAIN, pitch=pitch), None, 0.9, 0.8)
+            found = first(replace(group, paint={group.views[0].key: reading}), policy)
+            assert found.source == "paint"
+            apart[policy.goal] = found.paint.error_px
+        assert apart["laws"] < SIGMA_PX < apart["middle"], apart
 
     def test_it_says_how_both_agree_and_is_measured_against_the_clicks(self):
         clicks, found = first(clicked()), first(read(clicked()))

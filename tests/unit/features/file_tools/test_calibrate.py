@@ -59,6 +59,15 @@ class TestCalibrateFiles:
         apart = np.subtract(camera["position_meters"], BEHIND_GOAL.position)
         assert (np.abs(apart) < 4 * sigma[:3]).all() and sigma[:3].max() < 2
 
+    def test_lines_by_the_laws_are_fitted_where_asked_for(self, tmp_path):
+        lines = write(tmp_path / "lines", a=click(MAIN, pitch=Pitch(goal="laws")))
+        off = {}
+        for goal in ("middle", "laws"):
+            run(lines, tmp_path / goal, goal=goal)
+            camera = json.loads((tmp_path / goal / "camera_a.json").read_text())
+            off[goal] = math.dist(camera["position_meters"], MAIN.position)
+        assert 3 * off["laws"] < off["middle"], off
+
     def test_findings_name_the_frame_and_the_marking(self, lines, tmp_path):
         run(lines, tmp_path / "out")
         findings = json.loads((tmp_path / "out" / "findings.json").read_text())
