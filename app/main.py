@@ -40,10 +40,12 @@ from app.features.practice import routes as practice
 from app.features.predictions import evaluation_routes as predictions_evaluation
 from app.features.predictions import routes as predictions
 from app.features.queue import routes as queue
+from app.features.recordings import camera_routes as recording_cameras
 from app.features.recordings import link_routes as recording_links
 from app.features.recordings import routes as recordings
 from app.features.saved_views import routes as saved_views
 from app.features.stations import routes as stations
+from app.features.tracks import routes as tracks
 from app.features.verdicts import routes as verdicts
 from app.features.versions import routes as versions
 from app.features.webhooks import routes as webhooks
@@ -107,6 +109,8 @@ ROUTERS = (
     imports.uploads_router,
     imports.imports_router,
     recordings.router,
+    tracks.router,
+    recording_cameras.router,
     recording_links.router,
     saved_views.router,
     queue.query_fields_router,

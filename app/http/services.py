@@ -28,9 +28,11 @@ from app.features.policies.noise import NoiseStore
 from app.features.practice.service import resume_practice
 from app.features.predictions.jobs import resume_evaluations
 from app.features.predictions.reader import PredictionReader
+from app.features.recordings.camera_jobs import resume_cameras
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
 from app.features.solve.jobs import resume_solving, solve_leftovers
+from app.features.tracks.jobs import TRACKS
 from app.features.upkeep.service import Upkeep
 from app.features.versions.jobs import resume_versions
 from app.features.webhooks.sender import WebhookSender
@@ -124,12 +126,13 @@ class Services:
         Thread(target=self._keep_large_up, name="yield", daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
-        for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG):
+        for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG, TRACKS):
             kind.take_up(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
         resume_imports(self.jobs, self.store, self.settings)
         resume_recordings(self.jobs, self.store)
+        resume_cameras(self.jobs, self.store)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
         self.jobs.on_leadership(self._start_leading)

@@ -33,6 +33,8 @@ GRID = 16
 """Pixels between those for which it is computed where they lie on the cylinder."""
 CORNER_PX, CORNER_BY_ZOOM = 11.0, 6.0
 """What the lens displaces in the corners at 2000 px of focal length, and more at e times as much."""
+REACH = 1.6
+"""How far hands and feet are from where somebody stands, metres."""
 TALL_PX = 110
 """People from this height on are drawn in full."""
 GRAIN = 0.9
@@ -215,6 +217,11 @@ def take(backdrop: Backdrop, camera: Camera, instant: Instant, look: Look) -> Im
 
 def hides(camera: Camera, instant: Instant) -> bool:
     """Whether somebody stands between a camera and the ball."""
+    toward = camera.position[:2] - instant.ball[:2]
+    away = instant.feet - instant.ball[:2]
+    aside = np.abs(away @ (-toward[1], toward[0])) / float(np.hypot(*toward))
+    if not ((aside < REACH) & (away @ toward > 0)).any():
+        return False
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     pixel = camera.project(instant.ball[None])[0]
     depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])

@@ -26,6 +26,8 @@ EnteredBy = Literal["start", "cut", "dissolve", "wipe", "fade"]
 
 SHOT_SECONDS = 0.2
 """Shortest shot; what is shorter belongs to the transition beside it, or to the shot before."""
+SLOW_SHARE = 0.2
+"""Frames that are repeats or mixes in slow motion."""
 _LOOKED_WIDTH = 960
 
 
@@ -101,12 +103,13 @@ def find_shots(
         if progress is not None:
             progress(done + 1, len(shots), "Looking at shots.")
     before = [logos.get(shot.first) for shot in shots]
+    still, mixed = repeated(rows), blended(rows)
+    slow = [(still | mixed)[shot.first : shot.last + 1].mean() > SLOW_SHARE for shot in shots]
     replays = between_logos(
         before[1:],
         [(shot.start_s, shot.end_s) for shot in shots],
-        [kind == "main" for kind in kinds],
+        [kind == "main" and not is_slow for kind, is_slow in zip(kinds, slow, strict=True)],
     )
-    still, mixed = repeated(rows), blended(rows)
     stands = freezes(rows, index.step)
     return RecordingShots(
         frames=len(index),

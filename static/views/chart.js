@@ -36,6 +36,7 @@ import { chartOptions } from './chart_options.js';
  * @property {(value: number) => string} [format] of values
  * @property {(index: number, y: number | null) => void} [onPick] when somebody clicks at a place of x, and at which height
  * @property {boolean} [legend] false: too many curves for one
+ * @property {boolean} [compact] one of several over the same x: without names of its axes, and its numbers are elsewhere
  */
 
 const HEIGHT = 300;
@@ -62,8 +63,8 @@ function Legend({ curves, x, xLabel, at, format = String }) {
 	`;
 }
 
-/** The same as numbers; made when somebody wants them, for there can be thousands. @param {ChartProps} props */
-function Numbers({ curves, x, xLabel, format = String }) {
+/** The same as numbers; made when somebody wants them, for there can be thousands. @param {Pick<ChartProps, 'curves' | 'x' | 'xLabel' | 'format'>} props */
+export function Numbers({ curves, x, xLabel, format = String }) {
 	const [open, setOpen] = useState(false);
 	/** @param {number | null | undefined} value */
 	const text = (value) => (value === null || value === undefined ? '–' : format(value));
@@ -113,7 +114,7 @@ export function Chart(props) {
 		<div class="chart">
 			<div class="chart__plot" role="img" aria-label=${name} data-pick=${Boolean(props.onPick)} ref=${box} style=${{ height: `${height}px` }}></div>
 			${props.legend === false ? null : html`<${Legend} ...${props} at=${at} />`}
-			<${Numbers} ...${props} />
+			${props.compact ? null : html`<${Numbers} ...${props} />`}
 		</div>
 	`;
 }

@@ -21,10 +21,11 @@ function tickText(place) {
 	return place.toLocaleString('en-GB', { maximumFractionDigits: 6 }).replace('-', '−');
 }
 
-/** @param {string} label @param {Record<ChartColour, string>} colours @returns {uPlot.Axis} */
-function axis(label, colours) {
+/** @param {string} label @param {Record<ChartColour, string>} colours @param {number} size pixels @param {boolean} [compact] @returns {uPlot.Axis} */
+function axis(label, colours, size, compact) {
 	const lines = { stroke: colours['chart-grid'], width: 1 };
-	return { label, labelFont: FONT, font: FONT, stroke: colours.muted, labelSize: 20, grid: lines, ticks: { ...lines, size: 4 }, values: (_plot, places) => places.map(tickText) };
+	const named = compact ? { size: size - 8, space: 24 } : { label, labelFont: FONT, labelSize: 20, size };
+	return { ...named, font: FONT, stroke: colours.muted, grid: lines, ticks: { ...lines, size: 4 }, values: (_plot, places) => places.map(tickText) };
 }
 
 /** The vertical line of a threshold, and the intervals of the values. @param {uPlot} plot @param {ChartProps} props @param {Record<ChartColour, string>} colours */
@@ -88,7 +89,7 @@ function rangeY(asked, low, high) {
  * @returns {uPlot.Options}
  */
 export function chartOptions(props, { width, height, colours, setAt }) {
-	const { curves, xLabel, yLabel } = props.current;
+	const { curves, xLabel, yLabel, compact } = props.current;
 	return {
 		width,
 		height,
@@ -99,7 +100,7 @@ export function chartOptions(props, { width, height, colours, setAt }) {
 			x: { time: false, range: (_plot, low, high) => rangeX(props.current.xRange, low, high) },
 			y: { range: (_plot, low, high) => rangeY(props.current.yRange, low ?? 0, high ?? 1) },
 		},
-		axes: [{ ...axis(xLabel, colours), size: 34 }, { ...axis(yLabel, colours), size: 52 }],
+		axes: [axis(xLabel, colours, 34, compact), axis(yLabel, colours, 52, compact)],
 		series: [{}, ...curves.map((curve) => seriesOf(curve, colours))],
 		hooks: {
 			draw: [(plot) => drawOver(plot, props.current, colours)],

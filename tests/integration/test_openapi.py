@@ -41,16 +41,20 @@ from app.features.policies.service import read_policy
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
+from app.features.recordings.cameras import Tracked, save_cameras
 from app.features.recordings.links import add_link, get_link
 from app.features.recordings.service import Shot, add_recording, get_shots, index_now, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station
+from app.features.tracks.service import get_track
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.webhooks.messages import Kind
 from app.features.webhooks.service import make_webhook, send_ping
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.main import create_app
+from tests.flights import add_flight
+from tests.tracked_frames import frame
 from tests.videos import write_video
 from tests.waiting import SECONDS
 
@@ -123,6 +127,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
     for name in ("kept", "deleted"):
         make_batch(store, "small", NewBatch(name, skip_given=False), actor="local")
     add_recordings(store)
+    assert add_flight(store) == 1
     talk = begin_thread(store, 1, "Is this the ball?", actor="local")
     reply(store, 1, talk.id, "It is.", actor="local")
     yield app
@@ -149,7 +154,9 @@ def add_recordings(store: Store) -> None:
     for path in (film, film.with_name("gone.mp4")):
         number = add_recording(store, "small", path, actor="local").id
     assert str(number) == DELETED_RECORDING
-    index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
+    found = index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
+    frames = [frame(number, "tracked") for number in range(6)]
+    save_cameras(store, found, (0, 5), Tracked(frames, ()), [], "local")
     put_shots(store, 1, [Shot(0, 19, "replay", "start")], None, actor="local")
     for first in (0, 1):
         number = add_link(store, (1, first, 9), (1, 10, 19), actor="local").id
@@ -336,10 +343,18 @@ class Attack:
             case.body = {"instants": [{"live": 3, "replay": 12}, {"live": 7, "replay": 18}]}
         if case.operation.path.endswith("/recordings") and case.method == "POST":
             case.body = {"dataset": "small", "source": {"upload": self.upload("film.mp4")}}
+        if case.operation.path.endswith("/tracks") and case.method == "POST":
+            case.path_parameters["dataset"], case.body = "flight", {}
+        if "track" in case.path_parameters and case.method == "PATCH":
+            case.body = {"verdict": "rejected"}
         if case.operation.path.endswith("/shots") and case.method == "PUT":
             case.body = {"shots": [{"first": 0, "last": 5, "kind": "main"}]}
         if case.operation.path.endswith("/{recording}/groups"):
             case.body = {"frames": [1], "propose": False}
+        if case.operation.path.endswith("/{recording}/cameras") and case.method == "POST":
+            case.body = {"first": 10, "last": 12}
+        if "/cameras/{frame}" in case.operation.path:
+            case.path_parameters["frame"] = "3"
 
     def upload(self, name: str = "predictions.csv") -> str:
         """A file of predictions that fits, or another one of the home."""
@@ -359,6 +374,8 @@ class Attack:
             return get_link(self.store, 1, 1).etag
         if "recording" in case.path_parameters:
             return get_shots(self.store, 1).etag
+        if "track" in case.path_parameters:
+            return get_track(self.store, 1).etag
         return load(self.store, 1).etag
 
 

@@ -26,6 +26,7 @@ from app.features.people.service import invite
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
+from app.features.recordings.cameras import Tracked, save_cameras
 from app.features.recordings.links import add_link
 from app.features.recordings.service import Shot, add_recording, index_now, put_shots
 from app.features.solutions.service import solve_dataset
@@ -35,6 +36,7 @@ from app.features.webhooks.service import make_webhook, send_ping
 from app.http.server import listen, make_server
 from app.main import create_app
 from tests.scenes import make_scenes
+from tests.tracked_frames import frame
 from tests.videos import write_video
 from tests.waiting import SECONDS
 
@@ -53,7 +55,7 @@ FULL = (
     "listEvaluations", "listSavedViews", "listThreads", "listWebhooks", "listWebhookDeliveries",
     "listBatches", "listBatchGroups", "getMyWork", "getTeamWork", "listUsers", "listMembers",
     "listTokens", "listSessions", "listDatasets", "listUploads", "listVerdictBatches", "getAudit",
-    "getNotifications", "getHistory", "listRecordings", "listShots", "listLinks", "listPolicies", "listQueryFields", "listEvaluationFrames",
+    "getNotifications", "getHistory", "listRecordings", "listShots", "listLinks", "listCameras", "listPolicies", "listQueryFields", "listEvaluationFrames",
 )  # fmt: skip
 """Lists of which the home has several things, so that their second pages are looked at."""
 
@@ -93,7 +95,10 @@ def fill(store: Store, home: Path) -> None:
         make_batch(store, "small", batch, actor="local")
         film = write_video(home / f"{number}.mp4", "mp4v", 20)
         recording = add_recording(store, "small", film, actor="local")
-        index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+        recording = index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
+        for first in range(0, 9, 3):
+            frames = [frame(first, "tracked"), frame(first + 1, "lost")]
+            save_cameras(store, recording, (first, first + 1), Tracked(frames, ()), [], "local")
         shots = [Shot(first, first + 4, "main", "cut") for first in range(0, 20, 5)]
         put_shots(store, recording.id, shots, None, actor="local")
         if number == 0:

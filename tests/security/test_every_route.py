@@ -39,7 +39,10 @@ LARGE = 50_000
 """A body of more bytes is sent to one route: the same lines read it for all."""
 ALL_RANGES = ("/static/{file}", f"{API}/exports/{{export}}/content", f"{API}/views/{{view}}/image")
 """Files that are read from the disk, and what is made when it is asked for."""
-NOT_THERE = ("/lesson", "/independent-annotation", "/adjudication", "/guidelines/pictures/{digest}")
+NOT_THERE = (
+    *("/lesson", "/independent-annotation", "/adjudication", "/guidelines/pictures/{digest}"),
+    *("/cameras/{frame}", "/cameras/{frame}/file"),
+)
 """Ends of routes about what these groups and datasets do not have."""
 OF_TEAMS = tuple(
     f"{API}/{name}"

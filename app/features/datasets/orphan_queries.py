@@ -16,7 +16,7 @@ from app.db.session import Session
 from app.features.datasets.tables import ViewModel
 from app.features.imports.upload_queries import list_uploads
 from app.features.queue.tables import QueueModel
-from app.features.recordings.tables import RecordingModel
+from app.features.recordings.tables import RecordingModel, ShotCamerasModel
 from app.features.solutions.tables import CalibrationModel, SolutionModel
 from app.object_store.address import is_address
 
@@ -67,7 +67,9 @@ def unread_uploads(session: Session, settings: Settings) -> list[str]:
 def unused_frames(session: Session, settings: Settings) -> list[str]:
     """Folders and files of the home's recordings that no view and no recording uses."""
     used = {path.parent.name for path in _paths(session)}
-    used |= {sha256 for sha256 in session.scalars(select(RecordingModel.sha256)) if sha256}
+    cameras = ShotCamerasModel
+    for column in (RecordingModel.sha256, cameras.digest, cameras.before):
+        used |= {sha256 for sha256 in session.scalars(select(column)) if sha256}
     if not settings.recordings.is_dir():
         return []
     return sorted(

@@ -75,7 +75,7 @@ def track_files(
         except WorkerEnded as error:
             raise InputError(f"{clip.name} {error}") from error
     rows = [frame_row(frame) for frame in found]
-    _write(out, found, rows)
+    write_cameras(out, found, rows)
     return {"frames": rows}
 
 
@@ -181,7 +181,15 @@ def count_outcomes(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
     return {"frames": len(rows), **{name: counts[name] for name in OUTCOMES}}
 
 
-def _write(out: Path, found: Sequence[FrameCamera], rows: list[dict[str, Any]]) -> None:
+def write_cameras(out: Path, found: Sequence[FrameCamera], rows: list[dict[str, Any]]) -> None:
+    """Write ``camera_<frame>.json`` of each frame that has a camera, and ``track.json``.
+
+    Args:
+        rows: ``frame_row`` of each frame.
+
+    Raises:
+        InputError: ``out`` cannot hold them.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         for frame in found:

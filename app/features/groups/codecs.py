@@ -129,9 +129,12 @@ def covariance_from_json(value: Sequence[float] | None) -> tuple[float, ...] | N
     return camera_covariance(value)
 
 
-def logged_camera(body: Mapping[str, Any]) -> tuple[Camera, tuple[float, ...] | None]:
-    """The camera of an entry of the log, and its covariance where the entry has one."""
-    return camera_from_json(body["given"]), covariance_from_json(body.get("covariance"))
+def logged_camera(body: Mapping[str, Any]) -> tuple[Camera | None, tuple[float, ...] | None]:
+    """The camera of an entry of the log, None where it was taken away, and its covariance where the entry has
+    one."""
+    given = body["given"]
+    camera = None if given is None else camera_from_json(given)
+    return camera, covariance_from_json(body.get("covariance"))
 
 
 def given_to_json(station: Station) -> Json:

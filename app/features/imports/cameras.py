@@ -33,7 +33,7 @@ EXAMPLES = 3
 
 
 @dataclass(frozen=True)
-class _NamedStation:
+class NamedStation:
     """A station that a name means; ``group`` is that of its only view, None when shared."""
 
     station: int
@@ -42,10 +42,10 @@ class _NamedStation:
     size: ImageSize
 
 
-class _GivenCamera(NamedTuple):
-    """A camera for a station, and its covariance where that is known."""
+class GivenCamera(NamedTuple):
+    """A camera for a station, and its covariance where that is known; None takes what was given away."""
 
-    camera: Camera
+    camera: Camera | None
     covariance: tuple[float, ...] | None
 
 
@@ -88,7 +88,7 @@ def ingest_cameras(
     report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
         places = _places(session, found.id)
-    known: list[tuple[_NamedStation, _GivenCamera]] = []
+    known: list[tuple[NamedStation, GivenCamera]] = []
     for name in sorted(cameras):
         fitting = _fitting(places, name)
         matches = {place.match for place in fitting}
@@ -115,16 +115,16 @@ def ingest_cameras(
         for place in fitting:
             covariance = covariance_from_json(record, cameras[name], made_for or place.size)
             camera = _sized(cameras[name], made_for, place.size)
-            known.append((place, _GivenCamera(camera, covariance)))
+            known.append((place, GivenCamera(camera, covariance)))
     for start in range(0, len(known), BATCH):
         with ingest_session(store, keep=not dry_run) as session:
             batch = known[start : start + BATCH]
-            _attach_batch(session, found.id, batch, source, actor, report)
+            attach_cameras(session, found.id, batch, source, actor, report)
     return report
 
 
-def _places(session: Session, dataset_id: int) -> dict[str, list[_NamedStation]]:
-    places: dict[str, list[_NamedStation]] = {}
+def _places(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
+    places: dict[str, list[NamedStation]] = {}
     for row in dataset_views(session, dataset_id):
         stem = str(PurePosixPath(row.key).with_suffix(""))
         own = row.group.removeprefix(f"{row.match}/") if row.match else row.group
@@ -135,7 +135,7 @@ def _places(session: Session, dataset_id: int) -> dict[str, list[_NamedStation]]
             else {stem, f"{row.match}/{stem}", f"{row.group}/{stem}", f"{row.match}/{own}/{stem}"}
         )
         size = ImageSize(row.width, row.height)
-        place = _NamedStation(row.station_id, None if row.shared else row.group_id, row.match, size)
+        place = NamedStation(row.station_id, None if row.shared else row.group_id, row.match, size)
         for name in names:
             known = places.setdefault(name, [])
             if place not in known:
@@ -143,7 +143,7 @@ def _places(session: Session, dataset_id: int) -> dict[str, list[_NamedStation]]
     return places
 
 
-def _fitting(places: Mapping[str, list[_NamedStation]], name: str) -> list[_NamedStation]:
+def _fitting(places: Mapping[str, list[NamedStation]], name: str) -> list[NamedStation]:
     """What a name means; folders before it do not matter where no match could be one of them."""
     parts = name.split("/")
     for start in range(len(parts)):
@@ -153,7 +153,7 @@ def _fitting(places: Mapping[str, list[_NamedStation]], name: str) -> list[_Name
     return []
 
 
-def _examples(places: Mapping[str, list[_NamedStation]]) -> str:
+def _examples(places: Mapping[str, list[NamedStation]]) -> str:
     names = [f'"{name}"' for name in sorted(places) if "/" not in name]
     more = " and more" if len(names) > EXAMPLES else ""
     return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
@@ -166,7 +166,7 @@ def _sized(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camer
 
 
 def _of_other_size(
-    name: str, camera: Camera, fitting: Sequence[_NamedStation], made_for: ImageSize | None
+    name: str, camera: Camera, fitting: Sequence[NamedStation], made_for: ImageSize | None
 ) -> Iterator[str]:
     """What to say of a camera whose principal point is the middle of another size than was said."""
     for size in sorted({made_for or place.size for place in fitting}, key=lambda it: it.width):
@@ -180,14 +180,20 @@ def _of_other_size(
             )
 
 
-def _attach_batch(
+def attach_cameras(
     session: Session,
     dataset_id: int,
-    batch: Sequence[tuple[_NamedStation, _GivenCamera]],
+    batch: Sequence[tuple[NamedStation, GivenCamera]],
     source: str,
     actor: str,
     report: IngestReport,
 ) -> None:
+    """Attach cameras to stations of a dataset, inside the caller's write transaction.
+
+    Args:
+        source: Where they come from, for the log.
+        report: Counts ``changed`` and ``unchanged``.
+    """
     stations = read_stations(session, [place.station for place, _ in batch])
     touched: set[int] = set()
     entries, at = [], now()
@@ -200,7 +206,8 @@ def _attach_batch(
             continue
         station = stored.station.with_given(*given)
         save_station(session, stored, station, source=None if stored.edited else station)
-        body = {"source": source, "given": camera_to_json(given.camera)}
+        shown = None if given.camera is None else camera_to_json(given.camera)
+        body = {"source": source, "given": shown}
         if given.covariance is not None:
             body["covariance"] = covariance_to_json(given.covariance)
         entries.append(Entry("camera", actor, at, body, dataset_id, place.group, place.station))

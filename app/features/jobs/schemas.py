@@ -27,6 +27,8 @@ JobKind = Literal[
     "pictures",
     "recording",
     "instants",
+    "ball",
+    "track",
 ]
 
 

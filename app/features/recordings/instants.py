@@ -5,7 +5,7 @@ The recording may be gone later: its groups have their frames, and say which one
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -17,13 +17,16 @@ from app.config import Settings
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
+from app.features.file_tools.track import frame_row
 from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
+from app.features.recordings.cameras import SOURCE, cameras_at
 from app.features.recordings.service import Recording, get_recording, groups_taken, read_index
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
+from app.tracking.track import FrameCamera
 from app.video.frames import read_frames
 from app.video.index import RecordingIndex
 
@@ -39,11 +42,13 @@ class Taken:
         name: Of the recording.
         new: Groups that were made.
         unchanged: Groups that were there already.
+        cameras: New ones that have the camera of their frame.
     """
 
     name: str
     new: int
     unchanged: int
+    cameras: int
 
 
 def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
@@ -97,17 +102,23 @@ def take_instants(
     origin, report = Origin(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
-    groups = _groups(store.settings, recording, index, wanted)
+    tracked = cameras_at(store, recording, wanted)
+    groups = _groups(store.settings, recording, index, wanted, tracked)
     while batch := list(islice(groups, BATCH)):
         with store.write() as session:
             ingest_batch(session, origin, batch, report, set())
         done += len(batch)
         progress(done, total)
-    return Taken(recording.name, report.new, len(numbers) - len(wanted))
+    known = sum(frame.camera is not None for frame in tracked.values())
+    return Taken(recording.name, report.new, len(numbers) - len(wanted), known)
 
 
 def _groups(
-    settings: Settings, recording: Recording, index: RecordingIndex, numbers: Iterable[int]
+    settings: Settings,
+    recording: Recording,
+    index: RecordingIndex,
+    numbers: Iterable[int],
+    tracked: Mapping[int, FrameCamera],
 ) -> Iterator[Group]:
     facts = index.facts
     size = ImageSize(facts.width, facts.height)
@@ -115,11 +126,16 @@ def _groups(
     for number, image in read_frames(recording.path, index, numbers):
         key = f"{recording.name}/{number}.png"
         path = _kept(folder / f"{number}.png", image)
+        station, shown = Station(key, size), _provenance(recording, index, number)
+        frame = tracked.get(number)
+        if frame is not None and frame.camera is not None:
+            station = station.with_given(frame.camera, frame.covariance)
+            shown["camera"] = _given_by_track(frame)
         view = View(
             f"{number}.png",
-            Station(key, size),
+            station,
             media=Media(str(path)),
-            extras=Extras(metadata={"recording": _provenance(recording, index, number)}),
+            extras=Extras(metadata={"recording": shown}),
         )
         yield Group(key, (view,), match=recording.name, label=f"Frame {number}")
 
@@ -135,6 +151,13 @@ def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dic
         "time_base": f"{over}/{under}",
         "seconds": float(index.seconds[number]),
     }
+
+
+def _given_by_track(frame: FrameCamera) -> dict[str, Any]:
+    """What the tracker says of the camera that it gives a frame."""
+    row = frame_row(frame)
+    names = ("outcome", "keyframe", "supported", "explained", "error_px", "sigma")
+    return {"source": SOURCE, **{name: row[name] for name in names}}
 
 
 def _kept(place: Path, image: Any) -> Path:

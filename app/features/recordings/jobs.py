@@ -25,6 +25,7 @@ from app.features.recordings.service import (
     add_recording,
     find_again,
     get_recording,
+    groups_taken,
     has_index,
     index_now,
     require_video,
@@ -150,7 +151,7 @@ def request_instants(
 
 
 def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
-    """The work itself; its result counts groups, and names the jobs that follow."""
+    """The work itself; its result counts groups, and names the first one and the jobs that follow."""
     asked, actor = progress.job.request, progress.job.actor
     recording = get_recording(store, asked["recording"])
 
@@ -164,10 +165,16 @@ def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     solve = proposals = None
     if taken["new"]:
         solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id
-        if asked["propose"]:
+        if asked["propose"] and taken["cameras"] < taken["new"]:
             number, match = recording.dataset_id, recording.name
             proposals = PROPOSALS.request(jobs, store, number, match, actor=actor).id
-    return {**taken, "solve_job": solve, "proposals_job": proposals}
+    groups = groups_taken(store, recording)
+    return {
+        **taken,
+        "group": groups.get(asked["frames"][0]) if asked["frames"] else None,
+        "solve_job": solve,
+        "proposals_job": proposals,
+    }
 
 
 def take_in_worker(

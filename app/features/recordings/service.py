@@ -7,7 +7,7 @@ the home: the index under its sha256, facts and shots in the database.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -249,7 +249,7 @@ def index_now(
     stamp = _stamp(path)
     if stamp is None:
         raise NotFoundError(f"{path.name} is not where it was imported from")
-    facts, shots = _in_worker(path, index_file, store.settings, progress=progress, stop=stop)
+    facts, shots = in_worker(path, index_file, store.settings, progress=progress, stop=stop)
     if _stamp(path) != stamp:
         raise ImageError(f"{path.name} changed while it was read", hint="Import it again.")
     with store.write() as session:
@@ -265,12 +265,13 @@ def index_now(
         return _recording(need_recording(session, recording_id))
 
 
-def _in_worker(
+def in_worker(
     path: Path,
     work: Callable[..., Found],
     *arguments: Any,
     progress: ReportProgress,
     stop: Callable[[], None],
+    limits: WorkerLimits = LIMITS,
 ) -> Found:
     """The result of ``work(path, *arguments, send)`` in a worker process."""
 
@@ -278,7 +279,7 @@ def _in_worker(
         done, total, sentence = place
         progress(done, total, *([sentence] if sentence else []))
 
-    with closing(WorkerProcess(LIMITS)) as worker, COUNTS["recordings"].working():
+    with closing(WorkerProcess(limits)) as worker, COUNTS["recordings"].working():
         try:
             found: Found = worker.run(work, path, *arguments, on_message=answer, stop=stop)
         except WorkerEnded as error:
@@ -365,7 +366,7 @@ def find_again(
     before = get_shots(store, recording_id)
     path, sha256 = before.recording.path, before.recording.require_readable()
     asked = (shots_of, store.settings, sha256)
-    found = _in_worker(path, *asked, progress=progress, stop=stop)
+    found = in_worker(path, *asked, progress=progress, stop=stop)
     shots = [Shot(**one) for one in found]
     return put_shots(store, recording_id, shots, before.etag, actor=actor)
 
@@ -446,11 +447,16 @@ def groups_taken(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
         keys = taken_frames(session, recording.dataset_id, recording.name)
+    return {number: keys[key] for number, key in frames_of_keys(keys).items()}
+
+
+def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
+    """Keys of groups that were taken from a recording, by the number of their frame."""
     found = {}
-    for key, group in keys.items():
+    for key in keys:
         number = key.rpartition("/")[2].removesuffix(".png")
         if number.isascii() and number.isdigit():
-            found[int(number)] = group
+            found[int(number)] = key
     return found
 
 

@@ -1,4 +1,5 @@
-"""The tables of recordings, films of a match from which groups are taken, and of links between their shots."""
+"""The tables of recordings, films of a match from which groups are taken, of links between their shots and of
+the cameras of shots."""
 
 from __future__ import annotations
 
@@ -30,6 +31,31 @@ class RecordingModel(Base):
     sha256: Mapped[str | None]
     facts: Mapped[str | None]
     shots: Mapped[str]
+    revision: Mapped[int]
+    actor: Mapped[str]
+    created: Mapped[str]
+
+
+class ShotCamerasModel(Base):
+    """The cameras of a stretch of a recording, one for each frame.
+
+    They lie in the recordings of the home under ``digest``, the sha256 of that file; ``summary`` (JSON) counts
+    them. ``before`` and ``before_summary`` are those that they took the place of. ``sha256`` is that of the video.
+    """
+
+    __tablename__ = "shot_cameras"
+    __table_args__ = (UniqueConstraint("recording_id", "first", name="shot_cameras_first"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"))
+    recording_id: Mapped[int] = mapped_column(ForeignKey("recording.id", ondelete="CASCADE"))
+    first: Mapped[int]
+    last: Mapped[int]
+    sha256: Mapped[str]
+    digest: Mapped[str]
+    summary: Mapped[str]
+    before: Mapped[str | None]
+    before_summary: Mapped[str | None]
     revision: Mapped[int]
     actor: Mapped[str]
     created: Mapped[str]

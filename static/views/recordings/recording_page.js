@@ -8,13 +8,16 @@ import { listen } from '../../api/events.js';
 import { getRecording, getShots, putShots } from '../../api/recordings.js';
 import { ApiError } from '../../api/problem.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
-import { page } from '../../lib/router.js';
+import { page, param } from '../../lib/router.js';
 import { useResource } from '../../lib/resource.js';
 import { isOver } from '../../state/jobs.js';
 import { announce, complain } from '../../state/notice.js';
 import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
 import { shotAt, timecode } from '../../state/shots.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { CameraCard } from './camera_card.js';
+import { CameraCurves, CameraLines } from './camera_curves.js';
+import { useCameraKeys, useCameras } from './camera_state.js';
 import { InstantsCard } from './instants_card.js';
 import { keysOfRecording } from './recording_keys.js';
 import { FindAgain, ShotCard } from './shot_card.js';
@@ -23,6 +26,7 @@ import { factsOf } from './recordings_page.js';
 
 /** @import {JobJson} from '../../api/jobs.js' */
 /** @import {RecordingJson, Shot, TimedShot} from '../../api/recordings.js' */
+/** @import {Cameras} from './camera_state.js' */
 
 /** The list of shots, and what changes it: at once here, then on the server. @param {number} id */
 function useShots(id) {
@@ -100,14 +104,14 @@ function useInstants() {
 	};
 }
 
-/** @param {{one: RecordingJson, seconds: (frame: number) => number}} props */
-function Stage({ one, seconds }) {
+/** @param {{one: RecordingJson, seconds: (frame: number) => number, cameras: Cameras}} props */
+function Stage({ one, seconds, cameras }) {
 	const [ref, size] = useSize();
 	useLayoutEffect(() => { if (size.width) showAt(size.width * Math.min(devicePixelRatio, 2)); }, [size.width]);
 	const { frame, address } = seen.value;
 	return html`
 		<section class="film__stage" aria-label="Frame" data-frame=${frame}>
-			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}</div>
+			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}<${CameraLines} cameras=${cameras} /></div>
 			<p class="film__time">
 				<button class="button" type="button" aria-pressed=${speed.value !== 0} onClick=${toggleRunning}>${speed.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
 				<strong class="mono" data-timecode>${timecode(seconds(wanted.value), one.fps ?? 25)}</strong>
@@ -135,7 +139,12 @@ function clock(shots, one) {
 function Film({ one, reload }) {
 	const { list, latest, error, read, change, undo, remember } = useShots(one.id);
 	const instants = useInstants();
-	useEffect(() => openFilm({ id: one.id, frames: one.frames ?? 0, fps: one.fps ?? 25 }), [one.id, one.frames]);
+	useEffect(() => {
+		const end = openFilm({ id: one.id, frames: one.frames ?? 0, fps: one.fps ?? 25 });
+		// Whoever comes back from the lines of a frame is shown it again.
+		if (Number(param('frame')) > 0) goTo(Number(param('frame')));
+		return end;
+	}, [one.id, one.frames]);
 	useEffect(() => listen('job', (/** @type {JobJson} */ job) => {
 		if (isOver(job) && job.result?.recording === one.id) read();
 		if (isOver(job) && job.kind === 'instants') reload();
@@ -144,6 +153,8 @@ function Film({ one, reload }) {
 	doing.current = { change, undo, turn: instants.turn };
 	const keys = useMemo(() => keysOfRecording(one, () => latest.current?.items ?? [], doing), [one.id]);
 	useKeys(keys);
+	const cameras = useCameras(one, list?.items[shotAt(list.items, wanted.value)]);
+	useCameraKeys(cameras);
 	if (error) {
 		return html`
 			<${Trouble} title="The shots cannot be shown" error=${error} retry=${read} />
@@ -154,12 +165,14 @@ function Film({ one, reload }) {
 	const at = shotAt(list.items, wanted.value);
 	return html`
 		<div class="film">
-			<${Stage} one=${one} seconds=${clock(list.items, one)} />
+			<${Stage} one=${one} seconds=${clock(list.items, one)} cameras=${cameras} />
 			<div class="film__rail">
 				<${ShotCard} one=${one} shots=${list.items} at=${at} change=${change} remember=${remember} />
+				<${CameraCard} one=${one} cameras=${cameras} />
 				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} />
 			</div>
 			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} goTo=${goTo} />
+			<${CameraCurves} cameras=${cameras} />
 		</div>
 	`;
 }

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from app.errors import InputError
@@ -14,31 +13,11 @@ from app.features.file_tools import track
 from app.features.file_tools.track import count_outcomes, frame_row, track_files
 from app.formats.cameras_reader import read_cameras
 from app.formats.report import Report
-from app.soccer.frames import ImageSize
 from app.tracking.track import FrameCamera
-from tests.cameras import looking
+from tests.tracked_frames import CAMERA, frame
 from tests.unit.tracking.test_clip import write
 
 Run = Callable[..., tuple[int, str, str]]
-CAMERA = looking((0, 60, -15), (10, 0, 0), 900)
-
-
-def frame(number: int, outcome: str) -> FrameCamera:
-    sigma = np.array([0.01, 0.01, 0.01, 0.3, 0.4, 0.2, 0.01, 0.001])
-    is_lost = outcome == "lost"
-    return FrameCamera(
-        number=number,
-        time=number / 25,
-        outcome=outcome,
-        size=ImageSize(1280, 720),
-        camera=None if is_lost else CAMERA,
-        covariance=None if is_lost else tuple(np.diag(sigma**2).ravel().tolist()),
-        supported=None if is_lost else 0.9,
-        explained=None if is_lost else 0.7,
-        error_px=0.2 if outcome == "tracked" else None,
-        is_keyframe=number == 0,
-        reason=None if outcome == "tracked" else "no_paint",
-    )
 
 
 @pytest.fixture

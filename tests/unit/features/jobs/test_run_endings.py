@@ -83,6 +83,11 @@ RESULTS = [
         "2 matches estimated, 1 with a proposal.",
     ),
     (
+        "track",
+        {"name": "half", "frames": 1500, "tracked": 1480, "bridged": 8, "lost": 12, "groups": 2},
+        "1,500 frames of half: 1,480 tracked, 8 bridged, 12 lost; 2 groups got another camera.",
+    ),
+    (
         "recording",
         {"name": "half.mp4", "frames": 1500, "shots": 1},
         "half.mp4 has 1,500 frames in 1 shot.",
@@ -96,6 +101,16 @@ RESULTS = [
         "instants",
         {"name": "half.mp4", "new": 1, "unchanged": 3},
         "1 group made of half.mp4; 3 were there before.",
+    ),
+    (
+        "ball",
+        {"made": 2, "unchanged": 0, "without": []},
+        "The ball was tracked over 2 stretches.",
+    ),
+    (
+        "ball",
+        {"made": 1, "unchanged": 3, "without": [{"stretch": "a", "reason": "b"}]},
+        "The ball was tracked over 1 stretch; 3 were up to date; 1 has no track.",
     ),
 ]
 

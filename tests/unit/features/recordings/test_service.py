@@ -69,14 +69,14 @@ class TestIndexNow:
     def test_a_file_that_changes_meanwhile_is_refused(
         self, store: Store, film: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        plain = service._in_worker
+        plain = service.in_worker
 
         def slowly(path: Path, *rest: Any, **more: Any) -> Any:
             found = plain(path, *rest, **more)
             path.touch()
             return found
 
-        monkeypatch.setattr(service, "_in_worker", slowly)
+        monkeypatch.setattr(service, "in_worker", slowly)
         with pytest.raises(ImageError, match="changed while it was read"):
             indexed(store, film)
 

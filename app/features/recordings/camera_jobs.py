@@ -1,0 +1,77 @@
+"""Cameras of a stretch of a recording as a job."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.features.jobs.queries import Job
+from app.features.jobs.run import JobProgress, left_to_next_server
+from app.features.jobs.service import Jobs
+from app.features.recordings.cameras import require_stretch, track_now
+from app.features.recordings.service import get_recording
+from app.features.solve.jobs import request_solve
+from app.plural import plural
+
+KIND = "track"
+
+
+def request_cameras(
+    jobs: Jobs, store: Store, recording_id: int, first: int, last: int, *, actor: str
+) -> Job:
+    """Track a stretch of a recording, soon.
+
+    Args:
+        jobs: Carries it out.
+        store: The database.
+        recording_id: Which recording.
+        first, last: Numbers of its frames.
+        actor: Who wants it.
+
+    Raises:
+        NotFoundError, ConflictError, InputError: As ``cameras.require_stretch``.
+    """
+    recording = get_recording(store, recording_id)
+    require_stretch(recording, first, last)
+    return jobs.submit(
+        KIND,
+        f"Track the camera of frames {first} to {last} of {recording.name}",
+        partial(cameras_work, jobs, store),
+        dataset_id=recording.dataset_id,
+        actor=actor,
+        request={"recording": recording_id, "first": first, "last": last},
+    )
+
+
+def cameras_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
+    """The work itself; its result counts outcomes."""
+    asked, actor = progress.job.request, progress.job.actor
+    recording = get_recording(store, asked["recording"])
+    first, last = asked["first"], asked["last"]
+
+    def step(done: int, total: int | None = None, _: str = "") -> None:
+        rest = "; what was lost is followed backwards" if done == total else ""
+        progress(done, total, f"{plural(done, 'frame')} of {recording.name} followed{rest}.")
+
+    with left_to_next_server(progress):
+        found, given = track_now(
+            store, recording.id, first, last, actor=actor, progress=step, stop=progress.check
+        )
+    solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id if given else None
+    summary = found.summary
+    counts = {name: getattr(summary, name) for name in ("frames", "tracked", "bridged", "lost")}
+    return {
+        **counts,
+        "recording": recording.id,
+        "name": recording.name,
+        "first": first,
+        "last": last,
+        "groups": given,
+        "solve_job": solve,
+    }
+
+
+def resume_cameras(jobs: Jobs, store: Store) -> None:
+    """Let what an earlier server was at begin again."""
+    jobs.register_resume(KIND, partial(cameras_work, jobs, store))

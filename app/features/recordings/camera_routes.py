@@ -1,0 +1,125 @@
+"""Cameras over time of recordings: tracked by a job, read a stretch at a time, and written for other tools."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from app.errors import NotFoundError
+from app.features.jobs.queries import Job
+from app.features.recordings.camera_jobs import request_cameras
+from app.features.recordings.camera_output import MEDIA_TYPES, camera_output
+from app.features.recordings.camera_schemas import (
+    CameraFormat,
+    CamerasDocument,
+    CamerasList,
+    CamerasRequest,
+    FrameCamerasDocument,
+)
+from app.features.recordings.cameras import get_cameras, list_cameras, read_cameras
+from app.finite import MAX_ID
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, Id, etag_matches
+from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, may
+from app.http.problem import Responses, responses
+from app.http.request_limits import ZIPS, limit
+from app.http.respond import document, responds
+from app.http.route import Route
+
+router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
+
+Frame = Annotated[
+    int, Path(ge=0, le=MAX_ID, description="Number of a frame of the stretch, from 0.")
+]
+Before = Annotated[
+    bool, Query(description="Those that the present ones took the place of, if they are kept.")
+]
+TAGGED = {"headers": {"ETag": {"description": "Of these cameras.", "schema": {"type": "string"}}}}
+FILE: Responses = {
+    200: {
+        "description": "The file: a zip, or an npz.",
+        "content": {
+            kind: {"schema": {"type": "string", "format": "binary"}}
+            for kind in sorted(set(MEDIA_TYPES.values()))
+        },
+    }
+}
+
+
+@router.get("/{recording}/cameras", operation_id="listCameras", responses=responses(404))
+@may(Action.READ, recording=OwnedKind.RECORDING)
+@paged()
+def get_stretches(recording: Id, store: AppStore) -> CamerasList:
+    """The stretches of a recording that have a camera for each frame, and what became of their frames."""
+    found = list_cameras(store, recording)
+    return CamerasList(items=[CamerasDocument.model_validate(one) for one in found])
+
+
+@router.post("/{recording}/cameras", operation_id="trackCameras", **by_job(404, 409, 413, 415))
+@may(Action.LEAD, recording=OwnedKind.RECORDING)
+@responds(job_answer)
+def track_cameras(
+    recording: Id, wanted: CamerasRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Follow the camera of a stretch without a cut: a camera for each of its frames.
+
+    Lines that were drawn in groups of its frames are known. The cameras take the place of those that share a
+    frame with them; groups of its frames get theirs as given, unless somebody has given or drawn another one.
+    """
+    return request_cameras(
+        services.jobs, services.store, recording, wanted.first, wanted.last, actor=actor
+    )
+
+
+@router.get(
+    "/{recording}/cameras/{frame}",
+    operation_id="getCameras",
+    response_model=FrameCamerasDocument,
+    responses={**responses(404, 409), 200: TAGGED},
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+def get_stretch(
+    recording: Id, frame: Frame, store: AppStore, request: Request, before: Before = False
+) -> Response:
+    """The camera of each frame of the stretch that has a frame."""
+    found = get_cameras(store, recording, frame)
+    digest = found.digest_before if before else found.digest
+    if digest is None:
+        raise NotFoundError("these are the first cameras of this stretch")
+    headers = {"ETag": f'"{digest}"', "Cache-Control": "private, no-cache"}
+    if etag_matches(request, headers["ETag"]):
+        return Response(status_code=304, headers=headers)
+    frames = read_cameras(store.settings, digest)
+    return document(FrameCamerasDocument.of(frames), 200, headers)
+
+
+@router.get(
+    "/{recording}/cameras/{frame}/file",
+    operation_id="getCamerasFile",
+    response_class=Response,
+    responses={**responses(404, 409), **FILE},
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+@limit(ZIPS)
+def get_file(
+    recording: Id,
+    frame: Frame,
+    store: AppStore,
+    form: Annotated[
+        CameraFormat, Query(alias="format", description="Which file is written.")
+    ] = "soccernet",
+) -> Response:
+    """The cameras of a stretch for other tools.
+
+    `soccernet`: `camera_<frame>.json` each and `track.json`, zipped; `npz`: K, R, t and k, a row a frame from 0;
+    `opentrackio`: a sample a frame, zipped.
+    """
+    found = get_cameras(store, recording, frame)
+    name, content = camera_output(store, found, form)
+    headers = {
+        "Content-Disposition": f'attachment; filename="{name}"',
+        "Cache-Control": "private, no-cache",
+    }
+    return Response(content, media_type=MEDIA_TYPES[form], headers=headers)

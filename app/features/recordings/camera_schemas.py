@@ -1,0 +1,133 @@
+"""Documents of cameras over time."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.features.file_tools.track import frame_row
+from app.features.recordings.cameras import CameraSummary
+from app.finite import MAX_ID
+from app.http.documents import Document, ListDocument
+from app.tracking.track import FrameCamera
+
+Frame = Annotated[int, Field(ge=0, le=MAX_ID)]
+CameraFormat = Literal["soccernet", "npz", "opentrackio"]
+
+
+class CamerasRequest(BaseModel):
+    """A stretch of a recording that is tracked."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"first": 0, "last": 249}]}
+    )
+
+    first: Frame = Field(description="Number of its first frame, from 0.")
+    last: Frame = Field(description="Number of its last frame.")
+
+
+class SummaryDocument(Document, shows=CameraSummary):
+    """What became of the frames of a stretch."""
+
+    frames: int = Field(description="How many frames there are.")
+    tracked: int = Field(description="Frames whose camera lies on the paint.")
+    bridged: int = Field(description="Frames whose camera the background carries.")
+    lost: int = Field(description="Frames without a camera.")
+    worst_frame: int | None = Field(
+        description="Tracked frame whose paint lies farthest from its markings."
+    )
+    worst_px: float | None = Field(description="How far, pixels of the video.")
+    annotated: tuple[int, ...] = Field(description="Frames whose lines were known.")
+    unusable: tuple[int, ...] = Field(description="Frames with too few lines for a camera.")
+
+
+class CamerasDocument(Document):
+    """Cameras of a stretch of a recording."""
+
+    id: int
+    recording: int = Field(description="Id of the recording.")
+    first: int = Field(description="Number of its first frame, from 0.")
+    last: int = Field(description="Number of its last frame.")
+    summary: SummaryDocument = Field(description="What became of its frames.")
+    before: SummaryDocument | None = Field(
+        description="The same of the cameras that these took the place of."
+    )
+    revision: int = Field(description="How often the stretch was tracked.")
+    stale: bool = Field(description="Whether the video is another one by now.")
+    drawn: tuple[int, ...] = Field(description="Frames with lines now, which the next run knows.")
+    created: datetime
+    by: str = Field(validation_alias="actor")
+
+
+class CamerasList(ListDocument[CamerasDocument]):
+    """Stretches of a recording that have cameras, in their order."""
+
+
+class FrameCamerasDocument(Document):
+    """A camera for each frame of a stretch, as columns: the same place is the same frame."""
+
+    first: int = Field(description="Number of the first frame.")
+    last: int = Field(description="Number of the last frame.")
+    size: tuple[int, int] = Field(description="Width and height of a frame, pixels.")
+    principal_point: tuple[float, float] | None = Field(description="Of every camera, pixels.")
+    outcome: str = Field(description="A letter a frame: `T` tracked, `B` bridged, `L` lost.")
+    time: list[float] = Field(description="When each is shown, seconds after the first frame.")
+    supported: list[float | None] = Field(description="Share of the visible markings with paint.")
+    explained: list[float | None] = Field(description="Share of the paint that has a marking.")
+    error_px: list[float | None] = Field(description="Of the paint from its markings, median.")
+    keyframe: list[int] = Field(description="Frames that were annotated, or proposed alone.")
+    reason: list[str | None] = Field(description="Why a frame is not tracked.")
+    camera: list[list[float] | None] = Field(
+        description="x, y, z (metres); pan, tilt, roll (degrees); focal lengths (pixels); k1."
+    )
+    sigma: list[list[float] | None] = Field(
+        description="Standard deviations: position, pan, tilt, roll, focal length."
+    )
+
+    @staticmethod
+    def of(frames: list[FrameCamera]) -> FrameCamerasDocument:
+        """The document of cameras."""
+        rows = [frame_row(frame) for frame in frames]
+        first = next((frame.camera for frame in frames if frame.camera is not None), None)
+        size = frames[0].size
+        columns = {
+            name: [None if row[name] is None else round(row[name], 4) for row in rows]
+            for name in ("supported", "explained", "error_px")
+        }
+        return FrameCamerasDocument(
+            first=frames[0].number,
+            last=frames[-1].number,
+            size=(size.width, size.height),
+            principal_point=None if first is None else first.principal_point,
+            outcome="".join(frame.outcome[0].upper() for frame in frames),
+            time=[frame.time for frame in frames],
+            **columns,
+            keyframe=[frame.number for frame in frames if frame.is_keyframe],
+            reason=[frame.reason for frame in frames],
+            camera=[_camera(frame) for frame in frames],
+            sigma=[
+                None if row["sigma"] is None else [_short(row["sigma"][name]) for name in _SIGMA]
+                for row in rows
+            ],
+        )
+
+
+_SIGMA = ("position", "pan", "tilt", "roll", "focal_px")
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+def _camera(frame: FrameCamera) -> list[float] | None:
+    """So many digits that no pixel moves by a hundredth."""
+    camera = frame.camera
+    if camera is None:
+        return None
+    place = np.round(camera.position, 4).tolist()
+    turn = np.round(camera.pan_tilt_roll_degrees, 6).tolist()
+    lens = [round(focal, 3) for focal in camera.focal_length]
+    return [*place, *turn, *lens, round(float(camera.distortion[0]), 7)]

@@ -1,0 +1,94 @@
+// @ts-check
+/** Cameras over time as pictures: markings over the frame, outcomes as a band, and curves. */
+
+import { html } from 'htm/preact';
+import { useMemo } from 'preact/hooks';
+
+import { markingsPath, OUTCOMES, runsOf } from '../../state/cameras.js';
+import { goTo, seen, wanted } from '../../state/playback.js';
+import { Chart, Numbers } from '../chart.js';
+
+/** @import {FrameCamerasJson} from '../../api/cameras.js' */
+/** @import {Cameras} from './camera_state.js' */
+/** @import {Curve} from '../chart.js' */
+
+const HEIGHT = 84;
+const [PAN, TILT, FOCAL] = [3, 4, 6];
+
+/** The markings of the frame that is seen, where its camera puts them. @param {{cameras: Cameras}} props */
+export function CameraLines({ cameras: { frames, lines, before } }) {
+	const { frame } = seen.value;
+	const path = useMemo(() => (frames && lines && frame >= frames.first && frame <= frames.last ? markingsPath(frames, frame) : ''), [frames, lines, frame]);
+	if (!frames || !path) return null;
+	const [width, height] = frames.size;
+	return html`
+		<svg class="camera__lines" viewBox="-0.5 -0.5 ${width} ${height}" data-frame=${frame} data-before=${before} aria-hidden="true"><clipPath id="camera-frame"><rect x="-0.5" y="-0.5" width=${width} height=${height} /></clipPath><g clip-path="url(#camera-frame)"><path d=${path} /><path d=${path} /></g></svg>
+	`;
+}
+
+/** Outcomes in proportion; a click leads to its frame. @param {{frames: FrameCamerasJson}} props */
+function Outcomes({ frames }) {
+	const runs = useMemo(() => runsOf(frames), [frames]);
+	const total = frames.outcome.length;
+	/** @param {MouseEvent} event */
+	function click(event) {
+		const { left, width } = /** @type {HTMLElement} */ (event.currentTarget).getBoundingClientRect();
+		goTo(frames.first + Math.min(Math.floor(((event.clientX - left) / width) * total), total - 1));
+	}
+	return html`
+		<div class="camera__band" onClick=${click}>
+			<ol class="camera__outcomes" aria-label="Outcomes">
+				${runs.map(({ outcome, first, last }) => {
+					const words = `${first === last ? `frame ${first}` : `frames ${first} to ${last}`}: ${OUTCOMES[outcome].name}`;
+					return html`<li key=${first} style=${{ flexGrow: last - first + 1 }} data-outcome=${outcome} title=${words}><span class="hidden-text">${words}</span><span aria-hidden="true">${outcome}</span></li>`;
+				})}
+			</ol>
+			${wanted.value >= frames.first && wanted.value <= frames.last ? html`<span class="film__head" style=${{ left: `${(100 * (wanted.value - frames.first + 0.5)) / total}%` }}></span>` : null}
+		</div>
+	`;
+}
+
+/** @param {FrameCamerasJson} frames @param {number} column @returns {(number | null)[]} */
+const column = (frames, column) => frames.camera.map((row) => row?.[column] ?? null);
+
+/** @param {number} value */
+const two = (value) => value.toFixed(2);
+/** @param {number} value */
+const whole = (value) => value.toFixed(0);
+
+/** @param {{cameras: Cameras}} props */
+export function CameraCurves({ cameras: { frames, before } }) {
+	const charts = useMemo(() => frames && chartsOf(frames), [frames]);
+	if (!frames || !charts) return null;
+	const frame = wanted.value;
+	return html`
+		<section class="card camera__curves" aria-label="Cameras over time">
+			${before ? html`<p class="camera__was">These are the cameras before the last run.</p>` : null}
+			<${Outcomes} frames=${frames} />
+			<div class="camera__charts">
+				${charts.map((chart) => html`
+					<${Chart} key=${chart.yLabel} ...${chart} compact=${true} height=${HEIGHT} marker=${frame} onPick=${(/** @type {number} */ index) => goTo(frames.first + index)} />`)}
+			</div>
+			<${Numbers} x=${charts[0].x} xLabel="frame" curves=${charts.flatMap(({ curves }) => curves)} format=${two} />
+		</section>
+	`;
+}
+
+/** @param {FrameCamerasJson} frames */
+function chartsOf(frames) {
+	const x = frames.time.map((_, place) => frames.first + place);
+	/** @param {string} yLabel @param {Curve[]} curves @param {(value: number) => string} format @param {[number | null, number | null]} [yRange] */
+	const one = (yLabel, curves, format, yRange) => ({ name: `${curves.map(({ label }) => label).join(' and ')} of each frame`, xLabel: 'frame', yLabel, x, curves, format, yRange });
+	return [
+		one('share', [
+			{ label: 'supported', values: frames.supported, colour: 'chart-a' },
+			{ label: 'explained', values: frames.explained, colour: 'chart-b', dash: [6, 3] },
+		], two, [0, 1]),
+		one('px', [{ label: 'error, px', values: frames.error_px, colour: 'chart-d' }], two, [0, null]),
+		one('degrees', [
+			{ label: 'pan, degrees', values: column(frames, PAN), colour: 'chart-a' },
+			{ label: 'tilt, degrees', values: column(frames, TILT).map((value) => (value === null ? null : value - 90)), colour: 'chart-b', dash: [6, 3] },
+		], two),
+		one('focal px', [{ label: 'zoom, px', values: column(frames, FOCAL), colour: 'chart-c' }], whole),
+	];
+}

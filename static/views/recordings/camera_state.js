@@ -1,0 +1,111 @@
+// @ts-check
+/** What the page of a recording knows of the cameras of the shot that is shown. */
+
+import { useEffect, useRef, useState } from 'preact/hooks';
+
+import { getCameraStretches, getFrameCameras, postCameras } from '../../api/cameras.js';
+import { listen } from '../../api/events.js';
+import { postInstants } from '../../api/recordings.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { useKeys } from '../../lib/hooks.js';
+import { useResource } from '../../lib/resource.js';
+import { address, navigate } from '../../lib/router.js';
+import { worstFrame, nextUntracked } from '../../state/cameras.js';
+import { follow, isOver } from '../../state/jobs.js';
+import { announce } from '../../state/notice.js';
+import { goTo, wanted } from '../../state/playback.js';
+
+/** @import {FrameCamerasJson, ShotCamerasJson} from '../../api/cameras.js' */
+/** @import {JobJson} from '../../api/jobs.js' */
+/** @import {ApiError} from '../../api/problem.js' */
+/** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+/** @import {Binding} from '../../lib/keys.js' */
+
+/**
+ * @typedef {object} Cameras
+ * @property {ShotCamerasJson | null} stretch that has the frame on screen
+ * @property {FrameCamerasJson | null} frames of that stretch, as they are shown
+ * @property {boolean} before whether those are shown that the present ones took the place of
+ * @property {boolean} lines whether projected lines are drawn
+ * @property {JobJson | null} job that tracks, or takes a frame
+ * @property {ApiError | null} error
+ * @property {string} busy why nothing can be begun
+ * @property {() => void} track
+ * @property {() => void} correct draw the lines of the frame on screen
+ * @property {() => void} worst
+ * @property {() => void} untracked
+ * @property {() => void} turnBefore
+ * @property {() => void} turnLines
+ */
+
+/** @param {RecordingJson} one @param {Shot | undefined} shot @returns {Cameras} */
+export function useCameras(one, shot) {
+	const list = useResource((signal) => getCameraStretches(one.id, signal), [one.id]);
+	const [before, setBefore] = useState(false);
+	const [lines, setLines] = useState(true);
+	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { error, attempt } = useAttempt();
+	const frame = wanted.value;
+	const stretch = list.value?.items.find(({ first, last }) => first <= frame && frame <= last) ?? null;
+	const old = before && stretch?.before !== null;
+	const [id, revision] = [stretch?.first ?? -1, stretch?.revision ?? 0];
+	const found = useResource(async (signal) => (id < 0 ? null : getFrameCameras(one.id, id, old, signal)), [one.id, id, revision, old]);
+	useEffect(() => listen('job', (/** @type {JobJson} */ told) => {
+		if (told.kind === 'track' && isOver(told) && told.result?.recording === one.id) list.reload();
+	}, list.reload), [one.id]);
+	const busy = job !== null && !isOver(job) ? 'A job is at work' : shot ? '' : 'This recording has no shot';
+	function track() {
+		if (busy || !shot) return;
+		const asked = stretch && stretch.first <= shot.first && shot.last <= stretch.last ? stretch : shot;
+		attempt(postCameras(one.id, asked), async (begun) => {
+			const over = await follow(begun, setJob);
+			if (over.state === 'done') announce(over.sentence ?? 'The shot is tracked.');
+			list.reload();
+		});
+	}
+	function correct() {
+		if (busy) return;
+		attempt(postInstants(one.id, [frame], false), async (begun) => {
+			const over = await follow(begun, setJob);
+			if (over.state !== 'done') return;
+			// The way back leads to this frame.
+			navigate(address(`/recordings/${one.id}`, { frame: String(frame) }), { replace: true });
+			navigate(`/review/${over.result.group}/calibration`);
+		});
+	}
+	const frames = id < 0 || found.waiting && found.value?.first !== id ? null : found.value;
+	/** @param {number | null | undefined} place @param {string} none */
+	const jump = (place, none) => {
+		if (place === null || place === undefined) announce(none);
+		else goTo(place);
+	};
+	return {
+		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, correct,
+		worst: () => jump(frames && worstFrame(frames), 'No frame is tracked.'),
+		untracked: () => jump(frames && nextUntracked(frames, wanted.value), frames ? 'Every frame is tracked.' : 'This shot has no cameras yet.'),
+		turnBefore: () => {
+			if (!stretch?.before) return;
+			setBefore(!old);
+			announce(old ? 'The present cameras are shown.' : 'The cameras before are shown.');
+		},
+		turnLines: () => {
+			setLines(!lines);
+			announce(lines ? 'Projected lines are hidden.' : 'Projected lines are shown.');
+		},
+	};
+}
+
+/** @param {Cameras} cameras */
+export function useCameraKeys(cameras) {
+	const latest = useRef(cameras);
+	latest.current = cameras;
+	const keys = useRef(/** @type {Binding[]} */ ([
+		{ keys: ['t'], label: 'Track the camera of the shot', group: 'Cameras', needs: 'lead', run: () => latest.current.track() },
+		{ keys: ['e'], label: 'Draw the lines of this frame', group: 'Cameras', needs: 'lead', run: () => latest.current.correct() },
+		{ keys: ['w'], label: 'Worst frame of the shot', group: 'Cameras', run: () => latest.current.worst() },
+		{ keys: ['n'], label: 'Next frames that are lost or bridged', group: 'Cameras', run: () => latest.current.untracked() },
+		{ keys: ['b'], label: 'Cameras before the last run, or the present ones', group: 'Cameras', run: () => latest.current.turnBefore() },
+		{ keys: ['p'], label: 'Projected lines', group: 'Cameras', run: () => latest.current.turnLines() },
+	]));
+	useKeys(keys.current);
+}
