@@ -158,8 +158,8 @@ class Services:
             log.exception("annotations could not be compared")
 
     def _keep_large_up(self) -> None:
-        self.statistics.keep_large_up()
-        self.yields.keep_large_up()
+        self.statistics.refresh_large_datasets()
+        self.yields.refresh_large_datasets()
 
     def _solved_leftovers(self) -> bool:
         """Whether what an earlier run left is taken up; not while another process keeps writing."""

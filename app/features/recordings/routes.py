@@ -145,7 +145,7 @@ async def get_frame(
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
     task = services.recordings.ask(found, frame, wide)
-    data = await task.result_unless(request.is_disconnected)
+    data = await task.result_unless_client_gone(request.is_disconnected)
     if data is None:
         return Response(status_code=CLIENT_GONE)
     services.recordings.ask_ahead(found, frame)
