@@ -33,5 +33,9 @@ ExportFormat = Literal[
     "coco",
     "yolo",
     "parquet",
+    "tracks",
+    "tracab",
+    "cdf",
+    "npz",
     "touchline",
 ]

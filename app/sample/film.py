@@ -21,7 +21,7 @@ from app.sample.instant import HALF_LENGTH, Instant
 from app.sample.look import Look
 from app.sample.patch import Image
 from app.sample.pose import pose_people
-from app.sample.props import draw_ball, draw_frame, draw_net
+from app.sample.props import draw_ball, draw_goal_posts, draw_net
 from app.sample.render import bowl_of, eye_of, gain_at, lit_from, noise_tiles, turf_of
 from app.sample.surface import shade
 from app.sample.views import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
@@ -33,6 +33,8 @@ GRID = 16
 """Pixels between those for which it is computed where they lie on the cylinder."""
 CORNER_PX, CORNER_BY_ZOOM = 11.0, 6.0
 """What the lens displaces in the corners at 2000 px of focal length, and more at e times as much."""
+REACH = 1.6
+"""How far hands and feet are from where somebody stands, metres."""
 TALL_PX = 110
 """People from this height on are drawn in full."""
 GRAIN = 0.9
@@ -183,7 +185,7 @@ def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: Look) -> N
     plane = np.asarray(cv2.remap(area, back, down, cv2.INTER_LINEAR), np.uint8)
     before = plane.copy()
     draw_net(plane, flat, sign, look.light.exposure)
-    draw_frame(plane, flat, sign, look.light.exposure)
+    draw_goal_posts(plane, flat, sign, look.light.exposure)
     changed = cv2.dilate((plane != before).any(axis=2).astype(np.uint8), np.ones((3, 3), np.uint8))
     there_too = cv2.remap(changed, *wanted, cv2.INTER_NEAREST)
     cv2.copyTo(np.asarray(cv2.remap(plane, *wanted, cv2.INTER_LINEAR)), there_too, area)
@@ -215,6 +217,11 @@ def take(backdrop: Backdrop, camera: Camera, instant: Instant, look: Look) -> Im
 
 def hides(camera: Camera, instant: Instant) -> bool:
     """Whether somebody stands between a camera and the ball."""
+    toward = camera.position[:2] - instant.ball[:2]
+    away = instant.feet - instant.ball[:2]
+    aside = np.abs(away @ (-toward[1], toward[0])) / float(np.hypot(*toward))
+    if not ((aside < REACH) & (away @ toward > 0)).any():
+        return False
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     pixel = camera.project(instant.ball[None])[0]
     depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])

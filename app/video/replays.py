@@ -21,6 +21,8 @@ LEAST_SEEN = 3
 """Wipes of one logo from which on it marks replays; two do where a stretch lies between them."""
 LONGEST_SECONDS = 75.0
 """Longest stretch between two wipes of one logo that is one replay, or several in a row."""
+LIKE_MAIN, ALONE = 0.3, 0.5
+"""What a stretch counts as a replay that looks like the main camera, where another counts 1; and what a wipe costs that opens and closes none."""
 LEAST_ALIKE = 2
 """Frames that two wipes of one logo share."""
 
@@ -83,7 +85,7 @@ def between_logos(
     Args:
         clusters: Of the transition before each shot but the first one, in order; None: no logo.
         seconds: When each shot begins and ends.
-        main: Which shots show the main camera: what lies between two replays begins with it.
+        main: Which shots show the main camera at its own pace.
 
     Returns:
         Shape (shots,).
@@ -103,18 +105,21 @@ def _pairs(
 ) -> list[tuple[int, int]]:
     """Wipes that open and close a replay: first shot behind each, and first shot after it.
 
-    A wipe that opens and one that closes take turns; where one was missed, what lies between two
-    is too long for a replay, or the main camera, and the turns begin anew.
+    A wipe that opens and one that closes take turns; where one was missed the turns begin anew. Of all
+    ways to pair them this is the likeliest: what lies between two is short and shows another camera than
+    the main one, or shows it slowly; paint tells where some cameras of replays stand, too, so that those look like it.
     """
-    found = []
-    at = 0
-    while at + 1 < len(places):
-        start, stop = places[at], places[at + 1]
-        length = seconds[stop - 1][1] - seconds[start][0]
-        shown = sum(seconds[k][1] - seconds[k][0] for k in range(start, stop) if main[k])
-        if length <= LONGEST_SECONDS and shown < 0.5 * length:
-            found.append((start, stop))
-            at += 2
-        else:
-            at += 1
-    return found
+    best: list[tuple[float, list[tuple[int, int]]]] = [(0.0, [])]
+    for at, stop in enumerate(places, 1):
+        score, found = best[-1]
+        options = [(score - ALONE, found)]
+        if at > 1:
+            start = places[at - 2]
+            length = seconds[stop - 1][1] - seconds[start][0]
+            shown = sum(seconds[k][1] - seconds[k][0] for k in range(start, stop) if main[k])
+            if length <= LONGEST_SECONDS:
+                score, found = best[-2]
+                score += LIKE_MAIN if shown >= 0.5 * length else 1.0
+                options.append((score - length / LONGEST_SECONDS / 10, [*found, (start, stop)]))
+        best.append(max(options, key=lambda option: option[0]))
+    return best[-1][1]

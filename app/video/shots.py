@@ -17,7 +17,7 @@ from app.video.cuts import hard_cuts
 from app.video.frames import Image, RecordingReader
 from app.video.index import RecordingIndex
 from app.video.indexing import index_recording
-from app.video.kinds import LookedAt, ShotKind, frames_to_look_at, kind_of, look_at
+from app.video.kinds import LookedAt, ShotKind, frames_that_tell_kind, kind_of, look_at
 from app.video.repeats import Freeze, blended, freezes, repeated
 from app.video.replays import between_logos, logo_clusters
 from app.video.transitions import Transition, soft_transitions
@@ -26,6 +26,8 @@ EnteredBy = Literal["start", "cut", "dissolve", "wipe", "fade"]
 
 SHOT_SECONDS = 0.2
 """Shortest shot; what is shorter belongs to the transition beside it, or to the shot before."""
+SLOW_SHARE = 0.2
+"""Frames that are repeats or mixes in slow motion."""
 _LOOKED_WIDTH = 960
 
 
@@ -96,17 +98,18 @@ def find_shots(
     logos = {one.last + 1: cluster for one, cluster in zip(wipes, clusters, strict=True)}
     kinds: list[ShotKind] = []
     for done, shot in enumerate(shots):
-        numbers = frames_to_look_at(shot.first, shot.last, shot.end_s - shot.start_s)
+        numbers = frames_that_tell_kind(shot.first, shot.last, shot.end_s - shot.start_s)
         kinds.append("other" if look is None else kind_of(look(numbers)))
         if progress is not None:
             progress(done + 1, len(shots), "Looking at shots.")
     before = [logos.get(shot.first) for shot in shots]
+    still, mixed = repeated(rows), blended(rows)
+    slow = [(still | mixed)[shot.first : shot.last + 1].mean() > SLOW_SHARE for shot in shots]
     replays = between_logos(
         before[1:],
         [(shot.start_s, shot.end_s) for shot in shots],
-        [kind == "main" for kind in kinds],
+        [kind == "main" and not is_slow for kind, is_slow in zip(kinds, slow, strict=True)],
     )
-    still, mixed = repeated(rows), blended(rows)
     stands = freezes(rows, index.step)
     return RecordingShots(
         frames=len(index),

@@ -30,6 +30,7 @@ from tests.bench.picture_power import bench_picture_power
 from tests.bench.pictures import bench_pictures
 from tests.bench.pitches import bench_pitches
 from tests.bench.propose import bench_propose
+from tests.bench.recording import bench_recording
 from tests.bench.requests import bench_requests
 from tests.bench.rigs import bench_rigs
 from tests.bench.shipped import bench_shipped
@@ -71,6 +72,7 @@ def main() -> None:
     bench_shots(REAL_DATA)
     bench_track(REAL_DATA)
     bench_link(REAL_DATA)
+    bench_recording()
     bench_ball_track(REAL_DATA)
     bench_requests()
     bench_listeners()

@@ -45,6 +45,10 @@ class TestBetweenLogos:
             ([0, 0, 0, 0], [1, 0, 1, 0, 1], [0, 1, 0, 1, 0]),
             # The first wipe was missed: what is live between two replays is not taken for one.
             ([0, 0, 0], [0, 1, 0, 1], [0, 0, 1, 0]),
+            # Where replays stand where paint tells the camera, too, their turns tell them.
+            ([0, 0, 0, 0], [1, 1, 1, 1, 1], [0, 1, 0, 1, 0]),
+            ([0, 0, 0, 0, 0], [1, 1, 1, 0, 1, 1], [0, 1, 0, 1, 0, 0]),
+            ([0, 0], [1, 1, 1], [0, 1, 0]),
             # Logos of two broadcasters.
             ([0, 0, 1, 1], [1, 0, 1, 0, 1], [0, 1, 0, 1, 0]),
             ([None, None], [1, 0, 1], [0, 0, 0]),
