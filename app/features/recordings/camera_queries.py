@@ -45,7 +45,7 @@ def views_of_video(session: Session, dataset_id: int, sha256: str) -> list[Frame
     )
     found = []
     for path, group, key, has_lines in session.execute(statement):
-        number = PurePath(path).stem
+        number = PurePath(path or "").stem
         if number.isascii() and number.isdigit():
             found.append(FrameView(int(number), group, key, has_lines))
     return found
