@@ -54,6 +54,7 @@ KINDS = (
     "paint",
     "proposals",
     "recordings",
+    "tracks",
 )
 """What workers are used for, as the metrics call it."""
 

@@ -26,6 +26,7 @@ from app.features.queue import tables as queue  # noqa: F401
 from app.features.recordings import tables as recordings  # noqa: F401
 from app.features.saved_views import tables as saved_views  # noqa: F401
 from app.features.solutions import tables as solutions  # noqa: F401
+from app.features.tracks import tables as tracks  # noqa: F401
 from app.features.verdicts import tables as verdicts  # noqa: F401
 from app.features.versions import tables as versions  # noqa: F401
 from app.features.webhooks import tables as webhooks  # noqa: F401

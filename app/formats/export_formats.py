@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
@@ -25,6 +25,7 @@ from app.formats.sn_calibration import line_claims, line_frame
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import labels_frame, write_soccernet_v3
 from app.formats.soccernet_v3d_writer import write_soccernet_v3d
+from app.formats.tracks_writer import TrackRecord, write_track_arrays, write_tracks
 from app.formats.view_files import PutText
 from app.formats.yolo_writer import write_yolo
 from app.plural import plural
@@ -37,8 +38,11 @@ CONTENT = {
     "sn-calibration": ("frames", "frame"),
     "gamestate": ("images", "image"),
     "yolo": ("labels", "view that a detector may learn from"),
+    **dict.fromkeys(("tracks", "npz"), ("tracks", "track of the ball")),
 }
 """What a format consists of: the name of its count, and the word for one."""
+TRACKS = ("tracks", "npz")
+"""Formats of the ball over time: they hold no groups, and no pictures."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
 LAYOUTS: Mapping[str, FrameName] = {
@@ -60,7 +64,7 @@ PRESCRIBED = ("soccernet-v3", "soccernet-v3d", "yolo")
 
 USERS: Mapping[str, tuple[str, ...]] = {
     "boxes": ("soccernet-v3d", "coco", "yolo", "parquet"),
-    "images": tuple(name for name in FORMATS if name != "touchline"),
+    "images": tuple(name for name in FORMATS if name not in ("touchline", *TRACKS)),
     "views": ("coco", "yolo"),
 }
 """Which formats use an option; any other would ignore it, so it is refused there. Detectors learn from
@@ -78,6 +82,7 @@ class WriteOptions:
         every_view: Whether training data hold views in which the 3D ball does not hold.
         provenance: Where the groups come from, by the names of ``parquet.PROVENANCE``.
         unassigned: People of frames that are no view of a group.
+        tracks: Makes tracks of the groups, for the formats of ``TRACKS``.
     """
 
     format: str
@@ -86,6 +91,7 @@ class WriteOptions:
     every_view: bool = False
     provenance: Mapping[str, str | None] = field(default_factory=dict)
     unassigned: Iterable[FramePersons] = ()
+    tracks: Callable[[Iterable[ExportRecord]], Iterable[TrackRecord]] | None = None
 
 
 def write_format(
@@ -105,6 +111,9 @@ def write_format(
     Raises:
         InputError: A group does not fit the format, or one of its cameras does not.
     """
+    if options.tracks is not None:
+        write = write_tracks if options.format == "tracks" else write_track_arrays
+        return write(root, options.tracks(records))
     if options.format in WITHOUT_LENSES:
         records = _with_plain_lenses(records, options.format)
     everything, boxes = options.everything, options.boxes

@@ -33,5 +33,7 @@ ExportFormat = Literal[
     "coco",
     "yolo",
     "parquet",
+    "tracks",
+    "npz",
     "touchline",
 ]

@@ -166,6 +166,7 @@ TAGS = {
     "comments": "Comments on groups, and notifications.",
     "webhooks": "Addresses that get signed messages about what happens in a dataset.",
     "imports": "Files and folders that become datasets.",
+    "tracks": "The ball over time: its place in every frame of a stretch, and what happened to it.",
     "recordings": "Videos of matches, their shots, and the groups that are taken from them.",
     "predictions": "Predictions of detectors, beside the annotations of people.",
     "evaluations": "Detectors measured on what was accepted.",

@@ -129,6 +129,7 @@ WHOLE = frozenset(
         OwnedKind.EVALUATION,
         OwnedKind.BATCH,
         OwnedKind.RECORDING,
+        OwnedKind.TRACK,
     }
 )
 """Kinds that tell of all groups of a dataset at once."""

@@ -32,6 +32,7 @@ from app.features.recordings.camera_jobs import resume_cameras
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
 from app.features.solve.jobs import resume_solving, solve_leftovers
+from app.features.tracks.jobs import TRACKS
 from app.features.upkeep.service import Upkeep
 from app.features.versions.jobs import resume_versions
 from app.features.webhooks.sender import WebhookSender
@@ -125,7 +126,7 @@ class Services:
         Thread(target=self._keep_large_up, name="yield", daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
-        for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG):
+        for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG, TRACKS):
             kind.take_up(self.jobs, self.store)
         resume_exports(self.jobs, self.store, self.exports, self.frames)
         resume_versions(self.jobs, self.store)
@@ -155,8 +156,8 @@ class Services:
             log.exception("annotations could not be compared")
 
     def _keep_large_up(self) -> None:
-        self.statistics.keep_large_up()
-        self.yields.keep_large_up()
+        self.statistics.refresh_large_datasets()
+        self.yields.refresh_large_datasets()
 
     def _solved_leftovers(self) -> bool:
         """Whether what an earlier run left is taken up; not while another process keeps writing."""

@@ -37,6 +37,10 @@ _LOUD = 6.0
 _ALONE, _ACROSS, _LONG_S = 40.0, 2.0, 0.3
 """Noise of the acceleration by touches that nobody saw: before and after all measurements, and across
 gaps that are longer than so many seconds, (m/s2)2 s."""
+_SHIFTS = 5
+"""Times that views are looked at for times that are off."""
+_LATE_S, _LATE_SIGMA_S, _LATE_SURE, _LATE_LEAST_S = 0.1, 0.01, 5.0, 0.003
+"""How late views may be; how well that has to be known; in how many sigmas, and from where on it counts."""
 _OWN = 20.0
 """Rays that are believed to have been seen, as noisy as they are said to be."""
 _SCALES = (0.6, 1.1 * _LOUD)
@@ -55,7 +59,7 @@ class TrackOptions:
 
     longest_gap_s: float = 1.2
     beyond_s: float = 0.5
-    most_sigma_m: float = 2.0
+    most_sigma_m: float = 1.5
     leave_out: bool = True
 
 
@@ -84,14 +88,19 @@ def track_ball(
     reason = _too_few(measurements)
     if reason is None:
         shift = np.zeros(len(measurements.names))
-        runs = [
-            _solve_run(measurements, rows, times, shift, pitch, options)
-            for rows in _runs(measurements.times, options.longest_gap_s)
-        ]
+        for _ in range(_SHIFTS):
+            runs = [
+                _solve_run(measurements, rows, times, shift, pitch, options)
+                for rows in _runs(measurements.times, options.longest_gap_s)
+            ]
+            moved = _late(measurements, runs)
+            if not moved.any():
+                break
+            shift += moved
         reason = next((run.reason for run in runs if run.reason), None)
         made = [run for run in runs if run.fitted is not None]
         if made:
-            track = _joined(measurements, frames, times, made, pitch, options)
+            track = _joined(measurements, frames, times, made, shift, pitch, options)
             if any(state != "gap" for state in track.state):
                 return track
             reason = (
@@ -106,6 +115,7 @@ class _Run:
     """A stretch without long gaps; without a fit where there is a reason."""
 
     reason: str | None
+    names: tuple[str, ...] = ()
     knots: Knots | None = None
     history: History | None = None
     fitted: Fitted | None = None
@@ -176,7 +186,35 @@ def _solve_run(
     fitted = fit(knots, history.mode, event, used, state, noise, unseen)
     history = replace(history, event=event)
     rows_of = replace(knots, rows=rows[knots.rows])
-    return _Run(None, rows_of, history, fitted, used, noise)
+    return _Run(None, part.names, rows_of, history, fitted, used, noise)
+
+
+def _late(measurements: BallMeasurements, runs: list[_Run]) -> FloatArray:
+    """Seconds to add to each view's times, nought but where the ball says it surely, shape (V,).
+
+    The times of the view with most measurements are those that count.
+    """
+    names = measurements.names
+    count = len(names)
+    known, pull, rays = np.zeros((count, count)), np.zeros(count), np.zeros(count)
+    for run in runs:
+        if run.fitted is None or run.knots is None:
+            continue
+        own = [names.index(name) for name in run.names]
+        known[np.ix_(own, own)] += run.fitted.late
+        pull[own] += run.fitted.late_pull
+        rays[own] += np.bincount(run.knots.view, minlength=len(own))
+    found = np.zeros(count)
+    free = np.delete(np.arange(count), rays.argmax())
+    if not len(free):
+        return found
+    told = known[np.ix_(free, free)] + np.eye(len(free)) / _LATE_S**2
+    spread = np.linalg.inv(told)
+    late = -spread @ pull[free]
+    sigma = np.sqrt(spread.diagonal())
+    sure = (sigma < _LATE_SIGMA_S) & (np.abs(late) > np.maximum(_LATE_SURE * sigma, _LATE_LEAST_S))
+    found[free[sure]] = np.clip(late[sure], -_LATE_S, _LATE_S)
+    return found
 
 
 def _contradiction(what: str) -> str:
@@ -243,6 +281,7 @@ def _joined(
     frames: IntArray,
     times: FloatArray,
     runs: list[_Run],
+    shift: FloatArray,
     pitch: Pitch,
     options: TrackOptions,
 ) -> BallTrack:
@@ -304,6 +343,11 @@ def _joined(
         contradicted=tuple(sorted(against, key=lambda one: one.measurement)),
         reason=None,
         left_out=summed(px, measurements.frames, frames) if options.leave_out else None,
+        offsets=tuple(
+            (name, float(late))
+            for name, late in zip(measurements.names, shift, strict=True)
+            if late
+        ),
     )
 
 

@@ -46,12 +46,14 @@ from app.features.recordings.links import add_link, get_link
 from app.features.recordings.service import Shot, add_recording, get_shots, index_now, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station
+from app.features.tracks.service import get_track
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.webhooks.messages import Kind
 from app.features.webhooks.service import make_webhook, send_ping
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.main import create_app
+from tests.flights import add_flight
 from tests.tracked_frames import frame
 from tests.videos import write_video
 from tests.waiting import SECONDS
@@ -125,6 +127,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
     for name in ("kept", "deleted"):
         make_batch(store, "small", NewBatch(name, skip_given=False), actor="local")
     add_recordings(store)
+    assert add_flight(store) == 1
     talk = begin_thread(store, 1, "Is this the ball?", actor="local")
     reply(store, 1, talk.id, "It is.", actor="local")
     yield app
@@ -340,6 +343,10 @@ class Attack:
             case.body = {"instants": [{"live": 3, "replay": 12}, {"live": 7, "replay": 18}]}
         if case.operation.path.endswith("/recordings") and case.method == "POST":
             case.body = {"dataset": "small", "source": {"upload": self.upload("film.mp4")}}
+        if case.operation.path.endswith("/tracks") and case.method == "POST":
+            case.path_parameters["dataset"], case.body = "flight", {}
+        if "track" in case.path_parameters and case.method == "PATCH":
+            case.body = {"verdict": "rejected"}
         if case.operation.path.endswith("/shots") and case.method == "PUT":
             case.body = {"shots": [{"first": 0, "last": 5, "kind": "main"}]}
         if case.operation.path.endswith("/{recording}/groups"):
@@ -367,6 +374,8 @@ class Attack:
             return get_link(self.store, 1, 1).etag
         if "recording" in case.path_parameters:
             return get_shots(self.store, 1).etag
+        if "track" in case.path_parameters:
+            return get_track(self.store, 1).etag
         return load(self.store, 1).etag
 
 

@@ -29,6 +29,7 @@ from app.features.people.service import invite
 from app.features.recordings.queries import insert_recording
 from app.features.solutions.service import solve_dataset
 from app.main import create_app
+from tests.flights import insert_bare_track
 from tests.scenes import make_scenes
 from tests.security.table import Row, permissions
 
@@ -53,6 +54,8 @@ BODIES: Mapping[str, dict[str, Any]] = {
     "POST /api/v1/groups/{group}/threads": {"text": "one"},
     "POST /api/v1/exports": {"format": "soccernet-v3d", "all": True},
     "POST /api/v1/imports": {"format": "soccernet-v3", "source": {}, "dry_run": True},
+    "POST /api/v1/datasets/{dataset}/tracks": {},
+    "PATCH /api/v1/tracks/{track}": {"verdict": "rejected"},
     "POST /api/v1/recordings": {"source": {}},
     "PUT /api/v1/recordings/{recording}/shots": {"shots": []},
     "POST /api/v1/recordings/{recording}/groups": {"frames": [0]},
@@ -228,6 +231,8 @@ class Apart:
                 found[OwnedKind.RECORDING] = insert_recording(
                     session, number, f"film {spare}", film, actor=owner
                 )
+                key = f"stretch {spare}"
+                found[OwnedKind.TRACK] = insert_bare_track(session, number, key)
         found[OwnedKind.SAVED_VIEW] = self.ask(owner, "POST", f"{at}/saved-views", body).json()[
             "id"
         ]

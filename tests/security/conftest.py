@@ -22,11 +22,13 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.people import links as passwords
 from app.features.people.roles import Role
+from app.formats.issia_writer import write_issia
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.http import access, tries
 from app.http.server import listen, make_server
 from app.main import create_app
 from tests.e2e.service import NOBODY, run_touchline, serving
+from tests.flights import flight_groups
 from tests.integration.conftest import picture
 from tests.provider import CLIENT, SECRET, Provider, providing
 from tests.scenes import make_scenes
@@ -102,11 +104,16 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
     images = sorted((CORPUS / "images").iterdir())
     for view, image in zip(spoiled.views, images, strict=True):
         (files / "spoiled" / spoiled.match / view.key).write_bytes(image.read_bytes())
+    flight = [replace(group, match="issia") for group in flight_groups(40)]
+    (files / "flight").mkdir()
+    write_issia(files / "flight", flight)
     run_touchline(
         home,
         *(f"import soccernet-v3 {files / name} --dataset {name}" for name in ("small", "formula")),
         *(f"solve --dataset {name} --workers 1" for name in ("small", "formula")),
         f"import soccernet-v3 {files / 'spoiled'} --dataset spoiled",
+        f"import issia {files / 'flight'} --dataset flight --size 1280x720",
+        "solve --dataset flight --workers 1",
     )
     with serving(home) as address:
         found = Guarded(address, home)
@@ -159,6 +166,9 @@ def _fill(guarded: Guarded, frame: str) -> None:
     }
     indexed = json_("POST", "/recordings", recorded)
     ids |= {"recording": str(indexed["result"]["recording"]), "frame": "3"}
+    tracked = json_("POST", "/datasets/flight/tracks", {})
+    assert (tracked["state"], tracked["result"]["made"]) == ("done", 1), tracked
+    ids |= {"track": "1"}
     replay = {"recording": indexed["result"]["recording"], "first": 10, "last": 19}
     both = {"live": {"first": 0, "last": 9}, "replay": replay}
     made = json_("POST", f"/recordings/{ids['recording']}/links", both)

@@ -49,7 +49,7 @@ PLAIN_WORDS = """
     rights roles rotation router routes row rows rules run runs safe save scale scene scene3d scenes schemas score
     scoreboard scoring scroll search sender sending serve server service serving session sets shared sharing sheet
     sign singular site smallest snapshot solve solving source sources sphere spill spread sqlite squares stacks
-    stage staging standpoints starts state statements statistics steps storage store stored straight stream strict
+    stage staging standpoints starts state statements statistics steps storage store stored straight stream stretches strict
     submit suggested suggestions summary surface swap synloc tab table tall team term terminal text threads
     threshold ticks time tokens tools trace tracing track transfer transitions tree trees triangulate tries truth types
     undo undrawn upload v3 v3d video viewport viewports virtual visibility wal walk warm web what when window words

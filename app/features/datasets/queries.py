@@ -40,6 +40,7 @@ from app.features.recordings.tables import RecordingModel
 from app.features.saved_views.tables import SavedViewModel
 from app.features.solutions.tables import SolutionModel
 from app.features.tables import Base
+from app.features.tracks.tables import TrackModel
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.features.versions.tables import VersionModel
 from app.finite import MAX_ID
@@ -153,6 +154,7 @@ _DATASET_OF: Mapping[str, Select[Any]] = {
     "evaluation": select(EvaluationModel.dataset_id).where(EvaluationModel.id == _ID),
     "saved view": select(SavedViewModel.dataset_id).where(SavedViewModel.id == _ID),
     "recording": select(RecordingModel.dataset_id).where(RecordingModel.id == _ID),
+    "track": select(TrackModel.dataset_id).where(TrackModel.id == _ID),
     "work": select(BatchModel.dataset_id).where(BatchModel.id == _ID),
     "batch": select(VerdictBatchModel.dataset_id).where(VerdictBatchModel.id == _ID),
 }
@@ -192,6 +194,7 @@ _COUNTED = {
     "verdicts": "verdict",
     "saved_views": "saved_view",
     "recordings": "recording",
+    "tracks": "track",
     "versions": "version",
     "predictions": "prediction_set",
     "evaluations": "evaluation",

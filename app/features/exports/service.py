@@ -21,10 +21,13 @@ from app.features.groups.view_queries import frame_files
 from app.features.imports.edits_export import FORMAT as CARRY
 from app.features.imports.edits_export import export_edits
 from app.features.imports.unassigned import unassigned_persons
+from app.features.tracks.export import TrackSource
+from app.features.tracks.service import track_source
 from app.features.versions.service import find_version
 from app.formats.export_formats import (
     CONTENT,
     FORMATS,
+    TRACKS,
     USERS,
     WriteOptions,
     box_settings,
@@ -180,12 +183,13 @@ def export(
         counts = export_edits(store, dataset, out, progress, beside)
         return ExportReport(out, CARRY, counts["groups"], counts)
     with store.read() as session:
-        source = _source(session, store, dataset, everything, version)
+        source = _source(session, store, dataset, options, version)
         with output_anywhere(out, store.settings.exports, beside, progress) as root:
             frames = ExportImages(root, images, read or _local_reader(store), frame_layout(format))
             names = export_names(format, source.outlines())
             run = _Run(source, options, frames, names, progress)
             # A version is the same every time; unassigned frames are the dataset's as it is.
+            run.tracks = _tracks(session, source, options)
             if format == "issia" and isinstance(source, LiveSource):
                 run.unassigned = unassigned_persons(session, dataset)
             with _view_files(root, out) as put:
@@ -269,7 +273,13 @@ def _require_format(
     format, everything = options.format, options.everything  # noqa: A001
     _require_plain(format, everything, version)
     with store.read() as session, TemporaryDirectory(prefix="touchline-") as folder:
-        whole = _source(session, store, dataset, everything or format == CARRY, version)
+        whole = _source(
+            session,
+            store,
+            dataset,
+            replace(options, everything=everything or format == CARRY),
+            version,
+        )
         if format == CARRY:
             return
         source = _SampleSource(whole)
@@ -277,13 +287,15 @@ def _require_format(
         with ViewFiles(Path(folder)) as small:
             try:
                 names = export_names(format, source.outlines())
-                counts = _Run(source, options, frames, names, None).write(Path(folder), small.put)
+                run = _Run(source, options, frames, names, None)
+                run.tracks = _tracks(session, source, options, try_only=True)
+                counts = run.write(Path(folder), small.put)
             except InputError as error:
                 raise _UnrepresentableError(error.message, hint=error.hint) from error
         if options.images != "none" and not frames.media:
             files = [] if source.is_all else frame_files(session, whole.dataset_id)
             _require_frames(whole.dataset, files)
-    if source.is_all:
+    if source.is_all and run.tracks is None:
         _require_content(whole.dataset, format, counts)
 
 
@@ -320,7 +332,8 @@ class _SampleSource:
         self._source = source
         self.dataset, self.version, self.licence = source.dataset, source.version, source.licence
         self.count, self.date = min(source.count, TRIED), source.date
-        self.settings, self.stamp = source.settings, source.stamp
+        self.settings, self.stamp, self.policy = source.settings, source.stamp, source.policy
+        self.dataset_id = source.dataset_id
 
     @property
     def is_all(self) -> bool:
@@ -341,15 +354,30 @@ def _local_reader(store: Store) -> ReadPicture:
 
 
 def _source(
-    session: Session, store: Store, dataset: str | int, everything: bool, version: str | None
+    session: Session, store: Store, dataset: str | int, options: _Options, version: str | None
 ) -> LiveSource | VersionSource:
     found = read_dataset_head(session, dataset)
     if version is not None:
         frozen = find_version(store, found.id, version)
         return VersionSource(session, frozen)
-    source = LiveSource(session, found, everything)
+    source = LiveSource(session, found, options.everything, options.format in TRACKS)
     source.require_some()
     return source
+
+
+def _tracks(
+    session: Session,
+    source: LiveSource | VersionSource | _SampleSource,
+    options: _Options,
+    *,
+    try_only: bool = False,
+) -> TrackSource | None:
+    """What makes the tracks of an export; None where its format holds none."""
+    if options.format not in TRACKS:
+        return None
+    live = source.version is None
+    found = track_source(session, source.dataset_id, source.dataset, source.policy, live=live)
+    return replace(found, everything=options.everything or not live, try_only=try_only)
 
 
 class _Run:
@@ -369,6 +397,7 @@ class _Run:
         self._verdicts: Counter[str] = Counter()
         self._overrides: list[dict[str, str | None]] = []
         self.unassigned: Iterable[FramePersons] = ()
+        self.tracks: TrackSource | None = None
 
     def write(self, root: Path, put: PutText | None) -> dict[str, int]:
         """Write the format's files; returns its counts."""
@@ -388,6 +417,7 @@ class _Run:
             options.every_view,
             provenance,
             self.unassigned,
+            None if self.tracks is None else self.tracks.records,
         )
         return write_format(root, self._records(), wanted, put)
 

@@ -13,7 +13,7 @@ from app.errors import InputError
 from app.features.datasets.service import DatasetHead
 from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
 from app.features.groups.state import GroupState, VerdictState, read_states
-from app.features.groups.view_queries import NamedView, named_views
+from app.features.groups.view_queries import ViewFileFields, named_views
 from app.features.versions.membership import policy_settings, version_settings, version_stamp
 from app.features.versions.queries import BATCH, VersionGroup, read_rows
 from app.features.versions.service import FrozenGroup, Version, thaw, thaw_outlines
@@ -21,6 +21,7 @@ from app.formats.export_names import Outline
 from app.formats.export_record import ExportRecord
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
+from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
 
 Facts = Mapping[str, Mapping[str, int]]
@@ -52,6 +53,10 @@ class ExportSource(Protocol):
     def licence(self) -> str | None:
         """Licence text, where there is one of its own."""
 
+    @property
+    def policy(self) -> Policy:
+        """The policy that judges it."""
+
     def settings(self) -> dict[str, Any]:
         """What decided what is in it, for the manifest."""
 
@@ -66,16 +71,31 @@ class ExportSource(Protocol):
 
 
 class LiveSource:
-    """The accepted groups of a dataset, or all of them, in a session's snapshot."""
+    """The accepted groups of a dataset, or all of them, in a session's snapshot.
+
+    Args:
+        session: Any session.
+        dataset: The dataset.
+        everything: All of them.
+        unless_rejected: Also those that nobody accepted; what is rejected, its reader leaves out.
+    """
 
     version = None
     licence = None
 
-    def __init__(self, session: Session, dataset: DatasetHead, everything: bool):
+    def __init__(
+        self,
+        session: Session,
+        dataset: DatasetHead,
+        everything: bool,
+        unless_rejected: bool = False,
+    ):
         self._session, self._found, self._everything = session, dataset, everything
+        self._groups = "all" if everything else "not rejected" if unless_rejected else "accepted"
+        everything = everything or unless_rejected
         self._ids = exported_groups(session, dataset.id, everything)
         self.dataset, self.count = dataset.name, len(self._ids)
-        self.dataset_id = dataset.id
+        self.dataset_id, self.policy = dataset.id, dataset.policy
         self.left_out = {} if everything else left_out_groups(session, dataset.id)
 
     @property
@@ -85,8 +105,7 @@ class LiveSource:
 
     def settings(self) -> dict[str, Any]:
         """Policy, solver, and which groups."""
-        groups = "all" if self._everything else "accepted"
-        return {**policy_settings(self._found.policy, SOLVER_VERSION), "groups": groups}
+        return {**policy_settings(self._found.policy, SOLVER_VERSION), "groups": self._groups}
 
     def stamp(self) -> dict[str, Json]:
         """Nothing: the records say everything."""
@@ -109,7 +128,7 @@ class LiveSource:
     def require_some(self) -> None:
         """Raise InputError where there is nothing to export."""
         if not self.count:
-            raise _nothing_to_export(self._found, self.left_out, self._everything)
+            raise _nothing_to_export(self._found, self.left_out, self._groups != "accepted")
 
 
 class VersionSource:
@@ -118,7 +137,7 @@ class VersionSource:
     def __init__(self, session: Session, version: Version):
         self._session, self._version = session, version
         self.dataset, self.version = version.dataset, version.name
-        self.dataset_id = version.dataset_id
+        self.dataset_id, self.policy = version.dataset_id, version.policy
         self.date, self.licence = version.created, version.licence or None
         self.count = int(version.counts["groups"])
 
@@ -173,7 +192,7 @@ def frozen_record(item: FrozenGroup) -> ExportRecord:
     )
 
 
-def _outline(views: list[NamedView]) -> Group:
+def _outline(views: list[ViewFileFields]) -> Group:
     """A group of views without lines and balls."""
     first = views[0]
     return Group(
@@ -181,7 +200,7 @@ def _outline(views: list[NamedView]) -> Group:
     )
 
 
-def _bare_view(item: NamedView) -> View:
+def _bare_view(item: ViewFileFields) -> View:
     size = ImageSize(item.width, item.height)
     station = Station(item.station, size, shared=item.shared, flipped=item.flipped)
     return View(item.key, station, media=item.media)

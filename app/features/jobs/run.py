@@ -145,6 +145,14 @@ def _taken(result: Json) -> str:
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
+def _ball(result: Json) -> str:
+    there = f"; {result['unchanged']:,} were up to date" if result["unchanged"] else ""
+    count = len(result["without"])
+    without = f"; {count:,} {'has' if count == 1 else 'have'} no track" if count else ""
+    stretches = plural(result["made"], "stretch", "stretches")
+    return f"The ball was tracked over {stretches}{there}{without}."
+
+
 def _tracked(result: Json) -> str:
     counts = ", ".join(f"{result[name]:,} {name}" for name in ("tracked", "bridged", "lost"))
     given = f"; {plural(result['groups'], 'group')} got another camera" if result["groups"] else ""
@@ -167,6 +175,7 @@ _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "pictures": _pictures,
     "recording": _indexed,
     "instants": _taken,
+    "ball": _ball,
     "track": _tracked,
 }
 """By the kind of the job."""

@@ -27,6 +27,7 @@ JobKind = Literal[
     "pictures",
     "recording",
     "instants",
+    "ball",
     "track",
 ]
 

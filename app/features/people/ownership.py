@@ -44,6 +44,7 @@ class OwnedKind(StrEnum):
     WORK = "work"
     """Groups that were given out."""
     RECORDING = "recording"
+    TRACK = "track"
     UPLOAD = "upload"
     FOLDER = "folder"
     """One of the operator, which lies beside all datasets."""

@@ -31,6 +31,8 @@ def drawn_keys(session: Session, dataset_id: int, name: str) -> list[str]:
         .join(StationModel, StationModel.id == ViewModel.station_id)
         .where(GroupModel.dataset_id == dataset_id, GroupModel.match == name)
         .where(StationModel.lines != "{}")
+        # Other views of the group show linked replays.
+        .where(GroupModel.key == GroupModel.match + "/" + ViewModel.key)
     )
     return list(session.scalars(statement))
 

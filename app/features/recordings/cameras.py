@@ -45,6 +45,7 @@ from app.features.recordings.service import (
 from app.geometry.camera import Camera
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines
+from app.soccer.group import View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
@@ -369,17 +370,20 @@ def _groups_of(store: Store, recording: Recording, first: int, last: int) -> dic
 
 def _lines(stored: StoredGroup, sha256: str) -> Lines | None:
     """The lines that somebody drew in a frame of a recording, or accepted; None where there are none."""
-    if not _is_frame(stored, sha256):
+    view = _view_of(stored, sha256)
+    if view is None:
         return None
-    station = stored.group.views[0].station
+    station = view.station
     return None if station.flipped or station.picture else station.lines or None
 
 
-def _is_frame(stored: StoredGroup, sha256: str) -> bool:
-    """Whether a group shows a frame of the video of that content."""
-    views = stored.group.views
-    shown = (views[0].extras.metadata or {}).get("recording") if len(views) == 1 else None
-    return isinstance(shown, dict) and shown.get("sha256") == sha256
+def _view_of(stored: StoredGroup, sha256: str) -> View | None:
+    """The view of a group that shows its own frame of the video of that content; others show linked replays."""
+    for view in stored.group.views:
+        shown = (view.extras.metadata or {}).get("recording")
+        if isinstance(shown, dict) and "link" not in shown:
+            return view if shown.get("sha256") == sha256 else None
+    return None
 
 
 def _given_before(
@@ -390,7 +394,7 @@ def _given_before(
     groups = {
         number: stored
         for number, stored in _groups_of(store, recording, *stretch).items()
-        if _is_frame(stored, sha256)
+        if _view_of(stored, sha256)
     }
     cameras = cameras_at(store, recording, groups)
     return {
@@ -410,7 +414,9 @@ def _give(
     found = {frame.number: frame for frame in frames}
     batch = []
     for number, (stored, tracked) in groups.items():
-        view, frame = stored.group.views[0], found[number]
+        view, frame = _view_of(stored, recording.require_readable()), found[number]
+        if view is None:
+            continue
         given, kept = view.station.given, stored.stations[view.key]
         by_track = given is not None and given == tracked
         free = given is None and not view.station.lines and frame.camera is not None

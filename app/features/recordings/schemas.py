@@ -131,3 +131,7 @@ class InstantsRequest(BaseModel):
     propose: StrictBool = Field(
         default=True, description="Whether a job proposes cameras for them afterwards."
     )
+    linked: StrictBool = Field(
+        default=False,
+        description="Whether the frames of linked replays that show the same are further views of the groups.",
+    )

@@ -446,8 +446,16 @@ def _require_sound(shots: Sequence[Shot], frames: int) -> None:
 def groups_taken(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
-        keys = taken_frames(session, recording.dataset_id, recording.name)
-    return {number: keys[key] for number, key in frames_of_keys(keys).items()}
+        rows = taken_frames(session, recording.dataset_id, recording.name)
+    ids = {row.key: int(row.id) for row in rows}
+    return {number: ids[key] for number, key in frames_of_keys(ids).items()}
+
+
+def single_views(store: Store, recording: Recording) -> set[int]:
+    """Numbers of the frames whose groups have no view but theirs."""
+    with store.read() as session:
+        rows = taken_frames(session, recording.dataset_id, recording.name)
+    return set(frames_of_keys(row.key for row in rows if row.views == 1))
 
 
 def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:

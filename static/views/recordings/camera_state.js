@@ -65,7 +65,7 @@ export function useCameras(one, shot) {
 	}
 	function correct() {
 		if (busy) return;
-		attempt(postInstants(one.id, [frame], false), async (begun) => {
+		attempt(postInstants(one.id, [frame], { propose: false, linked: false }), async (begun) => {
 			const over = await follow(begun, setJob);
 			if (over.state !== 'done') return;
 			// The way back leads to this frame.

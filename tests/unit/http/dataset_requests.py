@@ -24,6 +24,7 @@ from app.sample.truth import TRUTH, truth_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
+from tests.flights import add_flight
 from tests.integration.conftest import picture
 from tests.rigs import groups as rig_groups
 from tests.scenes import make_scenes
@@ -103,6 +104,16 @@ def shots(api: Any) -> Request:
 
 def instants(api: Any) -> Request:
     return "POST", f"{recording(api)}/groups", {"frames": [3], "propose": False}, {}
+
+
+def track_verdict(api: Any) -> Request:
+    path = f"/tracks/{add_flight(store_of(api))}"
+    return "PATCH", path, {"verdict": "rejected"}, etag_of(api, path)
+
+
+def tracks(api: Any) -> Request:
+    add_flight(store_of(api))
+    return "POST", "/datasets/flight/tracks", {}, {}
 
 
 def tracked_cameras(api: Any) -> Request:

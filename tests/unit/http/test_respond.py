@@ -93,6 +93,8 @@ KEPT: dict[str, Made] = {
     "startImport": dataset_requests.data_import,
     "startPractice": dataset_requests.practice,
     "revertDatasetPaint": dataset_requests.no_paint,
+    "changeTrack": dataset_requests.track_verdict,
+    "makeTracks": dataset_requests.tracks,
     "takeInstants": dataset_requests.instants,
     "trackCameras": dataset_requests.tracked_cameras,
     "withdrawSubmission": group_requests.hand_in_taken_back,

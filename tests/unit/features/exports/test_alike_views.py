@@ -24,7 +24,7 @@ from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.formats.cameras_reader import read_cameras
 from app.formats.coco_reader import read_coco
-from app.formats.export_formats import FORMATS, used_options
+from app.formats.export_formats import FORMATS, TRACKS, used_options
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.parquet_reader import read_parquet
 from app.formats.report import Report
@@ -36,7 +36,7 @@ from app.soccer.media import Media
 from tests.cameras import SIZE
 from tests.unit.stores import BEHIND, MAIN
 
-OWN = tuple(name for name in FORMATS if name != "touchline")
+OWN = tuple(name for name in FORMATS if name not in ("touchline", *TRACKS))
 SCHEMES: dict[str, Sequence[tuple[str, str, tuple[str, ...]]]] = {
     "alike": [("", f"kick-{number}", ("north", "south")) for number in range(3)],
     "alike in a match": [("l/s/m", f"l/s/m/{number}", ("north", "south")) for number in range(3)],

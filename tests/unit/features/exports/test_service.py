@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError, NotFoundError
-from app.features.exports.service import FORMATS, export, possible_formats, require_possible
+from app.features.exports.service import FORMATS, TRACKS, export, possible_formats, require_possible
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
@@ -24,6 +24,9 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.media import Media
 from app.soccer.policy import PAPER
+
+OF_BROADCAST = [name for name in FORMATS if name not in ("issia", "issia-3d", *TRACKS)]
+"""Formats of groups of different instants."""
 
 
 def judge(store, group_id, state, reason=None, note=None):
@@ -239,6 +242,7 @@ class TestExport:
             "gamestate": ["images"],
             "sn-calibration": ["images"],
             "touchline": [],
+            **{name: [] for name in TRACKS},
         }
 
     def test_the_manifest_has_the_licence_of_every_source_once(
@@ -255,7 +259,7 @@ class TestExport:
             export(store, "demo", "soccernet-v3d", tmp_path / name, everything=True)
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
-    @pytest.mark.parametrize("form", [name for name in FORMATS if not name.startswith("issia")])
+    @pytest.mark.parametrize("form", OF_BROADCAST)
     def test_every_format_of_broadcast_groups(self, store, three, tmp_path, form: str) -> None:
         report = export(store, "demo", form, tmp_path / "out.zip", everything=True)
         assert report.counts["groups"] == 3
@@ -361,7 +365,7 @@ class TestPossibleFormats:
     def test_a_format_that_has_no_place_for_the_groups_says_why(self, store, three) -> None:
         answers = {one.format: one for one in possible_formats(store, "demo")}
         refused = [name for name, one in answers.items() if one.reason is not None]
-        assert refused == ["issia-3d", "issia"]
+        assert refused == ["issia-3d", "issia", *TRACKS]
         assert "is not from ISSIA" in answers["issia"].reason
         assert tuple(answers) == FORMATS
 
@@ -376,7 +380,7 @@ class TestPossibleFormats:
             require_possible(store, "demo", "issia", everything=True)
         assert caught.value.hint is not None
         named = caught.value.hint.removesuffix(".").partition(": ")[2].split(", ")
-        assert named == [form for form in FORMATS if not form.startswith("issia")]
+        assert named == OF_BROADCAST
 
     def test_that_nothing_is_accepted_is_no_matter_of_the_format(self, store, three) -> None:
         with pytest.raises(InputError, match="no group has been accepted") as caught:

@@ -102,6 +102,16 @@ RESULTS = [
         {"name": "half.mp4", "new": 1, "unchanged": 3},
         "1 group made of half.mp4; 3 were there before.",
     ),
+    (
+        "ball",
+        {"made": 2, "unchanged": 0, "without": []},
+        "The ball was tracked over 2 stretches.",
+    ),
+    (
+        "ball",
+        {"made": 1, "unchanged": 3, "without": [{"stretch": "a", "reason": "b"}]},
+        "The ball was tracked over 1 stretch; 3 were up to date; 1 has no track.",
+    ),
 ]
 
 

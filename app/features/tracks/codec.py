@@ -1,0 +1,277 @@
+"""What a track is made from and the track itself as JSON: stored, frozen and computed again from.
+
+A track is always computed from its stored inputs, so that whoever has them gets the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from app.canonical import canonical, digest_of
+from app.db.json_columns import Json, as_written
+from app.features.groups.codecs import camera_from_json, camera_to_json
+from app.features.tracks.stretches import Stretch
+from app.geometry.arrays import FloatArray, IntArray
+from app.geometry.camera import Camera
+from app.soccer.pitch import Pitch
+from app.tracking.ball_solve import track_ball
+from app.tracking.ball_track import (
+    BallEvent,
+    BallMeasurements,
+    BallTrack,
+    Contradiction,
+    EventKind,
+    LeftOut,
+)
+
+TRACK_VERSION = "1"
+"""Of the solver: tracks of another one are stale."""
+EVENT_KINDS: tuple[str, ...] = get_args(EventKind)
+NEAR_FRAMES = 3
+"""Between an event and the frame in which a person removes it."""
+_UPPER = np.triu_indices(6)
+
+
+@dataclass(frozen=True)
+class Correction:
+    """An event that a person added to a track, or removed from it.
+
+    Attributes:
+        frame: Of the stretch.
+        kind: ``kick``, ``bounce`` or ``out``.
+        added: Whether it is there; else it is not.
+    """
+
+    frame: int
+    kind: EventKind
+    added: bool
+
+
+@dataclass(frozen=True)
+class TrackInputs:
+    """What a track is computed from; the same bits, the same track.
+
+    Attributes:
+        frames: Numbers of the frames, shape (N,).
+        times: Seconds, shape (N,).
+        pitch: Where it lies.
+        measurements: What views show.
+        corrections: What people said of its events.
+    """
+
+    frames: IntArray
+    times: FloatArray
+    pitch: Pitch
+    measurements: BallMeasurements
+    corrections: tuple[Correction, ...] = ()
+
+    @staticmethod
+    def of(stretch: Stretch, corrections: Iterable[Correction] = ()) -> TrackInputs:
+        """The inputs of a stretch as it is now."""
+        return TrackInputs(
+            stretch.frames,
+            stretch.times,
+            stretch.pitch,
+            stretch.measurements,
+            tuple(sorted(corrections, key=lambda item: (item.frame, item.kind))),
+        )
+
+
+def make_track(inputs: TrackInputs) -> BallTrack:
+    """The track of inputs, with their corrections."""
+    track = track_ball(inputs.measurements, inputs.frames, inputs.times, pitch=inputs.pitch)
+    return corrected(track, inputs.corrections)
+
+
+def corrected(track: BallTrack, corrections: Sequence[Correction]) -> BallTrack:
+    """A track with the events that people added and without those they removed."""
+    events = list(track.events)
+    rows = {int(frame): row for row, frame in enumerate(track.frames)}
+    for item in corrections:
+        near = [
+            event
+            for event in events
+            if event.kind == item.kind and abs(event.frame - item.frame) <= NEAR_FRAMES
+        ]
+        row = rows.get(item.frame)
+        if not item.added:
+            gone = set(map(id, near))
+            events = [event for event in events if id(event) not in gone]
+        elif not near and row is not None and np.isfinite(track.position[row]).all():
+            time = float(track.times[row])
+            events.append(BallEvent(item.frame, time, item.kind, track.position[row], 0.0))
+    return replace(track, events=tuple(sorted(events, key=lambda event: event.time_s)))
+
+
+def inputs_to_json(inputs: TrackInputs) -> Json:
+    """Every number that a track depends on; a camera of many measurements stands there once."""
+    measured = inputs.measurements
+    cameras: dict[int, int] = {}
+    texts: list[Json] = []
+    known: dict[str, int] = {}
+    which = []
+    for camera in measured.cameras:
+        if id(camera) not in cameras:
+            value = camera_to_json(camera)
+            number = known.setdefault(canonical(value), len(texts))
+            if number == len(texts):
+                texts.append(value)
+            cameras[id(camera)] = number
+        which.append(cameras[id(camera)])
+    names = measured.names
+    return {
+        "version": TRACK_VERSION,
+        "first": int(inputs.frames[0]),
+        "times": inputs.times.tolist(),
+        "pitch": [float(inputs.pitch.length), float(inputs.pitch.width)],
+        "views": list(names),
+        "cameras": texts,
+        "measurements": {
+            "frame": measured.frames.tolist(),
+            "time": measured.times.tolist(),
+            "view": [names.index(view) for view in measured.views],
+            "camera": which,
+            "x": measured.pixels[:, 0].tolist(),
+            "y": measured.pixels[:, 1].tolist(),
+            "sigma": measured.sigma.tolist(),
+            "size": _missing(measured.sizes),
+            "size_sigma": _missing(measured.size_sigma),
+        },
+        "corrections": corrections_to_json(inputs.corrections),
+    }
+
+
+def corrections_to_json(corrections: Iterable[Correction]) -> Json:
+    """Corrections in their order."""
+    return [[item.frame, item.kind, item.added] for item in corrections]
+
+
+def corrections_from_json(value: Sequence[Any]) -> tuple[Correction, ...]:
+    """Back from ``corrections_to_json``."""
+    return tuple(Correction(frame, cast(EventKind, kind), added) for frame, kind, added in value)
+
+
+def inputs_digest(inputs: TrackInputs) -> str:
+    """The same digest, the same track."""
+    return digest_of(canonical(inputs_to_json(inputs)).encode())
+
+
+def inputs_from_json(value: Mapping[str, Any]) -> TrackInputs:
+    """Back from ``inputs_to_json``.
+
+    Raises:
+        DamagedError: It is not what was written.
+    """
+    with as_written():
+        found, names = value["measurements"], value["views"]
+        cameras: list[Camera] = [camera_from_json(item) for item in value["cameras"]]
+        times = np.array(value["times"], dtype=float)
+        return TrackInputs(
+            value["first"] + np.arange(len(times)),
+            times,
+            Pitch(*value["pitch"]),
+            BallMeasurements(
+                np.array(found["frame"], dtype=np.int64),
+                np.array(found["time"], dtype=float),
+                tuple(names[number] for number in found["view"]),
+                np.array([found["x"], found["y"]], dtype=float).T.reshape(-1, 2).copy(),
+                np.array(found["sigma"], dtype=float),
+                tuple(cameras[number] for number in found["camera"]),
+                _numbers(found["size"]),
+                _numbers(found["size_sigma"]),
+            ),
+            corrections_from_json(value["corrections"]),
+        )
+
+
+def track_to_json(track: BallTrack) -> Json:
+    """A track with every digit; frames without a place have null."""
+    left = track.left_out
+    return {
+        "frames": track.frames.tolist(),
+        "times": track.times.tolist(),
+        "position": _rows(track.position),
+        "velocity": _rows(track.velocity),
+        "covariance": _rows(track.covariance[:, _UPPER[0], _UPPER[1]]),
+        "state": list(track.state),
+        "mode": list(track.mode),
+        "views": [list(names) for names in track.views],
+        "events": [
+            [item.frame, item.time_s, item.kind, item.position.tolist(), item.sigma_s]
+            for item in track.events
+        ],
+        "contradicted": [[item.measurement, item.px, item.reason] for item in track.contradicted],
+        "reason": track.reason,
+        "left_out": left
+        and {
+            "px": _missing(left.px),
+            "by_frame": _missing(left.by_frame),
+            "median_px": left.median_px,
+            "p95_px": left.p95_px,
+            "predicted": left.predicted,
+        },
+        "offsets": [list(item) for item in track.offsets],
+    }
+
+
+def track_from_json(value: Mapping[str, Any]) -> BallTrack:
+    """Back from ``track_to_json``.
+
+    Raises:
+        DamagedError: It is not what was written.
+    """
+    with as_written():
+        frames = np.array(value["frames"], dtype=np.int64)
+        count, left = len(frames), value["left_out"]
+        covariance = np.full((count, 6, 6), np.nan)
+        upper = _matrix(value["covariance"], count, 21)
+        covariance[:, _UPPER[0], _UPPER[1]] = upper
+        covariance[:, _UPPER[1], _UPPER[0]] = upper
+        return BallTrack(
+            frames,
+            np.array(value["times"], dtype=float),
+            _matrix(value["position"], count, 3),
+            _matrix(value["velocity"], count, 3),
+            covariance,
+            tuple(value["state"]),
+            tuple(value["mode"]),
+            tuple(tuple(names) for names in value["views"]),
+            tuple(
+                BallEvent(frame, time, kind, np.array(place, dtype=float), sigma)
+                for frame, time, kind, place, sigma in value["events"]
+            ),
+            tuple(Contradiction(*item) for item in value["contradicted"]),
+            value["reason"],
+            left
+            and LeftOut(
+                _numbers(left["px"]),
+                _numbers(left["by_frame"]),
+                left["median_px"],
+                left["p95_px"],
+                left["predicted"],
+            ),
+            tuple((name, offset) for name, offset in value["offsets"]),
+        )
+
+
+def _missing(values: FloatArray) -> list[float | None]:
+    return [None if value != value else value for value in values.tolist()]
+
+
+def _numbers(values: Sequence[float | None]) -> FloatArray:
+    return np.array([np.nan if value is None else value for value in values], dtype=float)
+
+
+def _rows(values: FloatArray) -> list[list[float] | None]:
+    known = np.atleast_1d(np.isfinite(values).all(axis=1)).tolist()
+    return [row if there else None for row, there in zip(values.tolist(), known, strict=True)]
+
+
+def _matrix(rows: Sequence[Sequence[float] | None], count: int, width: int) -> FloatArray:
+    nothing = [np.nan] * width
+    found = [nothing if row is None else row for row in rows]
+    return np.array(found, dtype=float).reshape(count, width)

@@ -1,0 +1,103 @@
+"""Tracks as exports have them: computed from the groups of an export, or as people accepted them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from app.errors import InputError
+from app.features.tracks.codec import Correction, TrackInputs, inputs_digest, make_track
+from app.features.tracks.stretches import Shots, Stretch, gather_stretches, require_stretch
+from app.formats.export_record import ExportRecord
+from app.formats.tracks_writer import TrackRecord
+from app.soccer.policy import Policy
+from app.tracking.ball_track import BallTrack
+
+
+@dataclass(frozen=True)
+class KnownTrack:
+    """What is stored of a stretch.
+
+    Attributes:
+        digest: Of the inputs of its track.
+        track: The track, with its corrections; None where nobody accepted it.
+        verdict: ``accepted``, ``rejected`` or None.
+        corrections: What people said of its events.
+    """
+
+    digest: str
+    track: BallTrack | None
+    verdict: str | None
+    corrections: tuple[Correction, ...] = ()
+
+
+@dataclass(frozen=True)
+class TrackSource:
+    """Makes the tracks of an export.
+
+    Attributes:
+        dataset: Name of the dataset.
+        policy: Says how noisy clicks and cameras are.
+        shots: Of its recordings.
+        known: What is stored of stretches, by key.
+        frozen: The tracks of a frozen version, by key: they are written as they are, and no others.
+        everything: Whether rejected groups and tracks take part.
+        try_only: Whether it is only asked if there are stretches.
+    """
+
+    dataset: str
+    policy: Policy
+    shots: Shots = field(default_factory=dict)
+    known: Mapping[str, KnownTrack] = field(default_factory=dict)
+    frozen: Mapping[str, BallTrack] = field(default_factory=dict)
+    everything: bool = False
+    try_only: bool = False
+
+    def records(self, records: Iterable[ExportRecord]) -> Iterator[TrackRecord]:
+        """The tracks of groups, in the order of their keys.
+
+        Raises:
+            InputError: No groups follow each other in time, or no stretch has a track; with the reasons.
+        """
+        taken = (item for item in records if self.everything or item.verdict != "rejected")
+        stretches = gather_stretches(taken, self.policy, self.shots)
+        require_stretch(self.dataset, stretches)
+        if self.try_only:
+            return
+        reasons = []
+        for stretch in stretches:
+            found = self._record(stretch)
+            if isinstance(found, str):
+                reasons.append(f"{stretch.key}: {found}")
+            else:
+                yield found
+        if len(reasons) == len(stretches):
+            raise InputError(
+                f'no stretch of "{self.dataset}" has a track of the ball ({"; ".join(reasons[:5])})'
+            )
+
+    def _record(self, stretch: Stretch) -> TrackRecord | str:
+        """A stretch's track, or why there is none."""
+        if self.frozen:
+            track, verdict = self.frozen.get(stretch.key), "accepted"
+            if track is None:
+                return "its track was not accepted when the version was frozen"
+            return self._made(stretch, track, verdict)
+        known = self.known.get(stretch.key)
+        verdict, track = "unreviewed", None
+        if known is not None and known.digest == inputs_digest(TrackInputs.of(stretch)):
+            if known.verdict == "rejected" and not self.everything:
+                return "its track was rejected"
+            verdict = known.verdict or verdict
+            track = known.track
+        corrections = known.corrections if known is not None else ()
+        return self._made(
+            stretch, track or make_track(TrackInputs.of(stretch, corrections)), verdict
+        )
+
+    def _made(self, stretch: Stretch, track: BallTrack, verdict: str) -> TrackRecord | str:
+        if track.reason is not None:
+            return track.reason
+        return TrackRecord(
+            stretch.key, track, stretch.pitch, stretch.rate, stretch.cameras, verdict
+        )

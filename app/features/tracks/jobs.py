@@ -1,0 +1,40 @@
+"""Tracks as a job: made in a worker process, anew where their groups have changed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import asdict
+from typing import Any
+
+from app.db.database_worker import Caller
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.features.jobs.run import JobProgress, counting_progress, run_job_in_worker
+from app.features.match_estimates.jobs import MatchCall, MatchJob
+from app.features.tracks.service import make_tracks
+
+
+def _make(
+    store: Store, dataset_id: int, matches: Collection[str] | None, actor: str, caller: Caller
+) -> dict[str, Any]:
+    """``make_tracks`` in a worker process."""
+    return asdict(make_tracks(store, dataset_id, matches, actor, caller))
+
+
+def _track(call: MatchCall, progress: JobProgress) -> Json:
+    progress(0, None, "Reading what views measured of the ball.")
+    return run_job_in_worker(
+        call.store,
+        "tracks",
+        "tracking the ball",
+        _make,
+        call.dataset_id,
+        call.matches,
+        call.job.actor,
+        dataset_id=call.dataset_id,
+        progress=progress,
+        report=counting_progress(progress, "groups read"),
+    )
+
+
+TRACKS = MatchJob("ball", "Track the ball of {}", _track)

@@ -1,0 +1,121 @@
+"""Tracks in the database, and what they ask of it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Select, delete, insert, select, update
+
+from app.db.json_columns import as_written, parse
+from app.db.session import Session
+from app.features.datasets.tables import DatasetModel, GroupModel
+from app.features.groups.insert_queries import next_id
+from app.features.queue.tables import QueueModel
+from app.features.recordings.tables import RecordingModel
+from app.features.tracks.tables import TrackModel
+
+_LARGE = ("inputs", "body")
+
+
+@dataclass(frozen=True)
+class TrackGroup:
+    """A group as far as its stretch asks.
+
+    Attributes:
+        state: What a track depends on: what was said, whether it is solved, whether it is rejected.
+        rejected: Whether a person rejected it.
+        place: Where its own views put the ball, pitch frame, metres; None where they do not.
+    """
+
+    id: int
+    key: str
+    state: tuple[str, bool, bool]
+    rejected: bool
+    place: tuple[float, float, float] | None
+
+
+def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[int, int]]]:
+    """First and last frames of the shots of a dataset's recordings, by name."""
+    statement = select(RecordingModel.name, RecordingModel.shots).where(
+        RecordingModel.dataset_id == dataset_id
+    )
+    with as_written():
+        return {
+            row.name: [(shot["first"], shot["last"]) for shot in parse(row.shots)]
+            for row in session.execute(statement)
+        }
+
+
+def _heads() -> Select[Any]:
+    columns = [item for item in TrackModel.__table__.columns if item.name not in _LARGE]
+    return select(*columns, DatasetModel.name.label("dataset")).join_from(
+        TrackModel, DatasetModel, DatasetModel.id == TrackModel.dataset_id
+    )
+
+
+def list_rows(session: Session, dataset_id: int) -> Sequence[Any]:
+    """The tracks of a dataset by match and frame, without what is large."""
+    order = TrackModel.match, TrackModel.first, TrackModel.id
+    return session.execute(
+        _heads().where(TrackModel.dataset_id == dataset_id).order_by(*order)
+    ).all()
+
+
+def find_row(session: Session, track_id: int) -> Any | None:
+    """A track by its id, without what is large."""
+    return session.execute(_heads().where(TrackModel.id == track_id)).one_or_none()
+
+
+def read_bodies(session: Session, track_ids: Collection[int]) -> dict[int, tuple[bytes, bytes]]:
+    """Inputs and body of tracks, compressed, by id."""
+    statement = select(TrackModel.id, TrackModel.inputs, TrackModel.body).where(
+        TrackModel.id.in_(list(track_ids))
+    )
+    return {row.id: (row.inputs, row.body) for row in session.execute(statement)}
+
+
+def insert_track(session: Session, values: Mapping[str, Any]) -> int:
+    """Insert a track; returns its id."""
+    identity = next_id(session, TrackModel)
+    session.execute(insert(TrackModel), [{"id": identity, **values}])
+    return identity
+
+
+def update_track(session: Session, track_id: int, **values: Any) -> None:
+    """Change columns of a track."""
+    session.execute(update(TrackModel).where(TrackModel.id == track_id).values(values))
+
+
+def delete_tracks(session: Session, track_ids: Collection[int]) -> None:
+    """Delete tracks."""
+    session.execute(delete(TrackModel).where(TrackModel.id.in_(list(track_ids))))
+
+
+def match_groups(
+    session: Session, dataset_id: int, matches: Collection[str] | None = None
+) -> dict[str, list[TrackGroup]]:
+    """The groups of matches, or of all, by match, in the order of the dataset."""
+    queue = QueueModel
+    statement = (
+        select(
+            GroupModel.id, GroupModel.key, GroupModel.match, GroupModel.inputs_hash,
+            queue.solved, queue.status, queue.x_m, queue.y_m, queue.height_m,
+        )
+        .outerjoin(queue, queue.group_id == GroupModel.id)
+        .where(GroupModel.dataset_id == dataset_id)
+        .order_by(GroupModel.number)
+    )  # fmt: skip
+    if matches is not None:
+        statement = statement.where(GroupModel.match.in_(list(matches)))
+    found: dict[str, list[TrackGroup]] = {}
+    for row in session.execute(statement):
+        place = None
+        if row.x_m is not None and row.y_m is not None and row.height_m is not None:
+            place = row.x_m, row.y_m, -row.height_m
+        rejected = row.status == "rejected"
+        state = row.inputs_hash, bool(row.solved), rejected
+        group = TrackGroup(row.id, row.key, state, rejected, place)
+        found.setdefault(row.match, []).append(group)
+    return found

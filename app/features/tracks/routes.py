@@ -1,0 +1,113 @@
+"""Tracks of the ball over REST."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from app.features.jobs.queries import Job
+from app.features.match_estimates.schemas import MatchRequest
+from app.features.tracks import service as tracks
+from app.features.tracks.jobs import TRACKS
+from app.features.tracks.schemas import (
+    MOST_FRAMES,
+    TrackDocument,
+    TrackEdit,
+    TrackFrames,
+    TrackList,
+)
+from app.features.tracks.service import Track
+from app.finite import MAX_ID
+from app.http.conflicts import current_state
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
+from app.http.job_responses import by_job, job_answer
+from app.http.permissions import Action, OwnedKind, may
+from app.http.problem import responses
+from app.http.request_limits import QUESTIONS, limit
+from app.http.respond import document, responds
+from app.http.route import Route
+
+TAGGED = {"headers": {"ETag": {"description": "Of the track.", "schema": {"type": "string"}}}}
+router = APIRouter(tags=["tracks"], route_class=Route)
+
+
+@router.get("/datasets/{dataset}/tracks", operation_id="listTracks", responses=responses(404))
+@may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
+@limit(QUESTIONS)
+@paged()
+def list_tracks(dataset: DatasetPath, store: AppStore) -> TrackList:
+    """The tracks of a dataset, by match and frame, each with how well it predicts what was left out."""
+    return TrackList.model_validate({"items": tracks.list_tracks(store, dataset)})
+
+
+@router.post("/datasets/{dataset}/tracks", operation_id="makeTracks", **by_job(404, 409, 413, 415))
+@may(Action.LEAD, dataset=OwnedKind.DATASET)
+@responds(job_answer)
+def make_tracks(
+    dataset: DatasetPath, request: MatchRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Track the ball over the stretches of a match, or of all: static rigs, and shots of recordings.
+
+    What changed nothing stays; a track that comes out differently has no verdict. Corrections stay.
+    """
+    return TRACKS.request(services.jobs, services.store, dataset, request.match, actor=actor)
+
+
+@router.get("/tracks/{track}", operation_id="getTrack", responses={**responses(404), 200: TAGGED})
+@may(Action.READ, track=OwnedKind.TRACK)
+def get_track(track: Id, store: AppStore, response: Response) -> TrackDocument:
+    """A track without its frames."""
+    found = TrackDocument.model_validate(tracks.get_track(store, track))
+    response.headers["ETag"] = found.etag
+    return found
+
+
+@router.get(
+    "/tracks/{track}/frames",
+    operation_id="getTrackFrames",
+    responses={**responses(404), 200: TAGGED},
+)
+@may(Action.READ, track=OwnedKind.TRACK)
+@limit(QUESTIONS)
+def get_track_frames(
+    track: Id,
+    store: AppStore,
+    response: Response,
+    first: Annotated[
+        int, Query(ge=0, le=MAX_ID, description="Number of the first frame wanted.")
+    ] = 0,
+    last: Annotated[
+        int | None,
+        Query(ge=0, le=MAX_ID, description=f"Number of the last one; {MOST_FRAMES} come at most."),
+    ] = None,
+) -> TrackFrames:
+    """The frames of a track in columns, with its events and with the balls that contradict it."""
+    detail = tracks.read_track(store, track)
+    start = max(first, detail.track.first)
+    end = min(detail.track.last if last is None else last, start + MOST_FRAMES - 1)
+    found = TrackFrames.of(detail, start, end)
+    response.headers["ETag"] = found.etag
+    return found
+
+
+def _tagged(track: Track) -> Response:
+    found = TrackDocument.model_validate(track)
+    return document(found, 200, {"ETag": found.etag})
+
+
+@router.patch(
+    "/tracks/{track}",
+    operation_id="changeTrack",
+    response_model=TrackDocument,
+    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
+)
+@may(Action.REVIEW, track=OwnedKind.TRACK)
+@responds(_tagged)
+def change_track(
+    track: Id, edit: TrackEdit, store: AppStore, actor: Actor, if_match: IfMatch
+) -> Track:
+    """Accept or reject a track, or say which events it has and has not."""
+    with current_state(lambda: TrackDocument.model_validate(tracks.get_track(store, track))):
+        return tracks.change_track(store, track, edit.change(), if_match, actor=actor)

@@ -1,0 +1,256 @@
+"""Documents of tracks: what lists say, their frames in columns, and what people say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, StrictBool
+
+from app.features.tracks.codec import Correction
+from app.features.tracks.service import (
+    MOST_CORRECTIONS,
+    TrackChange,
+    TrackDetail,
+    TrackSummary,
+)
+from app.finite import MAX_ID, finite
+from app.formats.tracks_writer import position_sigma
+from app.geometry.arrays import FloatArray
+from app.http.documents import Document, ListDocument
+from app.tracking.ball_track import BallMode, BallState, EventKind
+
+MOST_FRAMES = 5000
+"""Of one answer."""
+Number = float | None
+
+
+class CorrectionDocument(BaseModel):
+    """An event that a person added to a track, or removed from it."""
+
+    model_config = ConfigDict(extra="forbid", from_attributes=True)
+
+    frame: Annotated[int, Field(ge=0, le=MAX_ID)] = Field(description="Of the stretch.")
+    kind: EventKind = Field(description="What happened.")
+    added: StrictBool = Field(description="Whether it happened; false: it did not.")
+
+
+class TrackSummaryDocument(Document, shows=TrackSummary):
+    """What came of tracking the ball over a stretch."""
+
+    frames: int = Field(description="Of the stretch.")
+    states: dict[str, int] = Field(
+        description="Frames by how the ball is known: `measured` by two views, `one_view`, "
+        "`predicted`, `bridged` over a gap, `gap`."
+    )
+    events: dict[str, int] = Field(description="Events by kind, without corrections.")
+    measurements: int = Field(description="Balls that views show.")
+    contradicted: int = Field(description="Those that the track does not explain.")
+    median_px: float | None = Field(
+        description="Median error of balls that were left out in turn and predicted, pixels."
+    )
+    p95_px: float | None = Field(description="95th percentile of the same.")
+    worst: int | None = Field(description="The frame where that error is largest.")
+    reason: str | None = Field(description="Why there is no track; null: there is one.")
+    rate: float = Field(description="Frames a second.")
+    unused: dict[str, int] = Field(description="Balls that were not used, by reason.")
+
+
+class TrackDocument(Document):
+    """The track of the ball over a stretch: a static rig's frames, or a shot of a recording."""
+
+    id: int
+    dataset: str
+    key: str = Field(description="Of the stretch; unique in its dataset.")
+    match: str
+    first: int = Field(description="Its first frame.")
+    last: int = Field(description="Its last frame.")
+    stale: bool = Field(description="Whether its groups have changed since it was made.")
+    verdict: Literal["accepted", "rejected"] | None = Field(description="Null: nobody judged it.")
+    note: str | None = Field(description="Why it was accepted or rejected.")
+    judged_by: str | None = Field(description="Who accepted or rejected it.")
+    judged_at: datetime | None = Field(description="When.")
+    corrections: list[CorrectionDocument] = Field(
+        description="Events that people added and removed; they stay when it is made again."
+    )
+    summary: TrackSummaryDocument = Field(description="What came of it.")
+    created: datetime
+    by: str = Field(validation_alias="actor")
+    etag: str
+
+
+class TrackList(ListDocument[TrackDocument]):
+    """The tracks of a dataset, by match and frame."""
+
+
+class TrackEventDocument(Document):
+    """What happened to the ball."""
+
+    frame: int = Field(description="The nearest frame.")
+    time_s: float = Field(description="Seconds.")
+    kind: EventKind = Field(description="What happened.")
+    position: list[float] = Field(description="x, y and z in the pitch frame, metres, z down.")
+    sigma_s: float = Field(description="Standard deviation of its time, seconds.")
+    added: bool = Field(description="Whether a person added it.")
+
+
+class ContradictionDocument(Document):
+    """A ball that the track does not explain, and what would mend it."""
+
+    frame: int = Field(description="Of the stretch.")
+    view: str = Field(description="Name of the camera or recording.")
+    group: int | None = Field(description="Id of its group.")
+    x: float = Field(description="Where it was annotated, pixels.")
+    y: float = Field(description="Where it was annotated, pixels.")
+    track_x: float | None = Field(description="Where the track is seen, pixels; null in a gap.")
+    track_y: float | None = Field(description="Where the track is seen, pixels; null in a gap.")
+    px: float = Field(description="How far from the track, pixels.")
+    sentence: str = Field(description="What is wrong.")
+    fix: str = Field(description="What to do.")
+
+
+class TrackFrames(Document):
+    """Frames of a track in columns: item i of every list is of one frame.
+
+    Lengths in metres in the pitch frame, z down; null where there is no ball.
+    """
+
+    etag: str
+    frame: list[int] = Field(description="Numbers.")
+    time_s: list[float] = Field(description="Seconds.")
+    x: list[Number] = Field(description="Along the pitch, metres.")
+    y: list[Number] = Field(description="Across the pitch, metres.")
+    z: list[Number] = Field(description="Downwards, metres.")
+    sigma: list[Number] = Field(description="Major axis of the covariance, metres.")
+    covariance: list[list[float] | None] = Field(
+        description="Of the position: xx, xy, xz, yy, yz, zz, square metres."
+    )
+    velocity: list[list[float] | None] = Field(description="Metres a second.")
+    state: list[BallState] = Field(description="How the ball is known.")
+    mode: list[BallMode] = Field(description="What it does; empty in gaps.")
+    views: list[list[str]] = Field(description="Cameras that saw it and agree.")
+    left_out_px: list[Number] = Field(
+        description="Error of what was left out in this frame and predicted, pixels."
+    )
+    raw: list[list[float] | None] = Field(
+        description="Where the views of this frame alone put the ball: x, y, z."
+    )
+    group: list[int | None] = Field(description="Ids of groups.")
+    events: list[TrackEventDocument] = Field(description="Those of these frames, by time.")
+    contradicted: list[ContradictionDocument] = Field(
+        description="Balls of these frames that the track does not explain."
+    )
+
+    @staticmethod
+    def of(detail: TrackDetail, first: int, last: int) -> TrackFrames:
+        """The document of the frames from one number to another."""
+        ball, groups = detail.ball, detail.groups
+        rows = np.flatnonzero((ball.frames >= first) & (ball.frames <= last))
+        numbers = [int(frame) for frame in ball.frames[rows]]
+        position, spread = ball.position[rows], ball.covariance[rows]
+        upper = spread[:, *np.triu_indices(3)]
+        left = (
+            np.full(len(ball.frames), np.nan) if ball.left_out is None else ball.left_out.by_frame
+        )
+        inside = set(numbers)
+        added = {(item.frame, item.kind) for item in detail.track.corrections if item.added}
+        return TrackFrames(
+            etag=detail.track.etag,
+            frame=numbers,
+            time_s=ball.times[rows].tolist(),
+            x=finite(position[:, 0].tolist()),
+            y=finite(position[:, 1].tolist()),
+            z=finite(position[:, 2].tolist()),
+            sigma=finite(position_sigma(spread).tolist()),
+            covariance=_rows(upper),
+            velocity=_rows(ball.velocity[rows]),
+            state=[ball.state[row] for row in rows],
+            mode=[ball.mode[row] for row in rows],
+            views=[list(ball.views[row]) for row in rows],
+            left_out_px=finite(left[rows].tolist()),
+            raw=[_place(groups[number].place) if number in groups else None for number in numbers],
+            group=[groups[number].id if number in groups else None for number in numbers],
+            events=[
+                TrackEventDocument(
+                    frame=event.frame,
+                    time_s=event.time_s,
+                    kind=event.kind,
+                    position=[float(value) for value in event.position],
+                    sigma_s=event.sigma_s,
+                    added=(event.frame, event.kind) in added,
+                )
+                for event in ball.events
+                if event.frame in inside
+            ],
+            contradicted=[item for item in _contradictions(detail) if item.frame in inside],
+        )
+
+
+class TrackEdit(BaseModel):
+    """What a person says of a track; what is left out stays."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"verdict": "accepted"}]}
+    )
+
+    verdict: Literal["accepted", "rejected", "none"] | None = Field(
+        default=None, description="`none` takes the verdict back."
+    )
+    note: Annotated[str, Field(max_length=2000)] | None = Field(default=None, description="Why.")
+    corrections: Annotated[list[CorrectionDocument], Field(max_length=MOST_CORRECTIONS)] | None = (
+        Field(default=None, description="All events that are added and removed; it is judged anew.")
+    )
+
+    def change(self) -> TrackChange:
+        """The change."""
+        found = self.corrections
+        corrections = None if found is None else tuple(Correction(**vars(item)) for item in found)
+        return TrackChange(self.verdict, self.note, corrections)
+
+
+def _contradictions(detail: TrackDetail) -> list[ContradictionDocument]:
+    measured, ball = detail.inputs.measurements, detail.ball
+    rows = {int(frame): row for row, frame in enumerate(ball.frames)}
+    found = []
+    for item in ball.contradicted:
+        frame, (x, y) = int(measured.frames[item.measurement]), measured.pixels[item.measurement]
+        place = ball.position[rows[frame]][None]
+        seen = (
+            measured.cameras[item.measurement].project(place)[0]
+            if np.isfinite(place).all()
+            else np.full(2, np.nan)
+        )
+        view, group = measured.views[item.measurement], detail.groups.get(frame)
+        there = bool(np.isfinite(seen).all())
+        fix = (
+            f"Move the ball of {view} to ({seen[0]:.1f}, {seen[1]:.1f}) if it is there, pick the "
+            "other ball if it shows two, or leave the view out."
+            if there
+            else f"Look at {view}: move its ball, or leave the view out."
+        )
+        found.append(
+            ContradictionDocument(
+                frame=frame,
+                view=view,
+                group=None if group is None else group.id,
+                x=float(x),
+                y=float(y),
+                track_x=float(seen[0]) if there else None,
+                track_y=float(seen[1]) if there else None,
+                px=item.px,
+                sentence=item.reason,
+                fix=fix,
+            )
+        )
+    return found
+
+
+def _rows(values: FloatArray) -> list[list[float] | None]:
+    known = np.asarray(np.isfinite(values).all(axis=1))
+    return [row if there else None for row, there in zip(values.tolist(), known, strict=True)]
+
+
+def _place(place: Sequence[float] | None) -> list[float] | None:
+    return None if place is None else list(place)

@@ -1,0 +1,298 @@
+"""Stretches: groups that follow each other in time, and what their views measure of the ball.
+
+A static rig makes one stretch of each match, its groups numbered by frame; a recording one of each shot,
+its groups at the time stamps of their frames.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from app.errors import InputError
+from app.formats.export_record import ExportRecord
+from app.geometry.arrays import FloatArray, IntArray
+from app.geometry.camera import Camera
+from app.plural import plural
+from app.soccer.group import Group, View
+from app.soccer.pitch import Pitch
+from app.soccer.policy import Policy
+from app.solving.ball_covariance import ray_covariances
+from app.solving.triangulate import BallObservation, ball_observations
+from app.tracking.ball_track import BallMeasurements
+
+RATE = 25.0
+"""Frames a second of a static rig, whose groups are numbered and say no time: ISSIA's."""
+LONGEST_GAP_S = 2.0
+"""Between two groups of a recording whose shots are not known, beyond which another stretch begins."""
+MOST_FRAMES = 200_000
+"""Of a stretch: a half of a match at 60 a second has 162,000."""
+_NUMBER = re.compile(r"(?:.*/)?(\d{1,9})(?:\.\w+)?", re.ASCII)
+_UNSURE = ("calibratable", "jac", "agreement")
+"""Gates on cameras; a view that fails one measures nothing."""
+_ROUGH_HEIGHT_M, _ROUGH_DEPTH_M = 1.0, 60.0
+"""Where a ball that no two views placed is taken to be, to carry its camera's covariance there."""
+
+Shots = Mapping[str, Sequence[tuple[int, int]]]
+"""First and last frames of a recording's shots in their order, by the recording's name."""
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A group in time.
+
+    Attributes:
+        frame: Its number in its stretch.
+        time: Seconds.
+        key: Of the group.
+    """
+
+    frame: int
+    time: float
+    key: str
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Frames in time order, one row each, with what views measured of the ball.
+
+    Attributes:
+        key: Unique in its dataset: the match; of a recording with its first and last frame.
+        match: Of its groups.
+        rate: Frames a second, of a variable rate the mean.
+        frames: Every number from the first group to the last, shape (N,).
+        times: Seconds, shape (N,).
+        pitch: Of its first group.
+        measurements: What views show, by frame and view.
+        groups: Key of the group of each frame that has one.
+        cameras: Cameras of views that have one, by frame, by view.
+        unused: Balls that are no measurement, counted by reason.
+    """
+
+    key: str
+    match: str
+    rate: float
+    frames: IntArray
+    times: FloatArray
+    pitch: Pitch
+    measurements: BallMeasurements
+    groups: Mapping[int, str]
+    cameras: Mapping[str, Mapping[int, Camera]]
+    unused: Mapping[str, int]
+
+
+def frame_of(key: str) -> int | None:
+    """The number of a group's frame, which ends its key; None where none does."""
+    number = _NUMBER.fullmatch(key)
+    return None if number is None else int(number[1])
+
+
+def instant_of(group: Group) -> tuple[Instant, bool] | None:
+    """When a group was, and whether a recording says so; None where nothing does."""
+    for view in group.views:
+        found = view.extras.metadata.get("recording")
+        if isinstance(found, Mapping):
+            try:
+                frame, seconds = int(found["frame"]), float(found["seconds"])
+            except (KeyError, TypeError, ValueError):
+                continue
+            return Instant(frame, seconds, group.key), True
+    number = frame_of(group.key)
+    if number is None or not all(view.station.shared for view in group.views):
+        return None
+    return Instant(number, number / RATE, group.key), False
+
+
+@dataclass
+class _Row:
+    """What one group gives."""
+
+    instant: Instant
+    pitch: Pitch
+    observations: list[tuple[str, BallObservation]]
+    point: tuple[float, float, float] | None
+    cameras: dict[str, Camera]
+
+
+@dataclass
+class _Match:
+    recorded: bool
+    rows: list[_Row] = field(default_factory=list)
+    unused: Counter[str] = field(default_factory=Counter)
+
+
+def gather_stretches(
+    records: Iterable[ExportRecord], policy: Policy, shots: Shots | None = None
+) -> list[Stretch]:
+    """The stretches of groups, by match and time; groups that say no time are in none.
+
+    Args:
+        records: Groups with their solutions, in any order.
+        policy: Says how noisy clicks and cameras are.
+        shots: Of recordings, where they are known.
+    """
+    matches: dict[str, _Match] = {}
+    known: dict[bytes, Camera] = {}
+    for record in records:
+        found = instant_of(record.group)
+        if found is None:
+            continue
+        instant, recorded = found
+        match = matches.setdefault(record.group.match, _Match(recorded))
+        match.rows.append(_row(record, instant, match.unused, known))
+    stretches = []
+    for name, match in sorted(matches.items()):
+        match.rows.sort(key=lambda row: row.instant.frame)
+        for rows in _parts(match, (shots or {}).get(name)):
+            key = name
+            if match.recorded:
+                key = f"{name} {rows[0].instant.frame}-{rows[-1].instant.frame}"
+            stretches.append(_stretch(key, name, rows, match, policy))
+    return stretches
+
+
+def require_stretch(dataset: str, stretches: Sequence[Stretch]) -> None:
+    """Raises InputError where no groups follow each other in time."""
+    if not stretches:
+        raise InputError(
+            f'no groups of "{dataset}" follow each other in time, so there is no track of the ball',
+            hint="Tracks are made of static cameras whose groups are numbered by frame, as ISSIA's, and of "
+            "groups that were taken from a recording.",
+        )
+
+
+def _row(
+    record: ExportRecord, instant: Instant, unused: Counter[str], known: dict[bytes, Camera]
+) -> _Row:
+    group, solution = record.group, record.solution
+    views, calibrations = [], []
+    cameras = {}
+    for view in group.views:
+        ball = view.ball is not None and view.ball.center is not None
+        solved = record.view_solution(view)
+        camera = None if solved is None else solved.calibration.camera
+        if solved is None or camera is None or solved.failed in _UNSURE:
+            unused["no camera that passes its gates" if solution else "not solved"] += ball
+            continue
+        camera = known.setdefault(_bytes_of(camera), camera)
+        cameras[_name_of(view)] = camera
+        if not view.included:
+            unused["view left out"] += ball
+            continue
+        views.append(view)
+        # A static camera's equal values are one object, so that a solver sees six and not thousands.
+        calibrations.append(replace(solved.calibration, camera=camera))
+    names = {view.key: _name_of(view) for view in views}
+    observations = ball_observations(views, calibrations)
+    named = [(names[item.view], item) for item in observations]
+    return _Row(instant, group.pitch, named, record.point, cameras)
+
+
+def _name_of(view: View) -> str:
+    """What a view is called through a stretch: its recording, or its camera."""
+    found = view.extras.metadata.get("recording")
+    name = found.get("name") if isinstance(found, Mapping) else None
+    return view.key if name is None else str(name)
+
+
+def _bytes_of(camera: Camera) -> bytes:
+    numbers = (*camera.focal_length, *camera.principal_point, camera.skew)
+    parts = camera.rotation, camera.position, np.array(numbers), camera.distortion
+    return b"".join(np.asarray(part).tobytes() for part in parts) + camera.lens.encode()
+
+
+def _parts(match: _Match, shots: Sequence[tuple[int, int]] | None) -> list[list[_Row]]:
+    """Rows that belong together: a whole rig, or the shots of a recording."""
+    parts: list[list[_Row]] = []
+    last: _Row | None = None
+    place: object = None
+    for row in match.rows:
+        frame = row.instant.frame
+        if match.recorded and shots:
+            here: object = next((shot for shot in shots if shot[0] <= frame <= shot[1]), None)
+            new = here is None or here != place
+            place = here
+        else:
+            new = last is None or (
+                match.recorded and row.instant.time - last.instant.time > LONGEST_GAP_S
+            )
+        if last is not None and frame == last.instant.frame:
+            raise InputError(
+                f"the groups {last.instant.key} and {row.instant.key} are both frame {frame}",
+                hint="A stretch has one group for each frame; give one of them another match.",
+            )
+        if new or not parts:
+            parts.append([])
+        parts[-1].append(row)
+        last = row
+    return parts
+
+
+def _stretch(key: str, name: str, rows: Sequence[_Row], match: _Match, policy: Policy) -> Stretch:
+    numbers = np.array([row.instant.frame for row in rows])
+    seconds = np.array([row.instant.time for row in rows])
+    count = int(numbers[-1] - numbers[0]) + 1
+    if count > MOST_FRAMES:
+        raise InputError(
+            f"the stretch {key} has {count:,} frames from its first group to its last; {MOST_FRAMES:,} are possible"
+        )
+    frames = np.arange(numbers[0], numbers[-1] + 1)
+    span = float(seconds[-1] - seconds[0])
+    cameras: dict[str, dict[int, Camera]] = {}
+    for row in rows:
+        for view, camera in row.cameras.items():
+            cameras.setdefault(view, {})[row.instant.frame] = camera
+    return Stretch(
+        key=key,
+        match=name,
+        rate=(count - 1) / span if match.recorded and span > 0 else RATE,
+        frames=frames,
+        # Time stamps of frames without a group lie between those of their neighbours.
+        times=np.interp(frames, numbers, seconds),
+        pitch=rows[0].pitch,
+        measurements=_measurements(rows, policy),
+        groups={row.instant.frame: row.instant.key for row in rows},
+        cameras=cameras,
+        unused={reason: number for reason, number in match.unused.items() if number},
+    )
+
+
+def _measurements(rows: Sequence[_Row], policy: Policy) -> BallMeasurements:
+    found = [(row, name, item) for row in rows for name, item in row.observations]
+    observations = [item for _, _, item in found]
+    points = np.array([_rough(item, row.point) for row, _, item in found]).reshape(-1, 3)
+    spread = ray_covariances(observations, points, policy) if found else np.zeros((0, 2, 2))
+    sizes = np.array([item.diameter_px or np.nan for item in observations])
+    share = np.hypot(policy.box_sigma_share * sizes, policy.click_sigma_px)
+    return BallMeasurements(
+        np.array([row.instant.frame for row, _, _ in found], dtype=np.int64),
+        np.array([row.instant.time for row, _, _ in found], dtype=float),
+        tuple(name for _, name, _ in found),
+        np.array([[*item.center] for item in observations], dtype=float).reshape(-1, 2),
+        np.sqrt(np.trace(spread, axis1=1, axis2=2) / 2),
+        tuple(item.camera for item in observations),
+        sizes,
+        share,
+    )
+
+
+def _rough(item: BallObservation, place: tuple[float, float, float] | None) -> FloatArray:
+    """About where a ball is: where the group puts it, else a metre above the grass, or some way off."""
+    if place is not None:
+        return np.array(place)
+    position = item.camera.position
+    ray = item.camera.rays(np.array([item.center]))[0]
+    ray = ray / np.linalg.norm(ray)
+    down = ray[2]
+    depth = (-_ROUGH_HEIGHT_M - position[2]) / down if down > 1e-3 else np.inf
+    return np.asarray(position + ray * (depth if 0 < depth < 300 else _ROUGH_DEPTH_M))
+
+
+def unused_sentence(unused: Mapping[str, int]) -> str | None:
+    """Which balls took no part, in words; None: all did."""
+    parts = [f"{plural(count, 'ball')} ({reason})" for reason, count in sorted(unused.items())]
+    return f"not measured: {', '.join(parts)}" if parts else None

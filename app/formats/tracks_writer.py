@@ -1,0 +1,257 @@
+"""Tracks of the ball, written: ``ball.csv``, ``ball.parquet`` and ``events.csv``, and FIFA-like ``npz``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from app.errors import InputError
+from app.formats.camera_arrays import arrays_of_cameras
+from app.formats.csv_text import csv_line
+from app.formats.parquet import pyarrow_modules
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.geometry.camera import Camera
+from app.soccer.pitch import Pitch
+
+BALL, EVENTS, NPZ = "ball.csv", "events.csv", "ball.npz"
+COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "sigma_m", "state", "cameras")
+EVENT_COLUMNS = ("frame", "time_s", "kind", "x_m", "y_m", "z_m", "sigma_s")
+_TO_Z_UP = np.array([1.0, -1.0, -1.0])
+_UNSAFE = re.compile(r"[^\w .()-]+")
+
+
+class TrackedEvent(Protocol):
+    """What happened to the ball: a kick, a bounce, the ball out.
+
+    Attributes:
+        frame: Of the stretch, the nearest.
+        time_s: Seconds.
+        kind: ``kick``, ``bounce`` or ``out``.
+        position: Pitch frame, metres, shape (3,).
+        sigma_s: Standard deviation of its time, seconds.
+    """
+
+    @property
+    def frame(self) -> int: ...
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def position(self) -> FloatArray: ...
+    @property
+    def sigma_s(self) -> float: ...
+
+
+class TrackValues(Protocol):
+    """A track as the solver makes it: everything in the pitch frame, metres, seconds, z down.
+
+    Attributes:
+        frames: Numbers of the frames of the stretch, increasing, shape (N,).
+        times: Seconds, shape (N,).
+        position: NaN in gaps, shape (N, 3).
+        velocity: Metres per second, NaN in gaps, shape (N, 3).
+        covariance: Of position and velocity, NaN in gaps, shape (N, 6, 6).
+        state: ``measured``, ``one_view``, ``predicted``, ``bridged`` or ``gap``, of each frame.
+        mode: ``roll``, ``flight`` and so on, of each frame.
+        views: Names of the cameras that measured the ball, of each frame.
+        events: In the order of time.
+    """
+
+    @property
+    def frames(self) -> IntArray: ...
+    @property
+    def times(self) -> FloatArray: ...
+    @property
+    def position(self) -> FloatArray: ...
+    @property
+    def velocity(self) -> FloatArray: ...
+    @property
+    def covariance(self) -> FloatArray: ...
+    @property
+    def state(self) -> Sequence[str]: ...
+    @property
+    def mode(self) -> Sequence[str]: ...
+    @property
+    def views(self) -> Sequence[Sequence[str]]: ...
+    @property
+    def events(self) -> Sequence[TrackedEvent]: ...
+
+
+@dataclass(frozen=True)
+class TrackRecord:
+    """A track on its way out.
+
+    Attributes:
+        key: Of the stretch; unique in an export.
+        track: Its values.
+        pitch: Where it lies.
+        rate: Frames a second.
+        cameras: The camera of each frame that has one, by frame number, by name of the view.
+        verdict: ``accepted`` or ``unreviewed``.
+    """
+
+    key: str
+    track: TrackValues
+    pitch: Pitch
+    rate: float
+    cameras: Mapping[str, Mapping[int, Camera]] = field(default_factory=dict)
+    verdict: str = "unreviewed"
+
+    @property
+    def there(self) -> BoolArray:
+        """Frames in which the track has a place, shape (N,)."""
+        return np.asarray(np.isfinite(self.track.position).all(axis=1))
+
+
+def position_sigma(covariance: FloatArray) -> FloatArray:
+    """Major axis of the positions' covariances, metres, NaN where there is none, shape (N,).
+
+    Args:
+        covariance: Of position and velocity, shape (N, 6, 6), or of position, (N, 3, 3).
+    """
+    part = covariance[:, :3, :3]
+    sigma = np.full(len(part), np.nan)
+    known = np.isfinite(part).all(axis=(1, 2))
+    if known.any():
+        sigma[known] = np.sqrt(np.maximum(np.linalg.eigvalsh(part[known])[:, -1], 0.0))
+    return sigma
+
+
+def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
+    """Write ``ball.csv``, ``events.csv`` and, where pyarrow is installed, ``ball.parquet``.
+
+    One track lies below ``root`` itself, several have a folder each, called by their keys.
+
+    Returns:
+        Counts: ``tracks``, ``frames``, ``balls`` (frames with a place) and ``events``.
+
+    Raises:
+        InputError: Two tracks would have one folder.
+    """
+    counts = {"tracks": 0, "frames": 0, "balls": 0, "events": 0}
+    for folder, record in _folders(root, records):
+        track = record.track
+        lines = [csv_line(COLUMNS), *map(csv_line, _rows(record))]
+        (folder / BALL).write_text("".join(lines), encoding="utf-8")
+        lines = [csv_line(EVENT_COLUMNS), *map(csv_line, _event_rows(record))]
+        (folder / EVENTS).write_text("".join(lines), encoding="utf-8")
+        _write_parquet(folder / "ball.parquet", record)
+        counts["tracks"] += 1
+        counts["frames"] += len(track.frames)
+        counts["balls"] += int(record.there.sum())
+        counts["events"] += len(track.events)
+    return counts
+
+
+def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
+    """Write ``ball.npz`` of each track: the ball and its cameras, as FIFA's skeletal kit has cameras.
+
+    The world is x along the pitch, y across it away from the main stand, z up. A row is a frame of the
+    stretch: ``frame`` (F,), ``time`` (F,) in seconds, ``ball`` (F, 3) in metres, NaN in gaps, ``sigma`` (F,);
+    and for each view ``<view>/K`` (F, 3, 3), ``<view>/R`` (F, 3, 3), ``<view>/t`` (F, 3), ``<view>/k``, NaN where
+    it has no camera.
+
+    Returns:
+        Counts: ``tracks``, ``frames``, ``balls`` and ``cameras`` (views that have one).
+    """
+    counts = {"tracks": 0, "frames": 0, "balls": 0, "cameras": 0}
+    for folder, record in _folders(root, records):
+        track = record.track
+        rows = {int(frame): row for row, frame in enumerate(track.frames)}
+        arrays: dict[str, Any] = {
+            "frame": track.frames,
+            "time": track.times,
+            "ball": track.position * _TO_Z_UP,
+            "sigma": position_sigma(track.covariance),
+        }
+        for view, cameras in sorted(record.cameras.items()):
+            placed = {rows[frame]: camera for frame, camera in cameras.items() if frame in rows}
+            found = arrays_of_cameras(placed, f"{NPZ}/{view}")
+            for name, values in found.items():
+                whole = np.full((len(rows), *values.shape[1:]), np.nan)
+                whole[: len(values)] = values
+                arrays[f"{view}/{name}"] = whole
+            counts["cameras"] += bool(placed)
+        with (folder / NPZ).open("wb") as file:
+            np.savez_compressed(file, **arrays)
+        counts["tracks"] += 1
+        counts["frames"] += len(rows)
+        counts["balls"] += int(record.there.sum())
+    return counts
+
+
+def _folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[Path, TrackRecord]]:
+    """Where each track goes: a single one to ``root``."""
+    whole = list(records)
+    taken: dict[str, str] = {}
+    for record in whole:
+        if len(whole) == 1:
+            yield root, record
+            continue
+        name = _UNSAFE.sub("_", record.key).strip(" .") or "track"
+        other = taken.setdefault(name.casefold(), record.key)
+        if other != record.key:
+            raise InputError(
+                f'the tracks "{other}" and "{record.key}" would have one folder, {name}',
+                hint="Export them one after the other.",
+            )
+        (root / name).mkdir()
+        yield root / name, record
+
+
+def _rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
+    track, sigmas = record.track, position_sigma(record.track.covariance)
+    for row, (frame, time) in enumerate(zip(track.frames, track.times, strict=True)):
+        place = track.position[row].tolist()
+        cameras = " ".join(track.views[row])
+        yield int(frame), float(time), *place, float(sigmas[row]), track.state[row], cameras
+
+
+def _event_rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
+    for event in record.track.events:
+        place = (float(value) for value in event.position)
+        yield int(event.frame), float(event.time_s), event.kind, *place, float(event.sigma_s)
+
+
+def _write_parquet(path: Path, record: TrackRecord) -> None:
+    pyarrow, parquet = pyarrow_modules()
+    track = record.track
+    numbers, whole, text = pyarrow.float64(), pyarrow.int32(), pyarrow.string()
+
+    def missing(values: FloatArray) -> Any:
+        return pyarrow.array(
+            [None if value != value else value for value in values.tolist()], numbers
+        )
+
+    def lists(values: FloatArray, length: int) -> Any:
+        flat = values.reshape(len(values), length)
+        known = np.asarray(np.isfinite(flat).all(axis=1))
+        rows = [row if there else None for row, there in zip(flat.tolist(), known, strict=True)]
+        return pyarrow.array(rows, pyarrow.list_(numbers, length))
+
+    table = pyarrow.table(
+        {
+            "frame": pyarrow.array(track.frames.tolist(), whole),
+            "time_s": pyarrow.array(track.times.tolist(), numbers),
+            **{
+                name: missing(track.position[:, axis])
+                for axis, name in enumerate(("x_m", "y_m", "z_m"))
+            },
+            "sigma_m": missing(position_sigma(track.covariance)),
+            **{
+                name: missing(track.velocity[:, axis])
+                for axis, name in enumerate(("vx_m_s", "vy_m_s", "vz_m_s"))
+            },
+            "covariance": lists(track.covariance, 36),
+            "state": pyarrow.array(list(track.state), text),
+            "mode": pyarrow.array([mode or None for mode in track.mode], text),
+            "cameras": pyarrow.array([list(names) for names in track.views], pyarrow.list_(text)),
+        }
+    )
+    parquet.write_table(table, path, compression="zstd")

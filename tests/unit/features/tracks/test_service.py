@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.db.log import read_log
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import load, submit
+from app.features.solutions.service import solve_dataset
+from app.features.tracks.codec import Correction
+from app.features.tracks.service import (
+    MadeTracks,
+    Track,
+    TrackChange,
+    change_track,
+    get_track,
+    list_tracks,
+    make_tracks,
+    read_track,
+)
+from app.features.verdicts.service import set_verdict
+from app.soccer.frames import ImagePoint
+from tests.flights import FIRST, flight_groups, places
+
+
+def make(store: Store) -> MadeTracks:
+    return make_tracks(store, "demo", None, "ann", lambda *_: None)
+
+
+def only(store: Store) -> Track:
+    (track,) = list_tracks(store, "demo")
+    return track
+
+
+def change(store: Store, what: TrackChange) -> Track:
+    track = only(store)
+    return change_track(store, track.id, what, track.etag, actor="ben")
+
+
+def move(store: Store, group: int, by: float) -> None:
+    """Move the first ball of a group, and solve it."""
+    state = load(store, group)
+    view = state.group.views[0]
+    ball = replace(view.ball, point=ImagePoint(view.ball.point.x + by, view.ball.point.y))
+    submit(store, group, SetBall(view.key, ball), if_match=state.etag, actor="ann")
+    solve_dataset(store, "demo")
+
+
+class TestMakeTracks:
+    def test_a_track_is_stored_with_what_came_of_it(self, store, flight) -> None:
+        assert make(store) == MadeTracks(made=1, unchanged=0, without=[])
+        track = only(store)
+        assert (track.key, track.first, track.last) == ("rig", FIRST, FIRST + 59)
+        assert (track.stale, track.verdict, track.actor) == (False, None, "ann")
+        assert track.summary.frames == sum(track.summary.states.values()) == 60
+        assert track.summary.measurements > 150
+        detail = read_track(store, track.id)
+        assert np.nanmedian(np.linalg.norm(detail.ball.position - places(60), axis=1)) < 0.1
+        assert detail.groups[FIRST + 3].id == flight[3]
+
+    def test_again_changes_nothing(self, store, flight) -> None:
+        make(store)
+        before = only(store)
+        assert make(store) == MadeTracks(made=0, unchanged=1, without=[])
+        assert only(store) == before
+
+    def test_a_changed_group_makes_it_stale_until_it_is_made_again(self, store, flight) -> None:
+        make(store)
+        before = only(store)
+        change(store, TrackChange("accepted"))
+        move(store, flight[7], 3.0)
+        assert only(store).stale
+        assert make(store).made == 1
+        after = only(store)
+        assert (after.id, after.stale, after.verdict) == (before.id, False, None)
+        assert after.etag != before.etag
+
+    def test_a_rejected_group_measures_nothing(self, store, flight) -> None:
+        make(store)
+        state = load(store, flight[4])
+        set_verdict(
+            store, flight[4], "rejected", "ball_not_visible", if_match=state.etag, actor="ann"
+        )
+        assert only(store).stale
+        make(store)
+        views = len(flight_groups(60)[4].views)
+        assert (
+            only(store).summary.measurements
+            == sum(len(group.views) for group in flight_groups(60)) - views
+        )
+
+    def test_corrections_stay_when_it_is_made_again(self, store, flight) -> None:
+        make(store)
+        said = (Correction(FIRST + 2, "kick", True),)
+        change(store, TrackChange(corrections=said))
+        move(store, flight[30], 2.0)
+        make(store)
+        assert only(store).corrections == said
+
+    def test_groups_without_time_are_refused(self, store, fill, make_group) -> None:
+        fill(make_group())
+        with pytest.raises(InputError, match="follow each other in time"):
+            make(store)
+
+    def test_too_little_is_a_stretch_without_a_track(self, store, fill) -> None:
+        fill(*(replace(group, views=group.views[:1]) for group in flight_groups(2)))
+        (without,) = make(store).without
+        assert without["stretch"] == "rig"
+        assert only(store).summary.reason == without["reason"]
+        with pytest.raises(ConflictError, match='the stretch "rig" has no track'):
+            change(store, TrackChange("accepted"))
+
+    def test_a_stretch_that_is_gone_goes_unless_somebody_judged_it(self, store, flight) -> None:
+        make(store)
+        with store.write() as session:
+            session.execute(_renamed())
+        make(store)
+        assert [track.key for track in list_tracks(store, "demo")] == ["other"]
+
+
+def _events(store: Store) -> list[tuple[int, str]]:
+    events = read_track(store, only(store).id).ball.events
+    return [(event.frame, event.kind) for event in events]
+
+
+def _renamed():
+    from sqlalchemy import update
+
+    from app.features.datasets.tables import GroupModel
+
+    return update(GroupModel).values(match="other")
+
+
+class TestChangeTrack:
+    def test_is_accepted_by_a_person_and_the_log_says_so(self, store, flight) -> None:
+        make(store)
+        found = change(store, TrackChange("accepted", "looks right"))
+        assert (found.verdict, found.note, found.judged_by) == ("accepted", "looks right", "ben")
+        assert found == only(store)
+        with store.read() as session:
+            deeds = [entry.body for entry in read_log(session) if entry.kind == "deed"]
+        assert deeds[-1]["did"] == "track accepted"
+        assert change(store, TrackChange("none")).verdict is None
+
+    def test_a_stale_one_is_not_accepted(self, store, flight) -> None:
+        make(store)
+        move(store, flight[7], 3.0)
+        with pytest.raises(ConflictError, match='groups of the track "rig" have changed'):
+            change(store, TrackChange("accepted"))
+        assert change(store, TrackChange("rejected")).verdict == "rejected"
+
+    def test_events_are_corrected_and_what_was_accepted_is_not_any_more(
+        self, store, flight
+    ) -> None:
+        make(store)
+        change(store, TrackChange("accepted"))
+        before = _events(store)
+        found = change(store, TrackChange(corrections=(Correction(FIRST + 40, "out", True),)))
+        assert found.verdict is None
+        assert set(_events(store)) - set(before) == {(FIRST + 40, "out")}
+
+    def test_a_correction_outside_of_it_is_refused(self, store, flight) -> None:
+        make(store)
+        with pytest.raises(
+            InputError, match=f"frame 3 is not of the track .rig., {FIRST} to"
+        ) as error:
+            change(store, TrackChange(corrections=(Correction(3, "out", True),)))
+        assert error.value.pointer == "/corrections/0/frame"
+
+    def test_two_people_do_not_overwrite_each_other(self, store, flight) -> None:
+        make(store)
+        etag = only(store).etag
+        change(store, TrackChange("rejected"))
+        with pytest.raises(StaleRevisionError):
+            change_track(store, only(store).id, TrackChange("accepted"), etag, actor="ann")
+
+    def test_a_track_that_is_not_there(self, store) -> None:
+        with pytest.raises(NotFoundError, match="there is no track 9"):
+            get_track(store, 9)

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.features.tracks.stretches import (
+    RATE,
+    Stretch,
+    gather_stretches,
+    instant_of,
+    require_stretch,
+    unused_sentence,
+)
+from app.formats.export_record import ExportRecord
+from app.soccer.annotation import Extras
+from app.soccer.group import Group
+from app.soccer.policy import PAPER
+from app.solving.solve import solve
+from tests.flights import FIRST, flight_groups
+from tests.rigs import TRUTH
+
+
+def record(group: Group) -> ExportRecord:
+    return ExportRecord(group, solve(group, PAPER), "unreviewed")
+
+
+def recorded(group: Group, frame: int, name: str = "final") -> Group:
+    """A group as instants of a recording are: one view, with its time stamp."""
+    said = {"recording": {"name": name, "frame": frame, "seconds": 10 + frame / 50}}
+    view = replace(group.views[0], key=f"{frame}.png", extras=Extras(metadata=said))
+    return replace(group, key=f"{name}/{frame}.png", match=name, views=(view,))
+
+
+@pytest.fixture(scope="module")
+def records() -> list[ExportRecord]:
+    return [record(group) for group in flight_groups(20)]
+
+
+def only(stretches: list[Stretch]) -> Stretch:
+    (stretch,) = stretches
+    return stretch
+
+
+class TestGatherStretches:
+    def test_a_rig_is_one_stretch_with_a_row_for_every_frame(self, records) -> None:
+        stretch = only(gather_stretches([*reversed(records[:5]), *records[9:]], PAPER))
+        assert (stretch.key, stretch.rate) == ("rig", RATE)
+        assert stretch.frames.tolist() == list(range(FIRST, FIRST + 20))
+        assert np.allclose(stretch.times, stretch.frames / RATE)
+        assert stretch.groups[FIRST + 9] == str(FIRST + 9)
+        assert FIRST + 6 not in stretch.groups
+
+    def test_measures_every_ball_with_its_camera_once(self, records) -> None:
+        measured = only(gather_stretches(records, PAPER)).measurements
+        assert len(measured) == sum(len(item.group.views) for item in records)
+        assert set(measured.views) == set(TRUTH)
+        assert len({id(camera) for camera in measured.cameras}) == 4
+        first = records[0].group.views[0]
+        assert measured.pixels[0].tolist() == [*first.ball.center]
+
+    def test_noise_is_that_of_the_policy(self, records) -> None:
+        usual = only(gather_stretches(records, PAPER)).measurements.sigma
+        noisy = replace(PAPER, click_sigma_px=3.0)
+        assert np.allclose(only(gather_stretches(records, noisy)).measurements.sigma, 3 * usual)
+
+    def test_counts_balls_that_are_not_used_by_reason(self, records) -> None:
+        views = records[3].group.views
+        out = replace(records[3].group, views=(replace(views[0], included=False), *views[1:]))
+        unsolved = replace(records[4], solution=None)
+        stretch = only(gather_stretches([*records[:3], record(out), unsolved], PAPER))
+        assert stretch.unused == {"view left out": 1, "not solved": len(records[4].group.views)}
+        assert (
+            unused_sentence(stretch.unused)
+            == "not measured: 4 balls (not solved), 1 ball (view left out)"
+        )
+
+    def test_two_groups_of_one_frame_are_refused_by_their_keys(self, records) -> None:
+        twice = replace(records[0], group=replace(records[0].group, key=f"late/{FIRST}.png"))
+        with pytest.raises(
+            InputError, match=f"{FIRST} and late/{FIRST}.png are both frame {FIRST}"
+        ):
+            gather_stretches([records[0], twice], PAPER)
+
+    def test_a_recording_is_cut_where_its_shots_are(self) -> None:
+        groups = [recorded(group, frame) for frame, group in enumerate(flight_groups(12))]
+        stretches = gather_stretches(map(record, groups), PAPER, {"final": [(0, 4), (6, 20)]})
+        assert [item.key for item in stretches][:2] == ["final 0-4", "final 5-5"]
+        assert stretches[2].key == "final 6-11"
+        assert stretches[0].rate == pytest.approx(50)
+        assert stretches[0].times[0] == 10
+
+    def test_a_recording_without_shots_is_cut_at_long_gaps(self) -> None:
+        numbers = [0, 10, 20, 400, 410]
+        groups = [recorded(item, n) for item, n in zip(flight_groups(5), numbers, strict=True)]
+        stretches = gather_stretches(map(record, groups), PAPER)
+        assert [item.key for item in stretches] == ["final 0-20", "final 400-410"]
+        assert len(stretches[0].frames) == 21
+        assert np.allclose(stretches[0].times, 10 + np.arange(21) / 50)
+        assert stretches[0].measurements.names == ("final",)
+
+    def test_groups_that_say_no_time_are_in_none(self, make_group) -> None:
+        found = gather_stretches([record(make_group())], PAPER)
+        assert found == []
+        with pytest.raises(InputError, match='no groups of "demo" follow each other in time'):
+            require_stretch("demo", found)
+
+
+class TestInstantOf:
+    def test_of_a_rig_by_the_number_of_the_frame(self) -> None:
+        instant, from_file = instant_of(flight_groups(1)[0])
+        assert (instant.frame, instant.time, from_file) == (FIRST, FIRST / RATE, False)
+
+    def test_of_a_recording_by_its_time_stamp(self) -> None:
+        instant, from_file = instant_of(recorded(flight_groups(1)[0], 7))
+        assert (instant.frame, instant.time, from_file) == (7, 10.14, True)

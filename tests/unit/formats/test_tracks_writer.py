@@ -1,0 +1,128 @@
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from app.errors import InputError
+from app.formats.camera_arrays import cameras_of_arrays
+from app.formats.file_tree import Limits
+from app.formats.tracks_writer import (
+    TrackRecord,
+    position_sigma,
+    write_track_arrays,
+    write_tracks,
+)
+from app.geometry.camera import Camera
+from app.soccer.pitch import Pitch
+from app.tracking.ball_track import BallEvent, BallTrack
+from tests.rigs import TRUTH
+
+
+def track(first: int = 100, count: int = 4) -> BallTrack:
+    """A ball that rolls along x, with a gap in its third frame."""
+    position = np.column_stack(
+        [np.arange(count) * 0.5, np.full(count, -2.0), np.full(count, -0.11)]
+    )
+    velocity = np.tile([12.5, 0.0, 0.0], (count, 1))
+    covariance = np.tile(np.diag([0.01, 0.04, 0.09, 1.0, 1.0, 1.0]), (count, 1, 1))
+    for values in (position, velocity, covariance):
+        values[2] = np.nan
+    return BallTrack(
+        np.arange(first, first + count),
+        np.arange(first, first + count) / 25,
+        position,
+        velocity,
+        covariance,
+        ("measured", "one_view", "gap", "predicted"),
+        ("roll", "roll", "", "flight"),
+        (("cam3", "cam4"), ("cam3",), (), ()),
+        (BallEvent(first + 3, 4.12, "kick", np.array([1.5, -2.0, -0.11]), 0.01),),
+    )
+
+
+def record(
+    key: str = "issia", cameras: Mapping[str, Mapping[int, Camera]] | None = None
+) -> TrackRecord:
+    return TrackRecord(key, track(), Pitch(), 25.0, cameras or {})
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+class TestPositionSigma:
+    def test_is_the_major_axis_and_nan_in_gaps(self) -> None:
+        found = position_sigma(track().covariance)
+        assert found[0] == pytest.approx(0.3)
+        assert np.isnan(found).tolist() == [False, False, True, False]
+
+
+class TestWriteTracks:
+    def test_a_row_a_frame_empty_where_there_is_a_gap(self, tmp_path: Path) -> None:
+        counts = write_tracks(tmp_path, [record()])
+        assert counts == {"tracks": 1, "frames": 4, "balls": 3, "events": 1}
+        text = (tmp_path / "ball.csv").read_text().splitlines()
+        assert text[0] == "frame,time_s,x_m,y_m,z_m,sigma_m,state,cameras"
+        assert text[1] == "100,4.0,0.0,-2.0,-0.11,0.3,measured,cam3 cam4"
+        assert text[3] == "102,4.08,,,,,gap,"
+        (event,) = rows(tmp_path / "events.csv")
+        assert event == {
+            "frame": "103", "time_s": "4.12", "kind": "kick",
+            "x_m": "1.5", "y_m": "-2.0", "z_m": "-0.11", "sigma_s": "0.01",
+        }  # fmt: skip
+
+    def test_parquet_has_covariance_velocity_and_mode(self, tmp_path: Path) -> None:
+        write_tracks(tmp_path, [record()])
+        found = pq.read_table(tmp_path / "ball.parquet").to_pylist()
+        assert [row["frame"] for row in found] == [100, 101, 102, 103]
+        assert (found[0]["mode"], found[0]["cameras"]) == ("roll", ["cam3", "cam4"])
+        assert found[0]["vx_m_s"] == 12.5
+        assert np.array_equal(np.reshape(found[0]["covariance"], (6, 6)), track().covariance[0])
+        assert [found[2][name] for name in ("x_m", "covariance", "mode", "sigma_m")] == [None] * 4
+
+    def test_several_tracks_have_a_folder_each(self, tmp_path: Path) -> None:
+        counts = write_tracks(tmp_path, [record("cup 0-90"), record("cup/x 91-99")])
+        assert counts["tracks"] == 2
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["cup 0-90", "cup_x 91-99"]
+
+    def test_two_tracks_of_one_folder_are_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(
+            InputError, match='the tracks "a/b" and "a:b" would have one folder, a_b'
+        ):
+            write_tracks(tmp_path, [record("a/b"), record("a:b")])
+
+
+class TestWriteTrackArrays:
+    def test_ball_and_cameras_are_z_up_with_a_row_a_frame(self, tmp_path: Path) -> None:
+        cameras = {"cam1": dict.fromkeys((100, 102), TRUTH["cam1"]), "cam2": {}}
+        counts = write_track_arrays(tmp_path, [record(cameras=cameras)])
+        assert counts == {"tracks": 1, "frames": 4, "balls": 3, "cameras": 1}
+        found = np.load(tmp_path / "ball.npz")
+        assert found["frame"].tolist() == [100, 101, 102, 103]
+        assert found["ball"][0].tolist() == [0.0, 2.0, 0.11]
+        assert np.isnan(found["ball"][2]).all()
+        point = found["ball"][1]
+        in_camera = found["cam1/R"][0] @ point + found["cam1/t"][0]
+        ideal = (found["cam1/K"][0] @ in_camera)[:2] / in_camera[2]
+        plain = replace(TRUTH["cam1"], distortion=np.zeros(12))
+        assert np.allclose(ideal, plain.project(track().position[1][None])[0])
+        assert np.isnan(found["cam1/K"][1]).all()
+        assert len(found["cam1/t"]) == 4
+
+    def test_a_camera_of_it_is_read_as_a_camera_file_is(self, tmp_path: Path) -> None:
+        cameras = {"cam1": dict.fromkeys(range(100, 104), TRUTH["cam1"])}
+        write_track_arrays(tmp_path, [record(cameras=cameras)])
+        found = np.load(tmp_path / "ball.npz")
+        part = {name: found[f"cam1/{name}"] for name in ("K", "R", "t", "k")}
+        np.savez(tmp_path / "cam1.npz", **part)
+        content = (tmp_path / "cam1.npz").read_bytes()
+        ((name, values),) = cameras_of_arrays(content, "cam1", "cam1.npz", Limits())
+        assert name is None
+        assert np.allclose(values["K"], TRUTH["cam1"].K)
