@@ -29,7 +29,6 @@ JobKind = Literal[
     "instants",
     "ball",
     "track",
-    "link",
 ]
 
 
