@@ -107,6 +107,14 @@ def stretch_pixels(path: Path, over: int, under: int) -> Path:
     return path
 
 
+def unmark_key_frames(path: Path) -> Path:
+    """Let an MP4 say that its first frame alone is a key frame."""
+    data = path.read_bytes()
+    table = struct.pack(">III", 0, 1, 1)
+    path.write_bytes(_replaced(data, (*_TIMES[:-1], b"stss"), _box(b"stss", table)))
+    return path
+
+
 def _box(kind: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body) + 8) + kind + body
 

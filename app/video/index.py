@@ -44,6 +44,7 @@ class RecordingFacts:
         time_base: Seconds of one tick of ``RecordingIndex.pts``, numerator and denominator.
         has_seek_table: Whether the container says where key frames are.
         decoder: What decoded it; another one may return other frames.
+        damaged: Pictures that cannot be decoded; they are no frames, and have no number.
     """
 
     sha256: str
@@ -58,6 +59,7 @@ class RecordingFacts:
     time_base: tuple[int, int]
     has_seek_table: bool
     decoder: str
+    damaged: int = 0
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  * @property {number | null} width
  * @property {number | null} height
  * @property {boolean | null} interlaced
+ * @property {number | null} damaged pictures that cannot be decoded, and are left out
  * @property {number} shots
  * @property {number} groups
  * @property {string | null} problem

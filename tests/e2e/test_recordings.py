@@ -147,6 +147,8 @@ class TestSending:
         uploads = page.get_by_role("list", name="Uploads")
         page.get_by_label("Dataset", exact=True).fill("sent")
         page.set_input_files("#import-file", films)
+        expect(uploads).to_contain_text("MB")
+        expect(page.get_by_label("Dataset", exact=True)).to_have_value("sent")
         # Before they are here.
         page.get_by_role("button", name="Add and find its shots").click()
         page.get_by_role("link", name="Open long").wait_for()

@@ -92,6 +92,7 @@ class Recording:
         seconds: How long it is.
         width, height: Of a frame as people see it, pixels.
         interlaced: Whether its frames show two fields; None where that cannot be told.
+        damaged: How many pictures of the file cannot be decoded; they are left out, and have no number.
         shots: How many it has.
         groups: How many groups were taken from it.
         problem: Why its frames cannot be read now, in a sentence; None: they can.
@@ -113,6 +114,7 @@ class Recording:
     height: int | None
     rotation: int | None
     interlaced: bool | None
+    damaged: int | None
     shots: int
     groups: int
     problem: str | None
@@ -502,7 +504,7 @@ def _recording(row: Any) -> Recording:
     path = Path(row.path)
     facts: Mapping[str, Any] = {} if row.facts is None else parse(row.facts)
     names = ("bytes", "frames", "fps", "variable", "seconds")
-    shape = ("width", "height", "rotation", "interlaced")
+    shape = ("width", "height", "rotation", "interlaced", "damaged")
     return Recording(
         id=int(row.id),
         dataset_id=int(row.dataset_id),

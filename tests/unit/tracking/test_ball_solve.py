@@ -211,6 +211,28 @@ class TestNonsense:
     def test_nothing(self) -> None:
         assert tracked(seen(BOTH).part(np.zeros(0, dtype=int))).reason is not None
 
+    def test_no_frames(self) -> None:
+        given = seen(BOTH)
+        track = track_ball(given, FRAMES[:0], TIMES[:0], pitch=Pitch())
+        assert track.reason == "The stretch has no frames." and track.state == ()
+
+    def test_a_pixel_without_a_ray_is_left_out(self) -> None:
+        given = seen(BOTH)
+        pixels = given.pixels.copy()
+        pixels[10] = np.nan
+        track = tracked(replace(given, pixels=pixels))
+        assert track.reason is None and track.state[10] == "one_view"
+
+    def test_one_of_three_views_is_of_another_ball(self) -> None:
+        third = looking((50.0, 40.0, -15.0), (0.0, 0.0, 0.0), 1100.0)
+        given = seen({**BOTH, "third": third})
+        of_third = np.array([name == "third" for name in given.views])
+        other = third.project(PLACES[::-1])[: int(of_third.sum())]
+        pixels = given.pixels.copy()
+        pixels[of_third] = other
+        track = tracked(replace(given, pixels=pixels))
+        assert track.reason is not None and "contradict" in track.reason
+
     def test_one_frame_a_second(self) -> None:
         given = seen(BOTH)
         track = tracked(given.part(given.frames % 25 == 0))
