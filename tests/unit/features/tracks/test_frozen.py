@@ -19,6 +19,7 @@ from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.versions.frozen_queries import body_of, json_of, read_frozen
 from app.features.versions.service import Version
 from app.features.versions.verify import verify
+from tests.databases import said_for_sqlite
 from tests.flights import FIRST
 from tests.unit.features.tracks.test_service import move
 
@@ -69,7 +70,7 @@ class TestVerify:
     def test_a_number_that_was_changed_is_found(self, store, accepted) -> None:
         version = frozen(store)
         key = version.tracks["rig"]
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             value = json_of(read_frozen(session, version.dataset_id, [key])[key])
             value["track"]["times"][3] += 1e-12
             unseal(session)
@@ -114,7 +115,7 @@ class TestCheck:
     def test_a_version_with_tracks_is_sound_until_one_is_gone(self, store, accepted) -> None:
         version = frozen(store)
         assert all(item.ok for item in examine_versions(store))
-        with store.write() as session:
+        with store.write() as session, said_for_sqlite(session):
             unseal(session)
             session.execute(text("DELETE FROM frozen WHERE key LIKE 'track:%'"))
         (wrong,) = [item for item in examine_versions(store) if not item.ok]
