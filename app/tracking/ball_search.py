@@ -12,7 +12,7 @@ from app.tracking.ball_models import REST
 from app.tracking.ball_search_kernels import likeliest
 from app.tracking.ball_track import BallMeasurements
 
-_WIDTH = 48
+_WIDTH = 96
 """Histories that are kept."""
 _FEWEST_PAIRS = 10
 """Of rays of the same instant, that the noise of a view is taken from."""

@@ -2,7 +2,7 @@
 
 Every hypothesis is a history of modes and events with a Kalman filter of position and velocity along
 it. They are extended by every knot of time, and the likeliest are kept: of those whose last event is
-the same only one, because their futures are the same.
+the same only two, because their futures are nearly the same.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ _OUTLIER = np.log(0.01 / 1000.0**2)
 """Logarithm of the density of a measurement of something else, per square pixel."""
 _WORST = 35.0
 """Natural logarithm by which a hypothesis may be less likely than the best."""
+_ALIKE = 2
+"""Hypotheses that are kept of those whose mode and last event are the same."""
 _PER_KNOT = 5
 
 
@@ -378,13 +380,11 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
             c = order[rank]
             if kept == width or cs[c] < best - _WORST:
                 break
-            again = False
+            alike = 0
             for other in range(kept):
                 if modes[k, other] == cmode[c] and since[other] == csince[c]:
-                    again = events[k, other] == cevent[c]
-                    if again:
-                        break
-            if again:
+                    alike += events[k, other] == cevent[c]
+            if alike >= _ALIKE:
                 continue
             _copy(M[kept], C[kept], cm[c], cC[c])
             for i in range(6):
