@@ -91,6 +91,8 @@ export function postInstants(id, frames, options) {
  * @property {number | null} sigma_s
  * @property {number | null} miss_m
  * @property {LinkPiece[]} pieces
+ * @property {{frame: number, miss_m: number}[]} misses
+ * @property {string | null} ball_reason
  */
 /** @typedef {{id: number, live: LinkedShot, replay: LinkedShot, instants: LinkedInstant[], assumed_speed: number | null, map: LinkMap, etag: string}} LinkJson */
 /** @typedef {{first: number, replay: (number | null)[], off_s: (number | null)[], repeated: number[], blended: number[]}} LinkedFrames */
@@ -125,6 +127,11 @@ export function getLinkedFrames(id, link, signal) {
 export async function putInstants(id, link, { instants, assumed_speed }, etag) {
 	const body = { instants: instants.map(({ live, replay }) => ({ live, replay })), assumed_speed };
 	return (await requestTagged(`/recordings/${id}/links/${link}/instants`, { method: 'PUT', body, etag, key: idempotencyKey() })).json;
+}
+
+/** Find the times of a link from the ball. @param {number} id @param {number} link @param {{live_upload: string | null, replay_upload: string | null}} body @returns {Promise<JobJson>} */
+export function postBallLink(id, link, body) {
+	return request(`/recordings/${id}/links/${link}/ball`, { method: 'POST', body, key: idempotencyKey() });
 }
 
 /** @param {number} id @param {number} link */

@@ -9,19 +9,28 @@ export function speedText(speed) {
 	return speed < 1 ? `${(1 / speed).toFixed(1)} times slower than live` : `${speed.toFixed(1)} times faster than live`;
 }
 
+/** A standard deviation with two digits that count. @param {number} sigma */
+const sigmaText = (sigma) => sigma.toFixed(sigma > 0 ? Math.min(Math.max(1 - Math.floor(Math.log10(sigma)), 1), 6) : 1);
+
 /** What is known of the times of a replay, in sentences. @param {LinkMap} map @param {number} fps of the live shot @returns {string[]} */
-export function mapText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, miss_m, pieces }, fps) {
+export function mapText(map, fps) {
+	const told = timesText(map, fps);
+	return map.ball_reason ? [...told, `The ball does not tell the times. ${map.ball_reason}`] : told;
+}
+
+/** @param {LinkMap} map @param {number} fps */
+function timesText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, miss_m, pieces }, fps) {
 	if (outcome === 'none') return ['Go to the same instant in both, such as a kick or a bounce, and press I.'];
 	if (outcome === 'unobservable') return [reason ?? ''];
 	const source = found_by === 'ball' ? 'Found from the ball' : 'Found from your instants';
 	if (pieces.length) {
-		const parts = pieces.map((piece) => `Frames ${piece.first} to ${piece.last} of the replay run ${speedText(piece.speed)} (speed ${piece.speed.toFixed(3)} ± ${piece.speed_sigma.toFixed(3)}).`);
+		const parts = pieces.map((piece) => `Frames ${piece.first} to ${piece.last} of the replay run ${speedText(piece.speed)} (speed ${piece.speed.toFixed(3)} ± ${sigmaText(piece.speed_sigma)}).`);
 		return [`The speed of the replay changes. ${source}.`, ...parts];
 	}
 	if (outcome === 'offset') return [`One instant says when the replay is, not how fast it runs: it is taken to run ${speedText(speed ?? 1)}.`, 'Link a second instant, as far from the first as you can.'];
-	const known = sigma_s === null ? '' : ` Its times are known to ± ${(sigma_s * fps).toFixed(1)} live frames (one sigma, in the middle of the replay).`;
+	const known = sigma_s === null ? '' : ` Its times are known to ± ${sigmaText(sigma_s * fps)} live frames (one sigma, in the middle of the replay).`;
 	const missed = miss_m === null ? '' : ` The ball's rays miss each other by ${miss_m.toFixed(2)} m.`;
-	return [`The replay runs ${speedText(speed ?? 1)} (speed ${(speed ?? 1).toFixed(3)}${speed_sigma === null ? '' : ` ± ${speed_sigma.toFixed(3)}`}). ${source}.${known}${missed}`];
+	return [`The replay runs ${speedText(speed ?? 1)} (speed ${(speed ?? 1).toFixed(3)}${speed_sigma === null ? '' : ` ± ${sigmaText(speed_sigma)}`}). ${source}.${known}${missed}`];
 }
 
 /** The frame of the replay that shows what a live frame shows; null outside of the replay. @param {LinkedFrames} frames @param {number} live */

@@ -17,6 +17,7 @@ import { makePlayer } from '../../state/playback.js';
 import { timecode } from '../../state/shots.js';
 import { FormError } from '../form_error.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { BallCard } from './link_ball.js';
 import { InstantsList, TimesCard } from './link_rail.js';
 import { keysOfLink } from './link_keys.js';
 
@@ -59,7 +60,8 @@ function useLink(first) {
 			}
 		});
 	}
-	return { link, change, undo: () => change(() => before.current.pop() ?? null, 'Taken back.', false) };
+	const reload = async () => keep(await getLink(recording, id));
+	return { link, change, reload, undo: () => change(() => before.current.pop() ?? null, 'Taken back.', false) };
 }
 
 /** @param {{side: Side, shot: LinkedShot, player: Player, one: RecordingJson, focused: boolean, focus: () => void, mark: string}} props */
@@ -91,7 +93,7 @@ function Stage({ side, shot, player, one, focused, focus, mark }) {
 
 /** @param {{first: LinkJson, recordings: {live: RecordingJson, replay: RecordingJson}}} props */
 function Both({ first, recordings }) {
-	const { link, change, undo } = useLink(first);
+	const { link, change, reload, undo } = useLink(first);
 	const players = useMemo(() => ({ live: makePlayer(), replay: makePlayer() }), [first.id]);
 	const [side, setSide] = useState(/** @type {Side} */ ('live'));
 	const [together, setTogether] = useState(false);
@@ -183,6 +185,7 @@ function Both({ first, recordings }) {
 				<button class="button button--small linking__remove" type="button" data-needs="annotate" data-of=${dataset} title="Groups that were made of it stay" onClick=${() => attempt(deleteLink(link.live.recording, link.id), () => navigate(`/recordings/${link.replay.recording}`))}>Remove this link</button>
 				${error ? html`<${FormError} error=${error} />` : null}
 			<//>
+			<${BallCard} link=${link} dataset=${dataset} reload=${reload} />
 		</div>
 	`;
 }
