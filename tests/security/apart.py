@@ -57,6 +57,7 @@ BODIES: Mapping[str, dict[str, Any]] = {
     "POST /api/v1/datasets/{dataset}/tracks": {},
     "PATCH /api/v1/tracks/{track}": {"verdict": "rejected"},
     "POST /api/v1/recordings": {"source": {}},
+    "PATCH /api/v1/recordings/{recording}": {"clocks": []},
     "PUT /api/v1/recordings/{recording}/shots": {"shots": []},
     "POST /api/v1/recordings/{recording}/groups": {"frames": [0]},
     "POST /api/v1/recordings/{recording}/cameras": {"first": 0, "last": 0},
