@@ -46,7 +46,7 @@ from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.choices import ShotKind, ShotStart
 from app.soccer.policy import TOUCHLINE
-from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes
+from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds
 from app.video.indexing import index_recording
 from app.video.shots import shots_of_indexed
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits, WorkerProcess
@@ -365,16 +365,18 @@ def read_index_at(place: Path) -> RecordingIndex:
     try:
         return index_from_bytes(place.read_bytes())
     except (OSError, InputError) as error:
-        raise ConflictError(
-            "the index of this recording cannot be read", hint="Index it again."
-        ) from error
+        raise _no_index() from error
+
+
+def _no_index() -> ConflictError:
+    return ConflictError("the index of this recording cannot be read", hint="Index it again.")
 
 
 def has_index(store: Store, recording: Recording) -> bool:
     """Whether the index of a recording fits its file, and this version can read it."""
     try:
-        read_index(store.settings, recording.require_readable())
-    except ConflictError:
+        read_index_seconds(index_place(store.settings, recording.require_readable()))
+    except (ConflictError, InputError, OSError):
         return False
     return True
 
@@ -512,7 +514,10 @@ def _shots(settings: Settings, row: RecordingRow) -> RecordingShots:
 @lru_cache(maxsize=4)
 def _seconds(index: Path) -> FloatArray:
     """When each frame is shown, by the place of an index: that of a whole match takes a second to read."""
-    return read_index_at(index).seconds
+    try:
+        return read_index_seconds(index)
+    except (OSError, InputError) as error:
+        raise _no_index() from error
 
 
 def frame_seconds(settings: Settings, sha256: str) -> FloatArray:
