@@ -66,6 +66,7 @@ BODIES: Mapping[str, dict[str, Any]] = {
         "replay": {"first": 0, "last": 0},
     },
     "PUT /api/v1/recordings/{recording}/links/{link}/instants": {"instants": []},
+    "POST /api/v1/recordings/{recording}/links/{link}/ball": {},
     "POST /api/v1/predictions/accept": {"q": "", "dry_run": True},
     "POST /api/v1/datasets/{dataset}/predictions": {"name": "p2", "format": "csv"},
     "POST /api/v1/datasets/{dataset}/evaluations": {"groups": "all"},
