@@ -36,6 +36,7 @@ import { chartOptions } from './chart_options.js';
  * @property {(value: number) => string} [format] of values
  * @property {(index: number, y: number | null) => void} [onPick] when somebody clicks at a place of x, and at which height
  * @property {boolean} [legend] false: too many curves for one
+ * @property {boolean} [gaps] where there is no value, no line
  * @property {boolean} [compact] one of several over the same x: without names of its axes, and its numbers are elsewhere
  */
 
