@@ -17,7 +17,8 @@ import { chartOptions } from './chart_options.js';
  * @property {(number | null)[]} values one for each x
  * @property {ChartColour} colour
  * @property {number[]} [dash]
- * @property {boolean} [points] points without a line between them
+ * @property {boolean | number} [points] points without a line between them; a number is their size in pixels
+ * @property {boolean} [gaps] no line where values are missing
  * @property {(number | null)[]} [low] lower end of the interval of each value
  * @property {(number | null)[]} [high]
  */
@@ -36,7 +37,6 @@ import { chartOptions } from './chart_options.js';
  * @property {(value: number) => string} [format] of values
  * @property {(index: number, y: number | null) => void} [onPick] when somebody clicks at a place of x, and at which height
  * @property {boolean} [legend] false: too many curves for one
- * @property {boolean} [gaps] where there is no value, no line
  * @property {boolean} [compact] one of several over the same x: without names of its axes, and its numbers are elsewhere
  */
 

@@ -9,10 +9,10 @@ const FONT = '12px Inter, system-ui, "DejaVu Sans", sans-serif';
 
 /** @typedef {{current: ChartProps}} Props */
 
-/** @param {Curve} curve @param {Record<ChartColour, string>} colours @param {boolean} [gaps] @returns {uPlot.Series} */
-function seriesOf({ label, colour, dash, points }, colours, gaps = false) {
+/** @param {Curve} curve @param {Record<ChartColour, string>} colours @returns {uPlot.Series} */
+function seriesOf({ label, colour, dash, points, gaps }, colours) {
 	const stroke = colours[colour];
-	if (points) return { label, stroke, paths: () => null, points: { show: true, size: 7, fill: stroke, stroke } };
+	if (points) return { label, stroke, paths: () => null, points: { show: true, size: points === true ? 7 : points, fill: stroke, stroke } };
 	return { label, stroke, width: 2, dash, spanGaps: !gaps, points: { show: false } };
 }
 
@@ -89,7 +89,7 @@ function rangeY(asked, low, high) {
  * @returns {uPlot.Options}
  */
 export function chartOptions(props, { width, height, colours, setAt }) {
-	const { curves, xLabel, yLabel, compact, gaps } = props.current;
+	const { curves, xLabel, yLabel, compact } = props.current;
 	return {
 		width,
 		height,
@@ -101,7 +101,7 @@ export function chartOptions(props, { width, height, colours, setAt }) {
 			y: { range: (_plot, low, high) => rangeY(props.current.yRange, low ?? 0, high ?? 1) },
 		},
 		axes: [axis(xLabel, colours, 34, compact), axis(yLabel, colours, 52, compact)],
-		series: [{}, ...curves.map((curve) => seriesOf(curve, colours, gaps))],
+		series: [{}, ...curves.map((curve) => seriesOf(curve, colours))],
 		hooks: {
 			draw: [(plot) => drawOver(plot, props.current, colours)],
 			setCursor: [(plot) => setAt(plot.cursor.idx ?? null)],

@@ -112,7 +112,7 @@ export function CameraCurves({ cameras }) {
 function chartsOf(frames) {
 	const x = frames.time.map((_, place) => frames.first + place);
 	/** @param {string} yLabel @param {Curve[]} curves @param {(value: number) => string} format @param {[number | null, number | null]} [yRange] */
-	const one = (yLabel, curves, format, yRange) => ({ gaps: true, name: `${curves.map(({ label }) => label).join(' and ')} of each frame`, xLabel: 'frame', yLabel, x, curves, format, yRange });
+	const one = (yLabel, curves, format, yRange) => ({ name: `${curves.map(({ label }) => label).join(' and ')} of each frame`, xLabel: 'frame', yLabel, x, curves: curves.map((curve) => ({ ...curve, gaps: true })), format, yRange });
 	return [
 		one('share', [
 			{ label: 'supported', values: frames.supported, colour: 'chart-a' },
