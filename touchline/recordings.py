@@ -185,5 +185,5 @@ def require_same(path: Path, recording: Recording) -> None:
     if recording.sha256 != digest.hexdigest():
         raise HashError(
             f"the server has another file than {path.name}",
-            "Delete the recording there, and send it again.",
+            "Delete the recording and its upload there, and send it again.",
         )
