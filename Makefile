@@ -130,7 +130,7 @@ tests/generators/node_modules/.ready: tests/generators/package-lock.json .venv/r
 readers: .readers/ready
 
 .readers/ready: requirements-readers.lock .venv/ready
-	@echo "Installing soccernet, sn-trackeval, pycocotools and datasets into .readers"
+	@echo "Installing soccernet, sn-trackeval, pycocotools, datasets, kloppy and the CDF validator into .readers"
 	@rm -rf .readers
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps --target .readers -r requirements-readers.lock
 	@touch $@

@@ -207,8 +207,8 @@ class Settings(BaseSettings):
     """Folder with ca.pem, cert.pem and key.pem, by which scheduler, workers and servers know each other."""
     image_workers: int = Field(default_factory=lambda: min(os.cpu_count() or 1, 4), ge=1)
     """Processes that make pictures of frames."""
-    max_upload_bytes: int = 2 * 1024**3
-    """Largest uploaded file; a JSON body is smaller still."""
+    max_upload_bytes: int = 8 * 1024**3
+    """Largest uploaded file, such as the recording of a match; a JSON body is smaller still."""
     upload_days: int = 7
     """After so many days an uploaded file that no dataset reads its frames from is deleted."""
     upload_quota_bytes: int = Field(default=20 * 1024**3, ge=0)

@@ -65,7 +65,7 @@ from app.http.pages import install_pages
 from app.http.request_limits import THREADS, ClassLimiters
 from app.http.request_log import RequestLog
 from app.http.requests import HeadAsGet, OneLength, OneRange
-from app.http.route import Gate, Route, nothing_here, require_permissions
+from app.http.route import Gate, Route, answer_no_route, require_permissions
 from app.http.services import Services
 from app.http.site import STATIC, Site
 from app.http.strict_parameters import refuse_unknown_parameters
@@ -169,7 +169,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
         min(MAX_JSON_BYTES, settings.max_upload_bytes),
     )
     install_handlers(app)
-    app.router.route_class, app.router.default = Route, nothing_here
+    app.router.route_class, app.router.default = Route, answer_no_route
     app.include_router(maintenance.health_router)
     # Before the API: nobody asks for as much at once as somebody who opens the first page.
     events = services.events

@@ -50,7 +50,7 @@ class PoolTask:
         self._left.set()
         self.future.cancel()
 
-    async def result_unless(self, gone: Callable[[], Awaitable[bool]]) -> Any:
+    async def result_unless_client_gone(self, gone: Callable[[], Awaitable[bool]]) -> Any:
         """The result; None where the task is given up because nobody waits for it any more.
 
         Args:

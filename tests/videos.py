@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import cv2
@@ -104,6 +104,34 @@ def stretch_pixels(path: Path, over: int, under: int) -> Path:
     described = data[start + 24 : end] + _box(b"pasp", struct.pack(">II", over, under))
     descriptions = _box(b"stsd", data[start + 8 : start + 16] + _box(kind, described))
     path.write_bytes(_replaced(data, _DESCRIPTIONS, descriptions))
+    return path
+
+
+def unmark_key_frames(path: Path) -> Path:
+    """Let an MP4 say that its first frame alone is a key frame."""
+    data = path.read_bytes()
+    table = struct.pack(">III", 0, 1, 1)
+    path.write_bytes(_replaced(data, (*_TIMES[:-1], b"stss"), _box(b"stss", table)))
+    return path
+
+
+def replace_boxes(path: Path, make: Callable[[bytes, bytes], bytes]) -> Path:
+    """Give an MP4 other tables of its samples; it lasts as long as they say.
+
+    Args:
+        path: The file, whose tables come behind its pictures.
+        make: From the kind of a table (``stts``, ``stss``, ``stsc``, ``stsz``, ``stco``) and what it
+            holds to what it shall hold.
+    """
+    data = path.read_bytes()
+    for kind in (b"stsc", b"stss", b"stsz", b"stts", b"stco"):
+        start, end = _place(data, (*_TIMES[:-1], kind))
+        table = _box(kind, make(kind, data[start + 8 : end]))
+        data = _replaced(data, (*_TIMES[:-1], kind), table)
+    start, end = _place(data, _EDITS)
+    edits = data[start:end]
+    data = _replaced(data, _EDITS, edits[:24] + struct.pack(">I", 10**8) + edits[28:])
+    path.write_bytes(data)
     return path
 
 

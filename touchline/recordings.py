@@ -36,6 +36,7 @@ class Recording:
         width, height: Of a frame, upright and with square pixels.
         rotation: Degrees by which the file turns its frames.
         interlaced: Whether frames hold two fields; None where that cannot be told.
+        damaged: Pictures that cannot be decoded; they are left out, and have no number.
         shots, groups: How many it has, and how many were taken from it.
         problem: Why its frames cannot be read now; None: they can.
     """
@@ -54,6 +55,7 @@ class Recording:
     height: int | None
     rotation: int | None
     interlaced: bool | None
+    damaged: int | None
     shots: int
     groups: int
     problem: str | None

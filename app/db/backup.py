@@ -27,7 +27,7 @@ from app.db.dialects.dialect import dialect_in, dialect_of
 from app.db.engine import make_engine, reported
 from app.db.home import refused
 from app.db.leftovers import is_half_written
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseInUse
 from app.db.log import verify_chain
 from app.db.recovery.anchor import Anchor, anchor_of, require_own_database
 from app.db.recovery.preopen_check import require_sound, signs_of_use
@@ -86,7 +86,7 @@ def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Backu
     require_file(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
     if not settings.database_file.exists() and not signs_of_use(settings):
         raise InputError(f"there is no database in {settings.home}", hint="Set TOUCHLINE_HOME.")
-    lock = DatabaseLock(settings)
+    lock = DatabaseInUse(settings)
     try:
         if lock.alone:
             require_sound(settings)
@@ -203,7 +203,7 @@ def examine_database(
         with reported(own), Session(engine) as session:
             dialect, tables = dialect_in(session), set(inspect(session).get_table_names())
             if "alembic_version" not in tables or "log" not in tables:
-                raise DamagedError(f"{known_as} is no database of Touchline", hint=EXAMINE)
+                raise DamagedError(f"{known_as} is not a Touchline database", hint=EXAMINE)
             if faults := dialect.file_faults(session, 3, thorough=True):
                 raise DamagedError(f"{known_as} is damaged: {'; '.join(faults)}", hint=EXAMINE)
             if dialect.count_lost_references(session):

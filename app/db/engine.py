@@ -10,7 +10,7 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
 from app.db.dialects.dialect import WRITE as WRITE
-from app.db.dialects.dialect import Failure, dialect_of, unstorable_text
+from app.db.dialects.dialect import Failure, dialect_of, unstorable_text_error
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
 
 
@@ -38,7 +38,7 @@ def reported(settings: Settings) -> Iterator[None]:
     except DBAPIError as error:
         kind, name = dialect_of(settings).failure(error)
         if kind is Failure.TEXT:
-            raise unstorable_text() from error
+            raise unstorable_text_error() from error
         if kind is not Failure.OTHER or isinstance(error, OperationalError):
             raise _storage_error(error, kind, name, settings) from error
         raise StorageError(

@@ -78,7 +78,8 @@ class PendingResponse(Generic[R]):
             stored = self._encode(response, key.request_digest)
             if not insert_response(session, key.key, key.actor, stored):
                 raise ConflictError(
-                    "the same request was answered in the meantime", hint="Send it again."
+                    "the same request was answered in the meantime",
+                    hint="Wait, then send it again with the same Idempotency-Key.",
                 )
         session.once_kept(lambda: self._commit(outcome, response))
 

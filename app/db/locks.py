@@ -47,7 +47,7 @@ def require_lock(handle: int, held: str, seconds: float) -> None:
         )
 
 
-class DatabaseLock:
+class DatabaseInUse:
     """Says that a process has the database open.
 
     ``database.lock`` is shared by all who have. Who opens it holds ``opening.lock`` meanwhile:
@@ -90,7 +90,7 @@ def database_alone(settings: Settings, why: str) -> Iterator[None]:
     Raises:
         StorageError: Somebody has it open; ``why`` says what cannot be done meanwhile.
     """
-    lock = DatabaseLock(settings)
+    lock = DatabaseInUse(settings)
     try:
         if not lock.alone:
             raise StorageError(

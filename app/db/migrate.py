@@ -12,54 +12,17 @@ from app.db.backup import write_backup
 from app.db.dialects.dialect import WRITE, Dialect, dialect_of
 from app.db.engine import make_engine, reported
 from app.db.home import make_file
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseInUse
 from app.db.recovery.anchor import renew_anchor, require_own_database
 from app.db.recovery.preopen_check import require_sound
 from app.errors import StorageError
 from app.folders import own_folder
 
-KNOWN_REVISIONS = (
-    "0001",
-    "0002",
-    "0003",
-    "0004",
-    "0005",
-    "0006",
-    "0007",
-    "0008",
-    "0009",
-    "0010",
-    "0011",
-    "0013",
-    "0014",
-    "0015",
-    "0016",
-    "0017",
-    "0018",
-    "0019",
-    "0020",
-    "0021",
-    "0022",
-    "0023",
-    "0024",
-    "0025",
-    "0026",
-    "0027",
-    "0028",
-    "0029",
-    "0030",
-    "0031",
-    "0032",
-    "0033",
-    "0034",
-    "0035",
-    "0036",
-    "0037",
-    "0038",
-    "0039",
+KNOWN_REVISIONS = tuple(
+    sorted(script.name[:4] for script in (own_folder("migrations") / "versions").glob("[0-9]*.py"))
 )
 """Every revision that this version can migrate, oldest first."""
-SCHEMA_REVISION = KNOWN_REVISIONS[-1]
+SCHEMA_REVISION = KNOWN_REVISIONS[-1] if KNOWN_REVISIONS else ""
 """The revision that this version works with."""
 COPY = "before-schema-{}.zip"
 UNFINISHED = "transfer"
@@ -101,7 +64,7 @@ def migrate(settings: Settings) -> Migrated:
         StorageError: The database is newer than this version, or somebody has it open.
         DamagedError: The database is not what was written, or not the one of its home.
     """
-    lock = DatabaseLock(settings)
+    lock = DatabaseInUse(settings)
     try:
         if lock.alone and dialect_of(settings).is_file:
             require_sound(settings)

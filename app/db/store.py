@@ -18,7 +18,7 @@ from app.db.base import InstallationModel
 from app.db.dialects.dialect import AGAIN, WRITE, dialect_of
 from app.db.engine import make_engine, reported
 from app.db.home import make_file
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseInUse
 from app.db.migrate import (
     KNOWN_REVISIONS,
     SCHEMA_REVISION,
@@ -84,7 +84,7 @@ class Store:
         self,
         engine: Engine,
         settings: Settings,
-        lock: DatabaseLock,
+        lock: DatabaseInUse,
         turn: AbstractContextManager[object],
     ):
         self.settings = settings
@@ -120,7 +120,7 @@ class Store:
             DamagedError: The database is not what was written, or not the one of its home.
             InputError: The URL is neither one of SQLite nor of PostgreSQL.
         """
-        lock = DatabaseLock(settings)
+        lock = DatabaseInUse(settings)
         engine: Engine | None = None
         try:
             engine = _open(settings, lock.alone)

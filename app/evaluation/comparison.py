@@ -49,7 +49,7 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class FrameDifference:
+class FrameOfTwoRuns:
     """One frame of both runs; ``change`` of one field, None where a run has no value."""
 
     first: FrameResult
@@ -74,7 +74,7 @@ class FrameComparison:
     gained: int
     lost: int
     mean_change: float | None
-    frames: tuple[FrameDifference, ...]
+    frames: tuple[FrameOfTwoRuns, ...]
 
 
 def differing_pins(first: Mapping[str, Any], second: Mapping[str, Any]) -> tuple[str, ...]:
@@ -124,7 +124,7 @@ def compare_frames(
         gained += a is None and b is not None
         lost += a is not None and b is None
         if a != b:
-            rows.append(FrameDifference(before, after, change))
+            rows.append(FrameOfTwoRuns(before, after, change))
     rows.sort(key=lambda row: (row.change is not None, -abs(row.change or 0.0)))
     mean = sum(changes) / len(changes) if changes else None
     return FrameComparison(field, len(pairs), better, worse, gained, lost, mean, tuple(rows))

@@ -98,7 +98,9 @@ def covariance_from_json(
     if found is None:
         return None
     if camera.is_wide:
-        raise ValueError("is that of a lens with one radial term, and the camera has another")
+        raise ValueError(
+            "is for a lens with one radial term, and this camera has another lens: leave it out"
+        )
     rows = [fields.numbers(row, PARAMETERS) for row in fields.sequence(found)]
     if len(rows) != PARAMETERS:
         raise ValueError(f"has {len(rows)} rows, not {PARAMETERS}")
@@ -235,7 +237,7 @@ def _rotation(reader: _Fields) -> FloatArray:
 
 def _within_reason(value: T) -> T:
     if np.abs(np.asarray(value)).max() > MAX_NUMBER:
-        raise ValueError("is beyond any camera")
+        raise ValueError(f"is larger than any camera has (at most {MAX_NUMBER:.0e})")
     return value
 
 

@@ -139,7 +139,7 @@ def _flat(value: Any) -> list[float]:
         else:
             flat.append(fields.number(item))
             if abs(flat[-1]) > MAX_NUMBER:
-                raise ValueError("is beyond any camera")
+                raise ValueError(f"is larger than any camera has (at most {MAX_NUMBER:.0e})")
         if len(flat) + len(pending) > MAX_NUMBERS:
             raise ValueError(f"has more than {MAX_NUMBERS} numbers")
     return flat

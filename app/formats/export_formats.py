@@ -25,6 +25,7 @@ from app.formats.sn_calibration import line_claims, line_frame
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import labels_frame, write_soccernet_v3
 from app.formats.soccernet_v3d_writer import write_soccernet_v3d
+from app.formats.tracking_writer import write_cdf, write_tracab
 from app.formats.tracks_writer import TrackRecord, write_track_arrays, write_tracks
 from app.formats.view_files import PutText
 from app.formats.yolo_writer import write_yolo
@@ -38,10 +39,10 @@ CONTENT = {
     "sn-calibration": ("frames", "frame"),
     "gamestate": ("images", "image"),
     "yolo": ("labels", "view that a detector may learn from"),
-    **dict.fromkeys(("tracks", "npz"), ("tracks", "track of the ball")),
+    **dict.fromkeys(("tracks", "tracab", "cdf", "npz"), ("tracks", "track of the ball")),
 }
 """What a format consists of: the name of its count, and the word for one."""
-TRACKS = ("tracks", "npz")
+TRACKS = ("tracks", "tracab", "cdf", "npz")
 """Formats of the ball over time: they hold no groups, and no pictures."""
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
@@ -94,6 +95,14 @@ class WriteOptions:
     tracks: Callable[[Iterable[ExportRecord]], Iterable[TrackRecord]] | None = None
 
 
+_TRACK_WRITERS = {
+    "tracks": write_tracks,
+    "tracab": write_tracab,
+    "cdf": write_cdf,
+    "npz": write_track_arrays,
+}
+
+
 def write_format(
     root: Path,
     records: Iterable[ExportRecord],
@@ -112,8 +121,7 @@ def write_format(
         InputError: A group does not fit the format, or one of its cameras does not.
     """
     if options.tracks is not None:
-        write = write_tracks if options.format == "tracks" else write_track_arrays
-        return write(root, options.tracks(records))
+        return _TRACK_WRITERS[options.format](root, options.tracks(records))
     if options.format in WITHOUT_LENSES:
         records = _with_plain_lenses(records, options.format)
     everything, boxes = options.everything, options.boxes

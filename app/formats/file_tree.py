@@ -78,7 +78,7 @@ class FileTree(Protocol):
     def media(self, name: str) -> Media:
         """Where one file can be read later, as a frame."""
 
-    def media_inside(self, name: str, member: str) -> Media:
+    def media_in_zip(self, name: str, member: str) -> Media:
         """The same of a member of a zip file among the files."""
 
     def nested(self, name: str, report: Report) -> ZipTree:

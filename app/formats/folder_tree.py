@@ -86,7 +86,7 @@ class FolderTree:
         """Where one file can be read later."""
         return Media(self.shown(name))
 
-    def media_inside(self, name: str, member: str) -> Media:
+    def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file in the folder can be read later."""
         return Media(str(self.path / name), member)
 

@@ -34,6 +34,8 @@ ExportFormat = Literal[
     "yolo",
     "parquet",
     "tracks",
+    "tracab",
+    "cdf",
     "npz",
     "touchline",
 ]

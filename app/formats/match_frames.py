@@ -49,7 +49,7 @@ class MatchFrames:
 
     def _member(self, name: str) -> Media:
         """Where a member of the archive is."""
-        return self._tree.media_inside(self._match + ARCHIVE, self._members[name])
+        return self._tree.media_in_zip(self._match + ARCHIVE, self._members[name])
 
     @property
     def some(self) -> bool:

@@ -135,7 +135,7 @@ def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
         InputError: Two tracks would have one folder.
     """
     counts = {"tracks": 0, "frames": 0, "balls": 0, "events": 0}
-    for folder, record in _folders(root, records):
+    for folder, record in track_folders(root, records):
         track = record.track
         lines = [csv_line(COLUMNS), *map(csv_line, _rows(record))]
         (folder / BALL).write_text("".join(lines), encoding="utf-8")
@@ -161,7 +161,7 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
         Counts: ``tracks``, ``frames``, ``balls`` and ``cameras`` (views that have one).
     """
     counts = {"tracks": 0, "frames": 0, "balls": 0, "cameras": 0}
-    for folder, record in _folders(root, records):
+    for folder, record in track_folders(root, records):
         track = record.track
         rows = {int(frame): row for row, frame in enumerate(track.frames)}
         arrays: dict[str, Any] = {
@@ -186,7 +186,7 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
     return counts
 
 
-def _folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[Path, TrackRecord]]:
+def track_folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[Path, TrackRecord]]:
     """Where each track goes: a single one to ``root``."""
     whole = list(records)
     taken: dict[str, str] = {}

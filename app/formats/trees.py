@@ -76,7 +76,7 @@ class StoreTree:
         """Where an object can be read later, as long as it is this one."""
         return Media(self.path.of(self._get(name)).sealed())
 
-    def media_inside(self, name: str, member: str) -> Media:
+    def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file in the store can be read later."""
         return Media(self.path.of(self._get(name)).sealed(), member)
 

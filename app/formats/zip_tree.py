@@ -100,7 +100,7 @@ class ZipTree:
         """Where a member can be read later."""
         return self._media(self.own_name(name))
 
-    def media_inside(self, name: str, member: str) -> Media:
+    def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file that is a member can be read later."""
         return self._media(f"{self.own_name(name)}/{member}")
 

@@ -140,6 +140,7 @@ PAGES = (
     "/import",
     "/recordings",
     "/recordings/{recording}",
+    "/recordings/{recording}/links/{link}",
     "/jobs",
     "/work",
     "/account",

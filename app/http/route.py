@@ -216,7 +216,7 @@ async def require_somebody(scope: Scope) -> None:
         await access.log_in(scope)
 
 
-async def nothing_here(scope: Scope, receive: Receive, send: Send) -> None:
+async def answer_no_route(scope: Scope, receive: Receive, send: Send) -> None:
     """Answer where there is no route: that is nothing that a stranger is told.
 
     Raises:

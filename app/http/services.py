@@ -31,6 +31,7 @@ from app.features.predictions.reader import PredictionReader
 from app.features.recordings.camera_jobs import resume_cameras
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
+from app.features.recordings.link_ball import resume_ball_links
 from app.features.solve.jobs import resume_solving, solve_leftovers
 from app.features.tracks.jobs import TRACKS
 from app.features.upkeep.service import Upkeep
@@ -133,6 +134,7 @@ class Services:
         resume_imports(self.jobs, self.store, self.settings)
         resume_recordings(self.jobs, self.store)
         resume_cameras(self.jobs, self.store)
+        resume_ball_links(self.jobs, self.store)
         resume_evaluations(self.jobs, self.store)
         resume_practice(self.jobs, self.store)
         self.jobs.on_leadership(self._start_leading)
@@ -156,8 +158,8 @@ class Services:
             log.exception("annotations could not be compared")
 
     def _keep_large_up(self) -> None:
-        self.statistics.keep_large_up()
-        self.yields.keep_large_up()
+        self.statistics.refresh_large_datasets()
+        self.yields.refresh_large_datasets()
 
     def _solved_leftovers(self) -> bool:
         """Whether what an earlier run left is taken up; not while another process keeps writing."""

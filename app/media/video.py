@@ -49,11 +49,24 @@ def open_video(path: Path, options: Sequence[int] = ()) -> Iterator[cv2.VideoCap
         video.release()
 
 
+MOST_DAMAGED = 500
+"""Pictures in a row that may be damaged; the end of a video is where no more come than that."""
+
+
+def skipped_to_next(video: cv2.VideoCapture) -> int | None:
+    """Grab the next frame that can be decoded.
+
+    Returns:
+        How many damaged ones were passed over on the way; None: there is no frame any more.
+    """
+    return next((count for count in range(MOST_DAMAGED + 1) if video.grab()), None)
+
+
 MAX_FRAMES = 2_000_000
 """Frames of one video; eleven hours at 50 a second."""
 _A_WORD = 250
 """Frames between two words of how far the decoding is: about a second of 1080p."""
-_VERSION = 1
+_VERSION = 2
 _MARGINS = (32, 256)
 """Frames before the one that is sought from which decoding starts: behind a jump some decoders return
 frames whose references they have not seen."""
@@ -178,11 +191,18 @@ class FrameReader:
         self.close()
         video = self._opened()
         while self._next <= number:
-            if not video.grab():
+            if skipped_to_next(video) is None:
                 self.close()
                 return None
             self._next += 1
         return _retrieved(video)
+
+    def skip(self) -> bool:
+        """Pass over the frame that follows the one read last; whether there is one."""
+        if self._video is None or skipped_to_next(self._video) is None:
+            return False
+        self._next += 1
+        return True
 
     def _opened(self) -> cv2.VideoCapture:
         if self._video is None:
@@ -204,7 +224,7 @@ class FrameReader:
         """Go to a frame from about another one; whether every frame on the way came when it should."""
         video = self._opened()
         video.set(cv2.CAP_PROP_POS_MSEC, self._times[start])
-        if not video.grab():
+        if skipped_to_next(video) is None:
             return False
         places = np.flatnonzero(_same_time(self._times, video.get(cv2.CAP_PROP_POS_MSEC)))
         # Where the jump led too far, or two frames have one time, nothing says which one this is.
@@ -222,10 +242,8 @@ class FrameReader:
         """Decode on to a frame; whether every frame on the way came when it should."""
         video = self._opened()
         while self._next <= number:
-            came = video.grab()
-            if not came or not _same_time(
-                self._times[self._next], video.get(cv2.CAP_PROP_POS_MSEC)
-            ):
+            gone = skipped_to_next(video) is None
+            if gone or not _same_time(self._times[self._next], video.get(cv2.CAP_PROP_POS_MSEC)):
                 return False
             self._next += 1
         return True
@@ -252,7 +270,7 @@ def _retrieved(video: Any) -> Any:
 def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     times: list[float] = []
     with _opened(path) as video:
-        while video.grab():
+        while skipped_to_next(video) is not None:
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             if len(times) > MAX_FRAMES:
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")

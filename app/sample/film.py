@@ -21,7 +21,7 @@ from app.sample.instant import HALF_LENGTH, Instant
 from app.sample.look import Look
 from app.sample.patch import Image
 from app.sample.pose import pose_people
-from app.sample.props import draw_ball, draw_frame, draw_net
+from app.sample.props import draw_ball, draw_goal_posts, draw_net
 from app.sample.render import bowl_of, eye_of, gain_at, lit_from, noise_tiles, turf_of
 from app.sample.surface import shade
 from app.sample.views import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
@@ -185,7 +185,7 @@ def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: Look) -> N
     plane = np.asarray(cv2.remap(area, back, down, cv2.INTER_LINEAR), np.uint8)
     before = plane.copy()
     draw_net(plane, flat, sign, look.light.exposure)
-    draw_frame(plane, flat, sign, look.light.exposure)
+    draw_goal_posts(plane, flat, sign, look.light.exposure)
     changed = cv2.dilate((plane != before).any(axis=2).astype(np.uint8), np.ones((3, 3), np.uint8))
     there_too = cv2.remap(changed, *wanted, cv2.INTER_NEAREST)
     cv2.copyTo(np.asarray(cv2.remap(plane, *wanted, cv2.INTER_LINEAR)), there_too, area)

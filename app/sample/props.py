@@ -72,7 +72,7 @@ def _on_goal(sign: float, profile: FloatArray, y: FloatArray | float) -> FloatAr
     return np.column_stack([x, np.broadcast_to(y, x.shape), -profile[:, 1]])
 
 
-def draw_frame(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
+def draw_goal_posts(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     """Posts and crossbar of the goal at x = ``sign`` * 52.5 m, round and 12 cm thick."""
     half = GOAL_WIDTH / 2
     corners = np.array([(-half, 0.0), (-half, GOAL_HEIGHT), (half, GOAL_HEIGHT), (half, 0.0)])

@@ -17,7 +17,7 @@ from app.sample.figures import DrawnPerson, draw_person, people_in_view
 from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
 from app.sample.look import Colour, Lamp, Light, Look
 from app.sample.pose import INDEX, LIMBS, Pose, pose_people
-from app.sample.props import draw_ball, draw_frame, draw_net
+from app.sample.props import draw_ball, draw_goal_posts, draw_net
 from app.sample.scene import Scene
 from app.sample.scoreboard import draw_scoreboard
 from app.sample.surface import BOARD_HEIGHT, TILE, Bowl, Eye, Turf, shade
@@ -293,10 +293,10 @@ def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> 
     for sign in (-1.0, 1.0):
         if sign not in near_goals:
             draw_net(image, camera, sign, gain)
-            draw_frame(image, camera, sign, gain)
+            draw_goal_posts(image, camera, sign, gain)
     _draw_play(image, camera, instant, look, side)
     for sign in near_goals:
-        draw_frame(image, camera, sign, gain)
+        draw_goal_posts(image, camera, sign, gain)
         draw_net(image, camera, sign, gain)
 
 

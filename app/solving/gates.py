@@ -342,18 +342,18 @@ def _chi_square(group: _Group, found: ChiSquare | None, policy: Policy) -> Gate:
     ):
         sentence = "not judged: a camera has no known uncertainty"
         return Gate("chi_square", passed, None, threshold, None, sentence, active=active)
-    sentence = f"{consistency(found.p_value)} ({_probability(found.p_value)})"
+    sentence = f"{consistency_word(found.p_value)} ({_probability(found.p_value)})"
     return _gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
 
 
-def consistency(p_value: float) -> str:
+def consistency_word(p_value: float) -> str:
     """How well the residuals agree with their uncertainty, in a word.
 
     Args:
         p_value: Of their chi-square test.
 
     Example:
-        >>> consistency(0.72), consistency(0.01), consistency(0.0004)
+        >>> consistency_word(0.72), consistency_word(0.01), consistency_word(0.0004)
         ('normal', 'unlikely', 'contradictory')
     """
     if p_value < LOW_P_VALUE:

@@ -34,9 +34,12 @@ from app.tracking.ball_models import (
     ROLL_S,
     ROLL_SIGMA,
     ROLLING,
+    SPIN_LEAST,
     SPIN_S,
-    SPIN_SIGMA,
+    SPIN_SHARE,
     TOUCH_SPEED,
+    TOUCHED,
+    TOUCHED_SIGMA,
 )
 from app.tracking.ball_search import Knots
 
@@ -71,6 +74,8 @@ class Fitted:
         weight: Of each ray, 1 but for gross errors, shape (R,).
         event_time: Of the event before each knot, seconds, NaN where there is none, shape (K,).
         event_sigma: Of these.
+        late: How much the rays say of each view's time, per second squared, shape (V, V).
+        late_pull: And in which direction, per second, shape (V,).
     """
 
     state: FloatArray
@@ -80,6 +85,8 @@ class Fitted:
     weight: FloatArray
     event_time: FloatArray
     event_sigma: FloatArray
+    late: FloatArray
+    late_pull: FloatArray
 
 
 def fit(
@@ -103,7 +110,7 @@ def fit(
         unseen: What touches that nobody saw add to the noise of the acceleration before each
             knot, (m/s2)2 s, shape (K,).
     """
-    problem = _Problem(knots, mode, event, used, noise, unseen)
+    problem = _Problem(knots, mode, event, used, noise, unseen, start)
     state = np.concatenate([start, np.zeros((len(start), 3))], axis=1)
     for _ in range(_ROUNDS):
         diagonal, beside, pull = problem.equations(state)
@@ -114,10 +121,12 @@ def fit(
         if most < _SETTLED_M:
             break
     diagonal, beside, _ = problem.equations(state)
-    covariance, after = inverse_blocks(factor(diagonal, beside), SIZE)
+    rows = factor(diagonal, beside)
+    covariance, after = inverse_blocks(rows, SIZE)
     when, spread = problem.events(state, covariance, after)
     miss, slope, weight = problem.misses(state)
-    return Fitted(state, covariance, miss, slope, weight, when, spread)
+    late = problem.lateness(state, rows)
+    return Fitted(state, covariance, miss, slope, weight, when, spread, *late)
 
 
 class _Problem:
@@ -131,6 +140,7 @@ class _Problem:
         used: BoolArray,
         noise: FloatArray,
         unseen: FloatArray,
+        start: FloatArray,
     ) -> None:
         self.knots, self.mode, self.event = knots, mode, event
         self.used, self.noise = used, noise
@@ -139,7 +149,8 @@ class _Problem:
         self.loud = np.flatnonzero(event[1:] != NOTHING)
         after = mode[1:][self.quiet]
         dt = self.dt[self.quiet]
-        self.way, self.inverse = _quiet_noise(after, dt, unseen[1:][self.quiet])
+        spin = _spin(np.linalg.norm(start[self.quiet, _V], axis=1))
+        self.way, self.inverse = _quiet_noise(after, dt, unseen[1:][self.quiet], spin)
 
     def misses(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Misses of the rays by their noise, (R, 2); their slopes, (R, 2, 3); and weights, (R,)."""
@@ -191,6 +202,25 @@ class _Problem:
             spread[at + 1] = np.sqrt(1 / (12 / self.dt[at] ** 2 + gain))
         return when, spread
 
+    def lateness(self, state: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What the rays say of the views' times when the ball's way may follow, (V, V) and (V,)."""
+        knots = self.knots
+        miss, slope, weight = self.misses(state)
+        moved = np.einsum("rki,ri->rk", slope, state[knots.at, _V])
+        views = int(knots.view.max(initial=-1)) + 1
+        known, pull = np.zeros((views, views)), np.zeros(views)
+        tied = np.zeros((views, *state.shape))
+        for view in range(views):
+            own = np.flatnonzero((knots.view == view) & (weight > 0))
+            push = moved[own] * weight[own, None]
+            known[view, view] = (push * moved[own]).sum()
+            pull[view] = (push * miss[own]).sum()
+            np.add.at(tied[view][:, _P], knots.at[own], np.einsum("rki,rk->ri", slope[own], push))
+        flat = tied.reshape(views, -1)
+        for view in range(views):
+            known[view] -= flat @ solve_factored(rows, SIZE, flat[view])
+        return (known + known.T) / 2, pull
+
     def _see(self, state: FloatArray, diagonal: FloatArray, pull: FloatArray) -> None:
         knots = self.knots
         miss, slope, weight = self.misses(state)
@@ -214,7 +244,7 @@ class _Problem:
         """What is known before anything is seen."""
         roll = self.mode[0] == ROLL
         mean = np.array([0, 0, -REST if roll else -2.0, 0, 0, 0, 0, 0, 0])
-        lift = (GRASS_SIGMA, 0.1, 0.5) if roll else (4.0, 5.0, SPIN_SIGMA)
+        lift = (GRASS_SIGMA, 0.1, 0.5) if roll else (4.0, 5.0, 2.0)
         sigma = np.array([40, 30, lift[0], 10, 10, lift[1], 2.0, 2.0, lift[2]])
         diagonal[0] += np.diag(sigma**-2)
         pull[0] += (state[0] - mean) / sigma**2
@@ -314,11 +344,20 @@ def _hit_of(a: FloatArray, b: FloatArray, dt: float, before: int, after: int, bo
     else:
         kept[:2], kept[2] = 0.5, 0.2
         sigma[:2], sigma[2] = 4.0, 2.0
-    low = bounce or after == ROLL
+    # A bounce, or a touch of a ball in the air, has a height; a ball that rolls from here has one too.
+    mid_air = bounce or (before == FLIGHT and after != ROLL)
+    low = mid_air or after == ROLL
+    height, height_sigma = (
+        (REST, GRASS_SIGMA) if bounce or after == ROLL else (TOUCHED, TOUCHED_SIGMA)
+    )
     rows = 10 if low else 9
     noise = np.zeros(rows)
-    noise[:3], noise[3:6], noise[6:9] = _SLACK_M**2, sigma**2, SPIN_SIGMA**2
-    noise[9:] = GRASS_SIGMA**2
+    noise[:3], noise[3:6], noise[6:9] = (
+        _SLACK_M**2,
+        sigma**2,
+        float(_spin(np.linalg.norm(b[None, _V], axis=1))[0]) ** 2,
+    )
+    noise[9:] = height_sigma**2
     covariance = np.diag(noise)
 
     def at_time(time: float) -> tuple[FloatArray, FloatArray]:
@@ -329,11 +368,11 @@ def _hit_of(a: FloatArray, b: FloatArray, dt: float, before: int, after: int, bo
         way[:3] = b[_V] - fall_b * rest - a[_V] - fall_a * time
         miss[3:6] = b[_V] - fall_b * rest - kept * (a[_V] + fall_a * time) - mean
         miss[6:9] = b[_A]
-        if bounce:
-            miss[9] = a[2] + a[5] * time + fall_a[2] * time**2 / 2 + REST
+        if mid_air:
+            miss[9] = a[2] + a[5] * time + fall_a[2] * time**2 / 2 + height
             way[9] = a[5] + fall_a[2] * time
         elif low:
-            miss[9] = b[2] + REST
+            miss[9] = b[2] + height
         return miss, way
 
     time = middle
@@ -351,7 +390,7 @@ def _hit_of(a: FloatArray, b: FloatArray, dt: float, before: int, after: int, bo
     slopes[3:6, _V] = -np.diag(kept)
     slopes[3:6, SIZE + 3 : SIZE + 6] = np.eye(3)
     slopes[6:9, SIZE + 6 :] = np.eye(3)
-    if bounce:
+    if mid_air:
         slopes[9, 2], slopes[9, 5] = 1.0, time
     elif low:
         slopes[9, SIZE + 2] = 1.0
@@ -360,8 +399,13 @@ def _hit_of(a: FloatArray, b: FloatArray, dt: float, before: int, after: int, bo
     return _Hit(straight, slopes, weight, covariance, way, time)
 
 
+def _spin(speed: FloatArray) -> FloatArray:
+    """Standard deviation of the acceleration by spin and wind at a speed, m/s2."""
+    return SPIN_SHARE * DRAG * np.minimum(speed, 30.0) ** 2 + SPIN_LEAST
+
+
 def _quiet_noise(
-    mode: IntArray, dt: FloatArray, unseen: FloatArray
+    mode: IntArray, dt: FloatArray, unseen: FloatArray, spin: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """How states move without events and without drag, and the inverse of the noise, (N, 9, 9) each."""
     count = len(mode)
@@ -369,7 +413,7 @@ def _quiet_noise(
     way = np.tile(np.eye(SIZE), (count, 1, 1))
     noise = np.zeros((count, SIZE, SIZE))
     lasts = np.where(flies, SPIN_S, np.where(rolls, ROLL_S, HELD_S))
-    strong = np.where(flies, SPIN_SIGMA, np.where(rolls, ROLL_SIGMA, HELD_SIGMA))
+    strong = np.where(flies, spin, np.where(rolls, ROLL_SIGMA, HELD_SIGMA))
     stay = np.exp(-dt / lasts)
     # A ball in somebody's keeping slows down: its velocity would grow without end.
     slow = np.where(rolls | flies, 1.0, np.exp(-dt))
@@ -392,5 +436,5 @@ def _quiet_noise(
         way[flat, 2, 2] = stay
         noise[flat, 2, 2] = GRASS_SIGMA**2 * (1 - stay**2) + ROUGH * dt[flat]
         noise[flat, 5, 5] = 0.2**2
-        noise[flat, 8, 8] = SPIN_SIGMA**2
+        noise[flat, 8, 8] = 1.0
     return way, np.asarray(np.linalg.inv(noise), dtype=float)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 GRAVITY = 9.81
 """Metres per second squared; z points down."""
-DRAG = 0.0125
-"""Of a size 5 ball in air, per metre: half of density, area and coefficient (0.23) by mass."""
+DRAG = 0.0115
+"""Of a size 5 ball in air, per metre: half of density, area and coefficient (0.21) by mass."""
 REST = 0.113
 """Height of the centre of a ball that lies on the grass, metres."""
 ROLLING = 0.7
@@ -22,14 +22,16 @@ KICKS_A_SECOND, HOLDS_A_SECOND = 0.6, 0.05
 """How often a ball is touched, and taken into somebody's keeping."""
 LEAST_CHANGE = 2.5
 """Of the velocity by what is called an event; hops of a rolling ball are less, m/s."""
+TOUCHED, TOUCHED_SIGMA = 0.9, 0.9
+"""Height at which a ball in the air is touched: by feet mostly, by heads at twice that, metres."""
 REACH = 2.7
 """Height above which nobody but a keeper touches a ball, metres."""
-GRASS_SIGMA = 0.07
+GRASS_SIGMA = 0.1
 """Height of a rolling ball above and below rest: blades, ruts, hops and what the pitch is off, metres."""
-GRASS_S = 0.5
+GRASS_S = 2.0
 """How long a rolling ball keeps such a height, seconds."""
-SPIN_SIGMA, SPIN_S = 2.0, 1.0
-"""Acceleration by spin and wind, and how long it lasts; bounded, m/s2 and seconds."""
+SPIN_SHARE, SPIN_LEAST, SPIN_S = 0.5, 0.2, 2.5
+"""Acceleration by spin as a share of the drag, what wind adds in m/s2, and how long both last, s."""
 ROLL_SIGMA, ROLL_S = 1.5, 0.4
 """Acceleration of a rolling ball beside its deceleration (skids, ruts, feet that run along)."""
 HELD_SIGMA, HELD_S = 12.0, 0.25

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from app.tracking.ball_track import BallMeasurements
 
 _WIDTH = 48
 """Histories that are kept."""
+_FEWEST_PAIRS = 10
+"""Of rays of the same instant, that the noise of a view is taken from."""
 _SAME_S = 1e-4
 """Instants that are closer are one."""
 _ASIDE_M, _ABOVE_M, _BELOW_M = 12.0, 45.0, 0.0
@@ -118,6 +120,34 @@ def knots_of(measurements: BallMeasurements, times: FloatArray, shift: FloatArra
         np.where(known, far * size_sigma / np.where(known, size, 1.0), 0.0),
         view[rows],
     )
+
+
+def louder(knots: Knots, most: float) -> Knots:
+    """The knots with the noise of views whose rays pass each other by more than it says.
+
+    Cameras that are not exact make all rays of a view miss those of others alike: they are of the
+    ball all the same. Beyond ``most`` times the noise they are not, and are left as they are.
+    """
+    pairs = np.flatnonzero((knots.at[1:] == knots.at[:-1]) & (knots.view[1:] != knots.view[:-1]))
+    if not len(pairs):
+        return knots
+    a, b = pairs, pairs + 1
+    across = np.cross(knots.along[a], knots.along[b])
+    sine = np.maximum(np.linalg.norm(across, axis=1), 1e-9)
+    apart = knots.centres[b] - knots.centres[a]
+    gap = np.abs((apart * across).sum(axis=1)) / sine
+    reach_a = (np.cross(apart, knots.along[b]) * across).sum(axis=1) / sine**2
+    reach_b = (np.cross(apart, knots.along[a]) * across).sum(axis=1) / sine**2
+    spread = np.hypot(reach_a * knots.noise[a], reach_b * knots.noise[b])
+    ratio = gap / np.maximum(spread, 1e-9)
+    factor = np.ones(len(knots.at))
+    for view in np.unique(knots.view):
+        own = ratio[(knots.view[a] == view) | (knots.view[b] == view)]
+        # The median of a normal number is 0.6745 sigma.
+        times = float(np.median(own)) / 0.6745 if len(own) >= _FEWEST_PAIRS else 1.0
+        if 1.0 < times <= most:
+            factor[knots.view == view] = times
+    return replace(knots, noise=knots.noise * factor)
 
 
 def search(knots: Knots, pitch: Pitch, width: int = _WIDTH) -> History:

@@ -36,8 +36,12 @@ from app.tracking.ball_models import (
     ROLL_S,
     ROLL_SIGMA,
     ROLLING,
-    SPIN_SIGMA,
+    SPIN_LEAST,
+    SPIN_S,
+    SPIN_SHARE,
     TOUCH_SPEED,
+    TOUCHED,
+    TOUCHED_SIGMA,
 )
 
 _OUTLIER = np.log(0.01 / 1000.0**2)
@@ -54,7 +58,7 @@ def _move(m, P, mode, dt):
         return
     speed = np.sqrt(m[3] ** 2 + m[4] ** 2 + m[5] ** 2)
     keep = 1.0
-    noise = SPIN_SIGMA**2 * 0.5
+    noise = (SPIN_SHARE * DRAG * speed**2 + SPIN_LEAST) ** 2 * SPIN_S
     if mode == FLIGHT:
         keep = np.exp(-DRAG * speed * dt)
     elif mode == ROLL:
@@ -129,12 +133,12 @@ def _forget(P, first, last):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _touch(m, P, before, mode, dt):
     """A kick at an unknown time between two knots, in place; its logarithm of probability."""
-    height = -m[2]
     cost = np.log(KICKS_A_SECOND * max(dt, 1e-3))
     _move(m, P, before, dt / 2)
-    slack = np.sqrt(max(P[2, 2], 0.0))
-    if height - slack > REACH:
-        cost -= 3.0 * (height - slack - REACH) + 2.0
+    if before == FLIGHT and mode != ROLL:
+        up = np.array([0.0, 0.0, 1.0])
+        square, _ = _pin(m, P, up, -TOUCHED, TOUCHED_SIGMA**2)
+        cost -= min(square / 2, 12.0)
     spread = dt * dt / 12 * (m[3] ** 2 + m[4] ** 2 + KICK_SPEED**2)
     if mode == ROLL:
         cost += np.log(0.5)

@@ -14,7 +14,7 @@ from app.soccer.pitch import Pitch
 from app.tracking.ball_fit import Fitted, fit
 from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, LEAST_CHANGE, NOTHING, REST, ROLL
 from app.tracking.ball_prediction import left_out, summed
-from app.tracking.ball_search import History, Knots, knots_of, search
+from app.tracking.ball_search import History, Knots, knots_of, louder, search
 from app.tracking.ball_track import (
     BallEvent,
     BallMeasurements,
@@ -32,11 +32,19 @@ _GROSS = 25.0
 """Square of a miss by its noise beyond which a ray is of something else."""
 _CONTRADICT = 0.3
 """Share of rays that is of something else beyond which there is no track."""
+_ODD = 0.4
+"""Share of one view's rays beyond which it is of something else."""
+_INEXACT = 12.0
+"""Times its noise that a view may be off for its camera's sake."""
 _LOUD = 6.0
 """Times that misses may be what the noise says."""
 _ALONE, _ACROSS, _LONG_S = 40.0, 2.0, 0.3
 """Noise of the acceleration by touches that nobody saw: before and after all measurements, and across
 gaps that are longer than so many seconds, (m/s2)2 s."""
+_SHIFTS = 4
+"""Times that views are looked at for times that are off."""
+_LATE_S, _LATE_SIGMA_S, _LATE_SURE, _LATE_LEAST_S = 0.1, 0.01, 5.0, 0.003
+"""How late views may be; how well that has to be known; in how many sigmas, and from where on it counts."""
 _OWN = 20.0
 """Rays that are believed to have been seen, as noisy as they are said to be."""
 _SCALES = (0.6, 1.1 * _LOUD)
@@ -55,7 +63,7 @@ class TrackOptions:
 
     longest_gap_s: float = 1.2
     beyond_s: float = 0.5
-    most_sigma_m: float = 2.0
+    most_sigma_m: float = 1.5
     leave_out: bool = True
 
 
@@ -81,17 +89,25 @@ def track_ball(
     """
     options = options or TrackOptions()
     frames, times = np.asarray(frames), np.asarray(times, dtype=float)
-    reason = _too_few(measurements)
+    reason = _too_few(measurements) if len(frames) else "The stretch has no frames."
     if reason is None:
         shift = np.zeros(len(measurements.names))
-        runs = [
-            _solve_run(measurements, rows, times, shift, pitch, options)
-            for rows in _runs(measurements.times, options.longest_gap_s)
-        ]
+        for _ in range(_SHIFTS):
+            runs = [
+                _solve_run(measurements, rows, times, shift, pitch, options)
+                for rows in _runs(measurements.times, options.longest_gap_s)
+            ]
+            moved = _late(measurements, runs)
+            if not moved.any():
+                break
+            shift += moved
+        odd = _odd_view(measurements, runs)
         reason = next((run.reason for run in runs if run.reason), None)
         made = [run for run in runs if run.fitted is not None]
-        if made:
-            track = _joined(measurements, frames, times, made, pitch, options)
+        if odd is not None:
+            reason = odd
+        elif made:
+            track = _joined(measurements, frames, times, made, shift, pitch, options)
             if any(state != "gap" for state in track.state):
                 return track
             reason = (
@@ -106,6 +122,7 @@ class _Run:
     """A stretch without long gaps; without a fit where there is a reason."""
 
     reason: str | None
+    names: tuple[str, ...] = ()
     knots: Knots | None = None
     history: History | None = None
     fitted: Fitted | None = None
@@ -145,6 +162,7 @@ def _solve_run(
     first, last = part.times.min() - options.beyond_s, part.times.max() + options.beyond_s
     own = shift[[names.index(name) for name in part.names]]
     knots = knots_of(part, times[(times >= first) & (times <= last)], own)
+    knots = louder(knots, _INEXACT)
     if len(np.unique(knots.at)) < FEWEST:
         return _Run("The ball lies where its cameras have no rays.")
     history = search(knots, pitch)
@@ -164,11 +182,11 @@ def _solve_run(
             return _Run(
                 _contradiction(f"the views miss each other by {times_said:.0f} times their noise")
             )
-        louder = knots.noise * scale
+        heard = knots.noise * scale
         moved = _moved(knots, history.mode, event, fitted)
-        gross = (fitted.miss**2).sum(axis=1) * (noise / louder) ** 2 > _GROSS
+        gross = (fitted.miss**2).sum(axis=1) * (noise / heard) ** 2 > _GROSS
         changed = bool(moved is not None or (gross != ~used).any())
-        noise, used = louder, ~gross
+        noise, used = heard, ~gross
         if moved is not None:
             event, history = moved[1], replace(history, mode=moved[0])
         if not changed and turn > 0:
@@ -176,7 +194,59 @@ def _solve_run(
     fitted = fit(knots, history.mode, event, used, state, noise, unseen)
     history = replace(history, event=event)
     rows_of = replace(knots, rows=rows[knots.rows])
-    return _Run(None, rows_of, history, fitted, used, noise)
+    return _Run(None, part.names, rows_of, history, fitted, used, noise)
+
+
+def _odd_view(measurements: BallMeasurements, runs: list[_Run]) -> str | None:
+    """Why a view cannot be of this ball: most of it fits no track of the others."""
+    names = measurements.names
+    rays, wrong = np.zeros(len(names)), np.zeros(len(names))
+    for run in runs:
+        if run.knots is not None and run.used is not None:
+            own = np.array([names.index(name) for name in run.names])[run.knots.view]
+            np.add.at(rays, own, 1)
+            np.add.at(wrong, own[~run.used], 1)
+    share = wrong / np.maximum(rays, 1)
+    worst = int(share.argmax())
+    if share[worst] <= _ODD or rays[worst] < FEWEST:
+        return None
+    return _contradiction(
+        f"{share[worst]:.0%} of those of {names[worst]} fit no ball of the others"
+    )
+
+
+def _late(measurements: BallMeasurements, runs: list[_Run]) -> FloatArray:
+    """Seconds to add to each view's times, nought but where the ball says it surely, shape (V,).
+
+    The times of most of them are those that count.
+    """
+    names = measurements.names
+    count = len(names)
+    known, pull, rays = np.zeros((count, count)), np.zeros(count), np.zeros(count)
+    for run in runs:
+        if run.fitted is None or run.knots is None:
+            continue
+        own = [names.index(name) for name in run.names]
+        known[np.ix_(own, own)] += run.fitted.late
+        pull[own] += run.fitted.late_pull
+        rays[own] += np.bincount(run.knots.view, minlength=len(own))
+    found = np.zeros(count)
+    free = np.delete(np.arange(count), rays.argmax())
+    if not len(free):
+        return found
+    told = known[np.ix_(free, free)] + np.eye(len(free)) / _LATE_S**2
+    spread = np.linalg.inv(told)
+    late = -spread @ pull[free]
+    sigma = np.sqrt(spread.diagonal())
+    sure = (sigma < _LATE_SIGMA_S) & (np.abs(late) > np.maximum(_LATE_SURE * sigma, _LATE_LEAST_S))
+    found[free[sure]] = np.clip(late[sure], -_LATE_S, _LATE_S)
+    if count < 3:
+        return found
+    # Where most views agree on an offset, it is the others that are off.
+    order = found.argsort()
+    middle = order[np.searchsorted(rays[order].cumsum(), rays.sum() / 2)]
+    result: FloatArray = found - found[middle]
+    return result
 
 
 def _contradiction(what: str) -> str:
@@ -243,6 +313,7 @@ def _joined(
     frames: IntArray,
     times: FloatArray,
     runs: list[_Run],
+    shift: FloatArray,
     pitch: Pitch,
     options: TrackOptions,
 ) -> BallTrack:
@@ -304,6 +375,11 @@ def _joined(
         contradicted=tuple(sorted(against, key=lambda one: one.measurement)),
         reason=None,
         left_out=summed(px, measurements.frames, frames) if options.leave_out else None,
+        offsets=tuple(
+            (name, float(late))
+            for name, late in zip(measurements.names, shift, strict=True)
+            if abs(late) > _LATE_LEAST_S / 2
+        ),
     )
 
 

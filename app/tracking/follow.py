@@ -162,7 +162,9 @@ class Follower:
             picture.number, picture.time, TRACKED, snapped.camera, snapped, seen, is_key=True
         )  # fmt: skip
         if snapped.reason is not None:
-            found = replace(found, outcome=BRIDGED, snapped=None, reason=snapped.reason)
+            reason = snapped.reason
+            found = replace(found, outcome=BRIDGED, camera=camera, snapped=None, reason=reason)
+            found = replace(found, covariance=covariance)
         return self._now(found)
 
     def step(

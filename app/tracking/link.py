@@ -6,66 +6,17 @@ every offset and speed is tried, the best are refined, and what the ball leaves 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from app.geometry.arrays import FloatArray, IntArray
-from app.tracking.ball_rays import LONGEST_GAP_S, BallRays, BoolArray, slopes_of
-from app.tracking.link_kernels import meeting_scores
+from app.tracking.ball_rays import BallRays
+from app.tracking.link_fit import FEWEST_PAIRS, Fit, Map, frame_seconds
+from app.tracking.link_reasons import judged
 from app.tracking.time_map import TimeMap, map_of_instants
 
-SLOWEST, FASTEST = 0.2, 1.15
-"""Speeds of replays that are looked for."""
-FEWEST_PAIRS, LEAST_OVERLAP_S = 20, 0.8
-"""Rays of the replay with a live one beside them, and live time between the first and the last."""
-
-_MOST_MISS_M = 0.6
-"""Median distance of rays beyond which they are not of one ball."""
-_LEAST_SHARE = 0.6
-"""Of the rays with a partner, those that meet it."""
-_LOUD, _LONG_S = 2.0, 3.0
-"""Misses that are so many times larger than the ball's own noise say something in so long an overlap
-only: a wrong map of a short and smooth path fits as well."""
-_CLEARLY = 8.0
-"""Natural logarithm of how many times less likely every other map has to be."""
-_USEFUL_S, _USEFUL_SHARE = 0.04, 0.05
-"""Sigma of the time in the middle of the overlap and of the speed beyond which a map is no use."""
-
-_GRID_S, _COARSE_S = 0.02, 0.04
-"""Between live rays that are looked up, and between offsets that are tried."""
-_MOST_TRIED = 120
-"""Rays of the replay in the search."""
-_SEARCH_M = 0.35
-"""How far rays of nearly the same instant are apart."""
-_BACKGROUND_M = 16.0
-"""Range over which rays of different instants miss each other."""
-_WRONG = float(np.log(0.1))
-"""Logarithm of the share of rays that are of something else."""
-_FREEDOM = 4.0
-"""Of the t distribution of misses: gross errors pull little."""
-_BEND = 25.0
-"""Acceleration of a ball, m/s2: how far it leaves the straight way between two rays."""
-_CANDIDATES = 8
-_APART_S = 0.25
-"""Maps whose times nowhere differ by more are one candidate."""
-_FLOORS_M = (0.3, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, *(0.0,) * 12)
-"""What misses may have beside their noise, step by step of a refinement."""
-_SHIFTS_S = (-1.2, -0.5, -0.2, 0.2, 0.5, 1.2)
-_STRETCHES = (0.7, 0.87, 1.15, 1.4)
-"""Other maps that the ball has to exclude, with the other number as it then fits best."""
-_BLOCK_S = 0.4
-"""Stretches of live time whose misses are taken for independent."""
-_PRIOR_BLOCKS = 4
-"""Such stretches that are believed to have been seen, as noisy as the rays say."""
-_RESTS_M = 1.0
-"""Way of a ball that hardly moves."""
-_ROOM = np.array([(-67.5, 67.5), (-49.0, 49.0), (-45.0, 1.5)])
-"""Where a ball can be, pitch frame (z down), metres."""
-_NEAR_HINT_S = 0.3
-"""How far a map may be from an instant that a person gives."""
 _CHANGE = 15.0
 """Natural logarithm of how many times likelier a change of the map makes the rays."""
 _CHANGE_S, _CHANGE_SHARE = 0.04, 0.05
@@ -84,7 +35,7 @@ def find_time_map(
             a frame. Two say a map where the ball says none.
     """
     given = np.array(hints, dtype=float).reshape(-1, 2)
-    made = _from_ball(live, replay, given)
+    made = map_of_ball(live, replay, given)
     if made.pieces:
         return made
     if made.reason is not None and len(given) > 1 and np.ptp(given[:, 1]) > 0:
@@ -92,15 +43,15 @@ def find_time_map(
     return made
 
 
-def _from_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool = True) -> TimeMap:
-    """The map that the ball says; with its pieces where a ``whole`` replay has several."""
+def map_of_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool = True) -> TimeMap:
+    """The map that the ball says, near the hints, shape (N, 2); with its pieces where a ``whole`` replay has several."""
     for name, rays in (("live", live), ("replay", replay)):
         if len(rays) < FEWEST_PAIRS:
             reason = (
                 f"The {name} view has {len(rays)} rays of the ball; a link needs {FEWEST_PAIRS}."
             )
             return TimeMap(reason)
-    fit = _Fit(live, replay, hints)
+    fit = Fit(live, replay, hints)
     tried = [fit.refined(one) for one in fit.candidates()]
     found = [one for one in tried if one is not None]
     if not found:
@@ -108,430 +59,38 @@ def _from_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool 
         reason = f"The rays of live and replay meet nowhere{where} for as long as a link needs."
         return TimeMap(reason)
     best = max(found, key=fit.evidence)
-    made = fit.judged(best, found)
+    made = judged(fit, best, found)
     return _in_pieces(fit, made, best, found) if whole else made
+
+
+def ray_misses(live: BallRays, replay: BallRays, made: TimeMap) -> tuple[FloatArray, FloatArray]:
+    """Times of the rays of a replay that have live ones beside them under a map, and how far they miss, metres."""
+    times, misses = [np.zeros(0)], [np.zeros(0)]
+    for piece in made.pieces or (made,):
+        assert piece.offset is not None and piece.speed is not None
+        inside = (replay.times >= piece.first) & (replay.times <= piece.last)
+        part = replay.part(np.flatnonzero(inside))
+        if len(part):
+            fit = Fit(live, part, np.zeros((0, 2)))
+            pairs = fit.pairs(Map(piece.offset, piece.speed, 0.0))
+            times.append(part.times[pairs.replay])
+            misses.append(np.abs(pairs.miss))
+    return np.concatenate(times), np.concatenate(misses)
 
 
 def _by_hand(live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
     """The map of a person's instants alone."""
-    made = map_of_instants(hints, _frame_s(live))
+    made = map_of_instants(hints, frame_seconds(live))
     if made.reason is not None or min(len(live), len(replay)) < 2:
         return made
     assert made.offset is not None and made.speed is not None
-    pairs = _Fit(live, replay, hints).pairs(_Map(made.offset, made.speed, 0.0))
+    pairs = Fit(live, replay, hints).pairs(Map(made.offset, made.speed, 0.0))
     count = len(pairs.miss)
     miss = float(np.median(np.abs(pairs.miss))) if count else None
     return replace(made, miss=miss, pairs=count)
 
 
-def _frame_s(rays: BallRays) -> float:
-    return float(np.median(np.diff(rays.times))) if len(rays) > 1 else 0.04
-
-
-@dataclass(frozen=True)
-class _Map:
-    """A map by the live time ``at`` of the replay's time ``middle``, and its speed."""
-
-    at: float
-    speed: float
-    middle: float
-
-    def live(self, times: FloatArray) -> FloatArray:
-        """Live times of replay times."""
-        return self.at + self.speed * (times - self.middle)
-
-    @property
-    def offset(self) -> float:
-        """Live time of the replay's time 0."""
-        return self.at - self.speed * self.middle
-
-
-@dataclass(frozen=True)
-class _Pairs:
-    """Rays of the replay with the live rays of their times under a map.
-
-    Attributes:
-        replay: Numbers of the replay's rays, shape (M,).
-        live: Numbers of the live rays before them, shape (M,).
-        share: Of the way from there to the next live ray, shape (M,).
-        gap: Seconds of that way, shape (M,).
-        miss: Signed distances of the rays, metres, shape (M,).
-        reach_live, reach_replay: Metres along the rays to where they are nearest, shape (M,).
-        inside: Whether that is before both cameras and where a ball can be, shape (M,).
-        normal: Directions of the misses, shape (M, 3).
-    """
-
-    replay: IntArray
-    live: IntArray
-    share: FloatArray
-    gap: FloatArray
-    miss: FloatArray
-    reach_live: FloatArray
-    reach_replay: FloatArray
-    inside: BoolArray
-    normal: FloatArray
-
-
-def _nearest(
-    live_at: FloatArray, live_way: FloatArray, replay_at: FloatArray, replay_way: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray, FloatArray]:
-    """Misses of rays of unit length, reaches along both, whether a ball can be there, and normals.
-
-    Source: Ericson, Real-Time Collision Detection, sec. 5.1.8 (nearest points of two lines).
-    """
-    normal = np.cross(live_way, replay_way)
-    square = np.maximum((normal * normal).sum(axis=1), 1e-12)
-    between = live_at - replay_at
-    cosine = (live_way * replay_way).sum(axis=1)
-    along_live = (live_way * between).sum(axis=1)
-    along_replay = (replay_way * between).sum(axis=1)
-    reach_live = (cosine * along_replay - along_live) / square
-    reach_replay = (along_replay - cosine * along_live) / square
-    normal = normal / np.sqrt(square)[:, None]
-    miss = (between * normal).sum(axis=1)
-    place = live_at + reach_live[:, None] * live_way
-    inside = (reach_live > 1) & (reach_replay > 1)
-    inside &= ((place > _ROOM[:, 0]) & (place < _ROOM[:, 1])).all(axis=1)
-    return miss, reach_live, reach_replay, inside, normal
-
-
-def _between(
-    rays: BallRays, before: IntArray, times: FloatArray
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Positions and directions on the way from a ray to the next, and whether that is near enough."""
-    gap = rays.times[before + 1] - rays.times[before]
-    share = (times - rays.times[before]) / gap
-    known = (gap <= LONGEST_GAP_S) & (share >= 0) & (share <= 1)
-    share = share[:, None]
-    positions = (1 - share) * rays.positions[before] + share * rays.positions[before + 1]
-    directions = (1 - share) * rays.directions[before] + share * rays.directions[before + 1]
-    return positions, directions / np.linalg.norm(directions, axis=1, keepdims=True), known
-
-
-class _Fit:
-    """Maps between two views, compared at the noise that their rays have."""
-
-    def __init__(self, live: BallRays, replay: BallRays, hints: FloatArray):
-        self.live, self.replay, self.hints = live, replay, hints
-        self.middle = float(replay.times[0] + replay.times[-1]) / 2
-        self.span = float(replay.times[-1] - replay.times[0])
-        self.hint_sigma = _frame_s(live)
-        self.slopes = slopes_of(live)
-        """Velocities of the live cameras, of the live rays, and the variance of the latter."""
-        self.noise = 1.0
-        """Misses by those that the noise of the rays leaves."""
-        self.run = 1.0
-        """Neighbours that say the same, beyond those that share a ray."""
-
-    def apart(self, a: _Map, b: _Map) -> float:
-        """Most seconds between the live times that two maps give the replay."""
-        ends = self.replay.times[[0, -1]]
-        return float(np.abs(a.live(ends) - b.live(ends)).max())
-
-    def candidates(self) -> list[_Map]:
-        """Maps under which most rays meet, best first: every offset with every speed."""
-        live, replay = self.live, self.replay
-        some = np.unique(np.linspace(0, len(replay) - 1, _MOST_TRIED).astype(int))
-        begin, end = live.times[0], live.times[-1]
-        grid = np.arange(begin, end + _GRID_S, _GRID_S)
-        before = np.clip(np.searchsorted(live.times, grid) - 1, 0, len(live) - 2)
-        positions, directions, known = _between(live, before, grid)
-        seen = np.hstack([positions, directions])
-        rays = np.hstack([replay.positions[some], replay.directions[some]])
-        sigma_live = float(np.median(live.sigma))
-        step = 0.1 / max(min(self.span, 2 * (end - begin) / SLOWEST), 1.0)
-        scores, maps = [np.zeros(0)], [np.zeros((0, 2))]
-        for speed in np.arange(SLOWEST, FASTEST, step):
-            shifts = speed * (replay.times[some] - self.middle) / _GRID_S
-            first = int(np.floor((LEAST_OVERLAP_S - speed * self.span / 2) / _GRID_S))
-            centres = np.arange(first, len(grid) - first, round(_COARSE_S / _GRID_S))
-            centres = centres[self._near_hints(begin + _GRID_S * centres, float(speed))]
-            scores.append(
-                meeting_scores(
-                    centres, shifts, seen, known, sigma_live, rays, replay.sigma[some], _ROOM,
-                    _SEARCH_M**2, _BACKGROUND_M, float(np.exp(_WRONG)),
-                )
-            )  # fmt: skip
-            maps.append(np.column_stack([begin + _GRID_S * centres, np.full(len(centres), speed)]))
-        score, table = np.concatenate(scores), np.vstack(maps)
-        chosen: list[_Map] = []
-        for row in np.argsort(-score, kind="stable"):
-            if len(chosen) == _CANDIDATES or score[row] <= 0:
-                break
-            one = _Map(float(table[row, 0]), float(table[row, 1]), self.middle)
-            if all(self.apart(one, other) > _APART_S for other in chosen):
-                chosen.append(one)
-        return chosen
-
-    def _near_hints(self, at: FloatArray, speed: float) -> BoolArray:
-        seen = at[:, None] + speed * (self.hints[:, 1] - self.middle)
-        off = np.abs(seen - self.hints[:, 0]).max(axis=1, initial=0.0)
-        near: BoolArray = off <= _NEAR_HINT_S
-        return near
-
-    def pairs(self, one: _Map) -> _Pairs:
-        """The rays that have a partner under a map."""
-        live, replay = self.live, self.replay
-        times = one.live(replay.times)
-        before = np.clip(np.searchsorted(live.times, times) - 1, 0, len(live) - 2)
-        positions, directions, known = _between(live, before, times)
-        rays = np.flatnonzero(known)
-        before = before[rays]
-        gap = live.times[before + 1] - live.times[before]
-        share = (times[rays] - live.times[before]) / gap
-        miss, reach_live, reach_replay, inside, normal = _nearest(
-            positions[rays], directions[rays], replay.positions[rays], replay.directions[rays]
-        )
-        return _Pairs(rays, before, share, gap, miss, reach_live, reach_replay, inside, normal)
-
-    def _parts(self, pairs: _Pairs) -> tuple[FloatArray, FloatArray]:
-        """Deviations of the misses: of each alone, shape (M,), and by its two live rays, (M, 2)."""
-        own = pairs.reach_replay * self.replay.sigma[pairs.replay]
-        # All rays of the replay between the same two live ones are bent the same way.
-        alike = np.sqrt(np.bincount(pairs.live, minlength=len(self.live))[pairs.live])
-        bend = _BEND / 2 * pairs.share * (1 - pairs.share) * pairs.gap**2 * alike
-        sigma = self.live.sigma
-        shared = np.column_stack(
-            [(1 - pairs.share) * sigma[pairs.live], pairs.share * sigma[pairs.live + 1]]
-        )
-        return np.hypot(own, bend), shared * pairs.reach_live[:, None]
-
-    def _sigma(self, pairs: _Pairs) -> FloatArray:
-        """Deviation of each miss, metres, shape (M,)."""
-        own, shared = self._parts(pairs)
-        sigma: FloatArray = self.noise * np.sqrt(own**2 + (shared**2).sum(axis=1))
-        return sigma
-
-    def _jacobian(self, pairs: _Pairs) -> FloatArray:
-        """Derivatives of the misses by the map's time and speed, shape (M, 2)."""
-        at, way, _ = self.slopes
-        share = pairs.share[:, None]
-        moved = (1 - share) * at[pairs.live] + share * at[pairs.live + 1]
-        turned = (1 - share) * way[pairs.live] + share * way[pairs.live + 1]
-        slope = ((moved + pairs.reach_live[:, None] * turned) * pairs.normal).sum(axis=1)
-        return np.column_stack([slope, slope * (self.replay.times[pairs.replay] - self.middle)])
-
-    def refined(self, one: _Map, hold: int | None = None) -> _Map | None:
-        """The map nearby that fits best, or None; ``hold`` keeps its time (0) or its speed (1)."""
-        free = [at for at in (0, 1) if at != hold]
-        at = np.array([one.at, one.speed])
-        most = np.array([0.1, 0.2 / max(self.span, 1.0)])[free]
-        hinted = np.column_stack([np.ones(len(self.hints)), self.hints[:, 1] - self.middle])
-        for floor in _FLOORS_M:
-            pairs = self.pairs(replace(one, at=float(at[0]), speed=float(at[1])))
-            if len(pairs.miss) < FEWEST_PAIRS:
-                return None
-            pulled = self._weigh(pairs, floor)(jacobian := self._jacobian(pairs))
-            normal, pull = jacobian.T @ pulled, pulled.T @ pairs.miss
-            normal += hinted.T @ hinted / self.hint_sigma**2
-            pull += hinted.T @ (hinted @ at - self.hints[:, 0]) / self.hint_sigma**2
-            step = -np.linalg.pinv(normal[np.ix_(free, free)], hermitian=True) @ pull[free]
-            step *= min(1.0, float((most / np.maximum(np.abs(step), 1e-12)).min()))
-            at[free] += step
-            if not 0.8 * SLOWEST <= at[1] <= 1.2 * FASTEST:
-                return None
-            if floor == 0.0 and np.abs(step / most).max() < 1e-4:
-                break
-        return replace(one, at=float(at[0]), speed=float(at[1]))
-
-    def _weigh(self, pairs: _Pairs, floor: float = 0.0) -> Callable[[FloatArray], FloatArray]:
-        """The inverse covariance of the misses, gross errors doubted, as a function of columns.
-
-        Two rays of the replay between the same live rays share those rays' noise: the covariance
-        is D + S S^T with two entries in a row of S, and its inverse by Woodbury's identity asks
-        for a tridiagonal system alone.
-        """
-        own, shared = self._parts(pairs)
-        own, shared = self.noise * own, self.noise * shared
-        total = own**2 + (shared**2).sum(axis=1) + floor**2
-        weight = (_FREEDOM + 1) / (_FREEDOM + pairs.miss**2 / total)
-        weight = np.where(pairs.inside, weight, 1e-3)
-        diagonal = np.maximum((own**2 + floor**2) / weight, 1e-6)
-        parts = shared / np.sqrt(weight)[:, None]
-        band = np.zeros((2, len(self.live)))
-        band[1] = 1.0
-        np.add.at(band[1], pairs.live, parts[:, 0] ** 2 / diagonal)
-        np.add.at(band[1], pairs.live + 1, parts[:, 1] ** 2 / diagonal)
-        np.add.at(band[0], pairs.live + 1, parts[:, 0] * parts[:, 1] / diagonal)
-
-        def weigh(columns: FloatArray) -> FloatArray:
-            scaled = columns / diagonal[:, None]
-            held = np.zeros((len(self.live), columns.shape[1]))
-            np.add.at(held, pairs.live, parts[:, :1] * scaled)
-            np.add.at(held, pairs.live + 1, parts[:, 1:] * scaled)
-            held = solveh_banded(band, held)
-            back = parts[:, :1] * held[pairs.live] + parts[:, 1:] * held[pairs.live + 1]
-            result: FloatArray = scaled - back / diagonal[:, None]
-            return result
-
-        return weigh
-
-    def likelihoods(self, one: _Map) -> FloatArray:
-        """Logarithm of how much likelier each ray's miss is under a map than by chance, (N,).
-
-        0 where a ray has no partner.
-        """
-        pairs = self.pairs(one)
-        sigma = self._sigma(pairs)
-        # The density of the t distribution with four degrees of freedom.
-        ratio = np.log(0.375 * _BACKGROUND_M / sigma) - 2.5 * np.log1p(
-            (pairs.miss / sigma) ** 2 / _FREEDOM
-        )
-        ratio = np.where(pairs.inside, np.maximum(ratio, _WRONG), _WRONG)
-        # Rays of the replay between the same two live ones say nearly the same.
-        count = np.bincount(pairs.live, minlength=len(self.live))
-        result = np.zeros(len(self.replay))
-        result[pairs.replay] = ratio / count[pairs.live] / self.run
-        return result
-
-    def meant(self, one: _Map, rows: IntArray) -> bool:
-        """Whether so many of some rays have partners under a map that they could be linked."""
-        times = self.replay.times[np.intersect1d(rows, self.pairs(one).replay)]
-        if len(times) < FEWEST_PAIRS:
-            return False
-        return one.speed * float(np.ptp(times)) >= LEAST_OVERLAP_S / 2
-
-    def evidence(self, one: _Map) -> float:
-        """The same of all rays, and of a person's instants."""
-        off = (one.live(self.hints[:, 1]) - self.hints[:, 0]) / self.hint_sigma
-        return float(self.likelihoods(one).sum() - (off**2).sum() / 2)
-
-    def _as_good(self, other: _Map, best: _Map) -> bool:
-        """Whether another map explains the rays as well, or most of them: those with partners."""
-        if self.evidence(other) > self.evidence(best) - _CLEARLY:
-            return True
-        mine, others = self.likelihoods(best), self.likelihoods(other)
-        both = (mine != 0) & (others != 0)
-        if both.sum() < _LEAST_SHARE * (mine != 0).sum():
-            return False
-        of_hints = self.evidence(other) - others.sum() - (self.evidence(best) - mine.sum())
-        return bool(others[both].sum() + of_hints > mine[both].sum() - _CLEARLY)
-
-    def set_noise(self, one: _Map) -> None:
-        """Take the noise from the misses under a map."""
-        pairs = self.pairs(one)
-        if pairs.inside.sum() >= FEWEST_PAIRS // 2:
-            ratio = np.abs(pairs.miss / self._sigma(pairs))[pairs.inside]
-            self.noise = max(self.noise * float(np.median(ratio)) / 0.6745, 1.0)
-
-    def judged(self, best: _Map, found: Sequence[_Map]) -> TimeMap:
-        """What can be said of the best map among others."""
-        for _ in range(3):
-            self.set_noise(best)
-            best = self.refined(best) or best
-        pairs = self.pairs(best)
-        made = self.described(best, pairs)
-        reason = self._why_not(made, pairs) or self._why_open(best, found, pairs)
-        return replace(made, reason=reason or self._why_no_use(made, pairs))
-
-    def described(self, one: _Map, pairs: _Pairs) -> TimeMap:
-        """A map with its covariance, wider where neighbouring misses hang together."""
-        jacobian, weigh = self._jacobian(pairs), self._weigh(pairs)
-        hinted = np.column_stack([np.ones(len(self.hints)), self.hints[:, 1] - self.middle])
-        held = hinted.T @ hinted / self.hint_sigma**2
-        normal = jacobian.T @ weigh(jacobian) + held
-        # Noise of the slopes looks like motion that tells the time; it tells nothing.
-        noise = self.noise * pairs.reach_live * np.sqrt(self.slopes[2][pairs.live])
-        lever = np.column_stack([noise, noise * (self.replay.times[pairs.replay] - self.middle)])
-        told = normal - lever.T @ (lever * np.maximum(weigh(np.ones((len(noise), 1))), 0.0))
-        known = np.linalg.pinv(told, hermitian=True)
-        known = known @ normal @ known
-        pulls = jacobian * weigh(pairs.miss[:, None])
-        times = self.live.times[pairs.live]
-        block = np.floor((times - times[0]) / _BLOCK_S).astype(int)
-        sums = np.column_stack([np.bincount(block, pulls[:, at]) for at in (0, 1)])
-        blocks = len(np.unique(block))
-        # The two numbers of the map fit two of the blocks.
-        run = float(((sums @ known) * sums).sum()) / 2 * blocks / max(blocks - 2, 1)
-        self.run = max(1.0, (run * blocks + _PRIOR_BLOCKS) / (blocks + _PRIOR_BLOCKS))
-        turn = np.array([[1.0, -self.middle], [0.0, 1.0]])
-        rays = self.replay.times[pairs.replay]
-        return TimeMap(
-            None,
-            one.offset,
-            one.speed,
-            self.run * (turn @ known @ turn.T),
-            float(np.median(np.abs(pairs.miss))),
-            len(rays),
-            float(one.speed * (rays[-1] - rays[0])),
-            first=float(self.replay.times[0]),
-            last=float(self.replay.times[-1]),
-        )
-
-    def _why_not(self, made: TimeMap, pairs: _Pairs) -> str | None:
-        """Why the rays do not meet under a map; None where they do."""
-        assert made.miss is not None
-        if made.overlap < LEAST_OVERLAP_S:
-            return (
-                f"Live and replay share {made.overlap:.1f} s of the ball; a link needs "
-                f"{LEAST_OVERLAP_S} s."
-            )
-        loud = self.noise > _LOUD and made.overlap < _LONG_S
-        if made.miss > _MOST_MISS_M or loud:
-            return (
-                f"The rays of live and replay miss each other by {made.miss:.2f} m at best, "
-                f"{self.noise:.1f} times their noise: the cameras are exchanged, mirrored or not exact "
-                "enough, or the replay is of another action."
-            )
-        meets = pairs.inside & (np.abs(pairs.miss) < 4 * self._sigma(pairs))
-        if meets.mean() < _LEAST_SHARE:
-            return (
-                f"{meets.mean():.0%} of the replay's rays meet the live ones where a ball can be; a "
-                f"link needs {_LEAST_SHARE:.0%}: the cameras are exchanged or mirrored, or the "
-                "replay is of another action."
-            )
-        off = np.abs(
-            (made.offset or 0.0) + (made.speed or 0.0) * self.hints[:, 1] - self.hints[:, 0]
-        )
-        if (off > 4 * self.hint_sigma).any():
-            live, replay = self.hints[int(off.argmax())]
-            return (
-                f"The ball contradicts the link {live:g}={replay:g} by {off.max():.2f} s: correct "
-                "it, or leave it out."
-            )
-        return None
-
-    def _why_open(self, best: _Map, found: Sequence[_Map], pairs: _Pairs) -> str | None:
-        """Why the ball cannot tell a map from others; None where it can."""
-        shifted = [(replace(best, at=best.at + shift), 0) for shift in _SHIFTS_S]
-        stretched = [(replace(best, speed=best.speed * factor), 1) for factor in _STRETCHES]
-        for start, hold in [*((one, None) for one in found), *shifted, *stretched]:
-            other = self.refined(start, hold)
-            if other is None or self.apart(best, other) < _APART_S / 2:
-                continue
-            if not self._as_good(other, best):
-                continue
-            fits = f"an offset of {other.offset:.2f} s and a speed of {other.speed:.2f} fit as well"
-            if _way(self.live, pairs) < _RESTS_M:
-                return f"The ball hardly moves: {fits}."
-            return (
-                f"The ball does not tell the times: {fits}. It moves too little, or in a plane with "
-                "both cameras."
-            )
-        return None
-
-    def _why_no_use(self, made: TimeMap, pairs: _Pairs) -> str | None:
-        """Why a map is too uncertain to be used; None where it is not."""
-        assert made.covariance is not None and made.speed is not None
-        middle = np.array([1.0, float(np.median(self.replay.times[pairs.replay]))])
-        time, speed = np.sqrt(middle @ made.covariance @ middle), np.sqrt(made.covariance[1, 1])
-        if time <= _USEFUL_S and speed <= _USEFUL_SHARE * made.speed:
-            return None
-        return (
-            f"The ball tells the times with a sigma of {time:.3f} s and the speed with {speed:.3f} "
-            "only: it moves too little, or in a plane with both cameras."
-        )
-
-
-def _way(live: BallRays, pairs: _Pairs) -> float:
-    """How far a ball comes about, metres."""
-    reach = pairs.reach_live[:, None] * live.directions[pairs.live]
-    place = (live.positions[pairs.live] + reach)[pairs.inside]
-    low, high = np.percentile(place, (5, 95), axis=0) if len(place) else np.zeros((2, 3))
-    return float(np.linalg.norm(high - low))
-
-
-def _in_pieces(fit: _Fit, made: TimeMap, best: _Map, found: Sequence[_Map]) -> TimeMap:
+def _in_pieces(fit: Fit, made: TimeMap, best: Map, found: Sequence[Map]) -> TimeMap:
     """What became of a link, refused where one map does not fit the whole replay.
 
     Every ray is given one of the maps that were found, or none, changes being dear (Viterbi); the
@@ -542,7 +101,7 @@ def _in_pieces(fit: _Fit, made: TimeMap, best: _Map, found: Sequence[_Map]) -> T
     fit.run = 1.0
     maps = [best, *found]
     for rows in np.array_split(np.arange(len(replay)), 3):
-        near = _Fit(live, replay.part(rows), fit.hints[:0])
+        near = Fit(live, replay.part(rows), fit.hints[:0])
         at = float(best.live(np.array(near.middle)))
         one = near.refined(replace(best, at=at, middle=near.middle))
         if one is not None:
@@ -551,12 +110,12 @@ def _in_pieces(fit: _Fit, made: TimeMap, best: _Map, found: Sequence[_Map]) -> T
             maps.append(one)
     left = [rows for rows in _stretches(fit, [best], none=True) if fit.meant(best, rows)]
     for rows in left:
-        near = _Fit(live, replay.part(rows), fit.hints[:0])
+        near = Fit(live, replay.part(rows), fit.hints[:0])
         maps += [one for one in map(near.refined, near.candidates()) if one is not None]
     parts = [replay.part(rows) for rows in _stretches(fit, maps)]
     pieces: list[TimeMap] = []
     for part in parts if len(parts) > 1 else ():
-        piece = _from_ball(live, part, fit.hints[:0], whole=False)
+        piece = map_of_ball(live, part, fit.hints[:0], whole=False)
         if piece.reason is None and (not pieces or _differ(pieces[-1], piece)):
             pieces.append(piece)
     if len(pieces) > 1:
@@ -573,7 +132,7 @@ def _in_pieces(fit: _Fit, made: TimeMap, best: _Map, found: Sequence[_Map]) -> T
     return made
 
 
-def _stretches(fit: _Fit, maps: Sequence[_Map], none: bool = False) -> list[IntArray]:
+def _stretches(fit: Fit, maps: Sequence[Map], none: bool = False) -> list[IntArray]:
     """Rays of the replay that follow each other and fit one map best; or with ``none`` no map."""
     gains = np.array([np.zeros(len(fit.replay)), *(fit.likelihoods(one) for one in maps)])
     ways = _cheapest(gains, _CHANGE)

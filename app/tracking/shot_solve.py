@@ -54,6 +54,8 @@ KAPPA_DEVIATION, KAPPA_SLOPE_SIGMA = 0.002, 0.03
 """Of the distortion from what the zoom says, and of its slope by the logarithm of the focal length."""
 FLOW_PX, FLOW_PLACES = 0.3, 4.0
 """Of what the background says of a turn, pixels at 960 wide, at so many places."""
+UNTIED_SIGMA = 1.0
+"""Of a step of a frame that nothing else says anything of, radians."""
 ROUNDS, SETTLED_PX = 8, 0.02
 LEAST_FRAMES = 3
 SCALE = np.array([1e-3, 1e-3, 1e-3, 1.0, 1.0, 1.0, 1e-3, 1e-3])
@@ -130,6 +132,12 @@ class _Shot:
         self.parameters[:, PAN] = np.unwrap(self.parameters[:, PAN])
         self._problem = PaintProblem.of(ResectionProblem.of(size, policy), self.parameters[0], None)
         self._sights = [self._sight(frame) for frame in frames]
+        # Without paint an annotated frame is where its lines say.
+        self._given = {
+            place: (self.parameters[place].copy(), np.linalg.inv(frame.covariance))
+            for place, frame in enumerate(frames)
+            if frame.snapped is None and frame.covariance is not None
+        }
         self._turns = [
             None
             if after != before + 1 or matches[after] is None
@@ -257,6 +265,11 @@ class _Shot:
         weight = MAIN_SIGMA[0] ** -2.0 / len(self.parameters)
         equations.diagonal[:, ROLL, ROLL] += weight
         equations.right[:, ROLL] -= weight * self.parameters[:, ROLL]
+        for place, (given, known) in self._given.items():
+            equations.diagonal[place] += known
+            equations.right[place] += known @ (given - self.parameters[place])
+        # A frame that neither paint nor background ties stays where it is.
+        equations.diagonal[:, AIM, AIM] += UNTIED_SIGMA**-2.0
 
     def descend(self) -> None:
         """Gauss-Newton steps until no paint moves any more."""

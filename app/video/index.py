@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import cached_property
 from io import BytesIO
 from math import lcm
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +47,7 @@ class RecordingFacts:
         time_base: Seconds of one tick of ``RecordingIndex.pts``, numerator and denominator.
         has_seek_table: Whether the container says where key frames are.
         decoder: What decoded it; another one may return other frames.
+        damaged: Pictures that cannot be decoded; they are no frames, and have no number.
     """
 
     sha256: str
@@ -58,6 +62,7 @@ class RecordingFacts:
     time_base: tuple[int, int]
     has_seek_table: bool
     decoder: str
+    damaged: int = 0
 
 
 @dataclass(frozen=True)
@@ -188,21 +193,45 @@ def index_from_bytes(data: bytes, name: str = "the index") -> RecordingIndex:
     Raises:
         InputError: They are no index, or one of another version.
     """
-    try:
-        with np.load(BytesIO(data), allow_pickle=False) as arrays:
-            head = json.loads(arrays["head"].tobytes())
-            pts: npt.NDArray[Any] = arrays["pts"]
-            keys: npt.NDArray[Any] = arrays["keys"]
-            rows: npt.NDArray[Any] = arrays["measured"]
-        if head.pop("version") != VERSION:
-            raise InputError(f"{name} is an index of another version; make it again")
-        if not pts.dtype == keys.dtype == np.int64 or rows.shape != (len(pts), MEASURES.itemsize):
+    with _opened(BytesIO(data), name) as arrays:
+        rows: npt.NDArray[Any] = arrays["measured"]
+        if rows.shape != (len(arrays["pts"]), MEASURES.itemsize):
             raise ValueError("another shape")
-        for pair in ("pixel_aspect", "time_base"):
-            head[pair] = tuple(head[pair])
-        measured: Measured = np.ascontiguousarray(rows).reshape(-1).view(MEASURES)
-        return RecordingIndex(RecordingFacts(**head), pts, keys, measured)
+        return _index(arrays, name, np.ascontiguousarray(rows).reshape(-1).view(MEASURES))
+
+
+def read_index_seconds(path: Path) -> FloatArray:
+    """``RecordingIndex.seconds`` of an index in a file, of which the rest is checked and not kept in memory.
+
+    Raises:
+        InputError: It is no index, or one of another version.
+        OSError: It cannot be read.
+    """
+    with path.open("rb") as file, _opened(file, "the index") as arrays:
+        if arrays.zip.testzip() is not None:
+            raise ValueError("damaged")
+        return _index(arrays, "the index", np.empty(0, MEASURES)).seconds
+
+
+@contextmanager
+def _opened(file: BinaryIO, name: str) -> Iterator[Any]:
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            yield arrays
     except InputError:
         raise
     except Exception as error:
         raise InputError(f"{name} is no index of a recording, or damaged; make it again") from error
+
+
+def _index(arrays: Any, name: str, measured: Measured) -> RecordingIndex:
+    head = json.loads(arrays["head"].tobytes())
+    pts: npt.NDArray[Any] = arrays["pts"]
+    keys: npt.NDArray[Any] = arrays["keys"]
+    if head.pop("version") != VERSION:
+        raise InputError(f"{name} is an index of another version; make it again")
+    if not pts.dtype == keys.dtype == np.int64:
+        raise ValueError("another shape")
+    for pair in ("pixel_aspect", "time_base"):
+        head[pair] = tuple(head[pair])
+    return RecordingIndex(RecordingFacts(**head), pts, keys, measured)

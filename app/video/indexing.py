@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import struct
 from collections.abc import Callable
+from contextlib import closing
 from math import gcd
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -16,7 +17,7 @@ from app.config import Settings
 from app.errors import ImageError, TooLargeError
 from app.geometry.arrays import FloatArray, IntArray
 from app.media.images import ImageHeader, check_size
-from app.media.video import MAX_FRAMES, open_video
+from app.media.video import MAX_FRAMES, FrameReader, open_video, skipped_to_next
 from app.video.index import RecordingFacts, RecordingIndex, time_base_of
 from app.video.measures import COMB_EVERY, COMB_SHARE, COMBED, FrameMeasurer, Rows, comb
 
@@ -25,6 +26,8 @@ _A_WORD = 100
 _BLOCK = 4 * 2**20
 _MOST_ASPECT = 8
 """Pixels wider or higher than that are a mistake of the container."""
+_BEFORE_END = 20
+"""Frames between the end of a file and a jump into it."""
 _LEAST_MOVING = 5
 """Frames that move, of those that are looked at for combs."""
 _MOVING = 3.0
@@ -70,7 +73,7 @@ def _index(
     """The index of a video of a content (sha256, bytes); without settings nothing is measured."""
     sha256, size = content
     rows, combs = Rows(), list[float]()
-    times, intra = list[float](), list[bool]()
+    times, intra, damaged = list[float](), list[bool](), 0
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
@@ -81,7 +84,8 @@ def _index(
         aspect = pixel_aspect(video, rotation)
         measurer = FrameMeasurer(video.get(cv2.CAP_PROP_FPS))
         total = int(video.get(cv2.CAP_PROP_FRAME_COUNT))
-        while video.grab():
+        while (skipped := skipped_to_next(video)) is not None:
+            damaged += skipped
             row, before = rows.add()
             if settings is not None:
                 done, picture = video.retrieve()
@@ -100,6 +104,7 @@ def _index(
     if not times:
         raise ImageError(f"{path.name} has no frame that can be decoded")
     shown = _repaired(np.array(times))
+    _require_same_behind_jump(path, shown)
     base, pts = time_base_of(shown)
     width, height = _square(coded, aspect)
     facts = RecordingFacts(
@@ -115,6 +120,7 @@ def _index(
         time_base=base,
         has_seek_table=_has_seek_table(path),
         decoder=f"OpenCV {cv2.__version__}",
+        damaged=damaged,
     )
     return RecordingIndex(facts, pts, _keys(shown, _key_times(path), np.array(intra)), rows.all())
 
@@ -187,6 +193,22 @@ def _repaired(times: FloatArray) -> FloatArray:
     if len(times) > 2 and times[-1] == 0 and times[-2] > 0:
         times[-1] = 2 * times[-2] - times[-3]
     return times
+
+
+def _require_same_behind_jump(path: Path, times: FloatArray) -> None:
+    """Raise where a jump leads to other frames: times of an AVI are counted, before damage and behind it
+    not alike."""
+    with path.open("rb") as file:
+        if file.read(4) != b"RIFF":
+            return
+    with closing(FrameReader(path, times)) as reader:
+        reader.read(max(len(times) - _BEFORE_END, 0))
+        follow = sum(reader.skip() for _ in range(2 * _BEFORE_END))
+    if follow != min(len(times), _BEFORE_END) - 1:
+        raise ImageError(
+            f"{path.name} is damaged: its own table of frames is not that of the frames in it",
+            hint="Repair it with a tool of your recorder, or write it anew as MP4 or MKV.",
+        )
 
 
 def _is_interlaced(combs: list[float]) -> bool | None:

@@ -37,7 +37,7 @@ class LookedAt:
     proposed: bool
 
 
-def frames_to_look_at(first: int, last: int, seconds: float) -> list[int]:
+def frames_that_tell_kind(first: int, last: int, seconds: float) -> list[int]:
     """Numbers of the frames of a shot that tell its kind."""
     places = LOOKED_AT if seconds >= SHORT_SECONDS else (0.5,)
     return sorted({first + round(place * (last - first)) for place in places})

@@ -17,7 +17,7 @@ from app.video.cuts import hard_cuts
 from app.video.frames import Image, RecordingReader
 from app.video.index import RecordingIndex
 from app.video.indexing import index_recording
-from app.video.kinds import LookedAt, ShotKind, frames_to_look_at, kind_of, look_at
+from app.video.kinds import LookedAt, ShotKind, frames_that_tell_kind, kind_of, look_at
 from app.video.repeats import Freeze, blended, freezes, repeated
 from app.video.replays import between_logos, logo_clusters
 from app.video.transitions import Transition, soft_transitions
@@ -98,7 +98,7 @@ def find_shots(
     logos = {one.last + 1: cluster for one, cluster in zip(wipes, clusters, strict=True)}
     kinds: list[ShotKind] = []
     for done, shot in enumerate(shots):
-        numbers = frames_to_look_at(shot.first, shot.last, shot.end_s - shot.start_s)
+        numbers = frames_that_tell_kind(shot.first, shot.last, shot.end_s - shot.start_s)
         kinds.append("other" if look is None else kind_of(look(numbers)))
         if progress is not None:
             progress(done + 1, len(shots), "Looking at shots.")

@@ -19,6 +19,7 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  * @property {number | null} width
  * @property {number | null} height
  * @property {boolean | null} interlaced
+ * @property {number | null} damaged pictures that cannot be decoded, and are left out
  * @property {number} shots
  * @property {number} groups
  * @property {string | null} problem
@@ -71,7 +72,69 @@ export function findShots(id) {
 	return request(`/recordings/${id}/shots`, { method: 'POST', key: idempotencyKey() });
 }
 
-/** @param {number} id @param {number[]} frames @param {boolean} propose whether cameras are proposed afterwards @returns {Promise<JobJson>} */
-export function postInstants(id, frames, propose) {
-	return request(`/recordings/${id}/groups`, { method: 'POST', body: { frames, propose }, key: idempotencyKey() });
+/** @param {number} id @param {number[]} frames @param {{propose: boolean, linked: boolean}} options whether cameras are proposed afterwards, and whether linked replays give views @returns {Promise<JobJson>} */
+export function postInstants(id, frames, options) {
+	return request(`/recordings/${id}/groups`, { method: 'POST', body: { frames, ...options }, key: idempotencyKey() });
+}
+
+/** @typedef {{recording: number, name: string, first: number, last: number}} LinkedShot */
+/** @typedef {{live: number, replay: number}} InstantPair */
+/** @typedef {InstantPair & {residual: number | null}} LinkedInstant   `residual`: live frames */
+/** @typedef {{first: number, last: number, first_s: number, last_s: number, offset_s: number, speed: number, speed_sigma: number}} LinkPiece */
+/**
+ * @typedef {object} LinkMap
+ * @property {'none' | 'offset' | 'linked' | 'unobservable'} outcome
+ * @property {'instants' | 'ball' | null} found_by
+ * @property {string | null} reason
+ * @property {number | null} speed
+ * @property {number | null} speed_sigma
+ * @property {number | null} sigma_s
+ * @property {number | null} miss_m
+ * @property {LinkPiece[]} pieces
+ * @property {{frame: number, miss_m: number}[]} misses
+ * @property {string | null} ball_reason
+ */
+/** @typedef {{id: number, live: LinkedShot, replay: LinkedShot, instants: LinkedInstant[], assumed_speed: number | null, map: LinkMap, etag: string}} LinkJson */
+/** @typedef {{first: number, replay: (number | null)[], off_s: (number | null)[], repeated: number[], blended: number[]}} LinkedFrames */
+/** @typedef {LinkedShot & {why: string, link: number | null}} LiveSuggestion */
+
+/** @param {number} id @param {AbortSignal} [signal] @returns {Promise<{items: LinkJson[]}>} */
+export function getLinks(id, signal) {
+	return request(`/recordings/${id}/links`, { signal });
+}
+
+/** Live shots that the replay at a frame may show. @param {number} id @param {number} frame @param {AbortSignal} [signal] @returns {Promise<{items: LiveSuggestion[]}>} */
+export function getLiveSuggestions(id, frame, signal) {
+	return request(`/recordings/${id}/links/suggestions/${frame}`, { signal });
+}
+
+/** @param {number} id of the recording of the live shot @param {{live: {first: number, last: number}, replay: {recording: number, first: number, last: number}}} body @returns {Promise<LinkJson>} */
+export function postLink(id, body) {
+	return request(`/recordings/${id}/links`, { method: 'POST', body, key: idempotencyKey() });
+}
+
+/** @param {number} id @param {number} link @param {AbortSignal} [signal] @returns {Promise<LinkJson>} */
+export function getLink(id, link, signal) {
+	return request(`/recordings/${id}/links/${link}`, { signal });
+}
+
+/** @param {number} id @param {number} link @param {AbortSignal} [signal] @returns {Promise<LinkedFrames>} */
+export function getLinkedFrames(id, link, signal) {
+	return request(`/recordings/${id}/links/${link}/frames`, { signal });
+}
+
+/** @param {number} id @param {number} link @param {{instants: InstantPair[], assumed_speed: number | null}} body @param {string} etag @returns {Promise<LinkJson>} */
+export async function putInstants(id, link, { instants, assumed_speed }, etag) {
+	const body = { instants: instants.map(({ live, replay }) => ({ live, replay })), assumed_speed };
+	return (await requestTagged(`/recordings/${id}/links/${link}/instants`, { method: 'PUT', body, etag, key: idempotencyKey() })).json;
+}
+
+/** Find the times of a link from the ball. @param {number} id @param {number} link @param {{live_upload: string | null, replay_upload: string | null}} body @returns {Promise<JobJson>} */
+export function postBallLink(id, link, body) {
+	return request(`/recordings/${id}/links/${link}/ball`, { method: 'POST', body, key: idempotencyKey() });
+}
+
+/** @param {number} id @param {number} link */
+export function deleteLink(id, link) {
+	return request(`/recordings/${id}/links/${link}`, { method: 'DELETE' });
 }

@@ -24,6 +24,7 @@ const LOADERS = {
 	exports: async () => (await import('./exports_page.js')).ExportsPage,
 	recordings: async () => (await import('./recordings/recordings_page.js')).RecordingsPage,
 	recording: async () => (await import('./recordings/recording_page.js')).RecordingPage,
+	link: async () => (await import('./recordings/link_page.js')).LinkPage,
 	import: async () => (await import('./import_page.js')).ImportPage,
 	help: async () => (await import('./help/help_page.js')).HelpPage,
 	account: async () => (await import('./account_page.js')).AccountPage,

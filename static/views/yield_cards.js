@@ -63,7 +63,7 @@ export function Distances({ answer }) {
 	const most = Math.max(1, ...bins.map(({ groups }) => groups));
 	return html`
 		<section class="yield__distances" aria-labelledby="distance-title">
-			<h2 id="distance-title">By distance to the ball</h2>
+			<h2 id="distance-title">Groups that qualify, by distance from camera to ball</h2>
 			<ul class="bar-chart">
 				${bins.map((bin) => html`
 					<li key=${binName(bin)} title=${`${binName(bin)}: ${count(bin.passing)} of ${count(bin.groups)} pass`}>

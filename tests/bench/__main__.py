@@ -23,6 +23,7 @@ from tests.bench.line_coverage import bench_line_coverage
 from tests.bench.link import bench_link
 from tests.bench.listeners import bench_listeners
 from tests.bench.lone_frames import bench_lone_frames
+from tests.bench.long_recording import bench_long_recording
 from tests.bench.page_loads import bench_page_loads
 from tests.bench.paint import bench_paint
 from tests.bench.people import bench_people
@@ -72,6 +73,7 @@ def main() -> None:
     bench_shots(REAL_DATA)
     bench_track(REAL_DATA)
     bench_link(REAL_DATA)
+    bench_long_recording()
     bench_recording()
     bench_ball_track(REAL_DATA)
     bench_requests()

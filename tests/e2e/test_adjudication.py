@@ -45,7 +45,7 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
     page.keyboard.press("Enter")
     until(page, lambda: page.url.endswith("/datasets/sample/agreement"))
     expect(page.get_by_text("Nothing to decide")).to_be_visible()
-    groups = page.get_by_role("region", name="Groups, the worst first", exact=True)
+    groups = page.get_by_role("region", name="Groups, most disagreement first", exact=True)
     expect(groups).to_contain_text("ada’s, by local")
     withdraw_verdict(page, group)
 
@@ -76,7 +76,7 @@ def test_two_who_agree_without_a_verdict_are_told_alike_by_queue_and_agreement(
     row = page.locator(".queue-row:not(.queue-row--head)")
     expect(row.locator(".pill").last).to_contain_text("agreed, no verdict")
     page.goto("/datasets/sample/agreement")
-    groups = page.get_by_role("region", name="Groups, the worst first", exact=True)
+    groups = page.get_by_role("region", name="Groups, most disagreement first", exact=True)
     expect(groups.get_by_role("row").filter(has_text="kim")).to_contain_text("agreed, no verdict")
     takes = page.get_by_role("region", name="Independent annotations").get_by_role("row")
     found = page.request.get(f"/api/v1/groups?dataset=sample&q=id:{group}").json()

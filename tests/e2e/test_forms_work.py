@@ -37,7 +37,7 @@ GIVING = [
         [
             press("Assign…"),
             fill("Name", "Friday", DIALOG),
-            fill("Limit to first N", "3", DIALOG),
+            fill("Number of groups (the first of the list)", "3", DIALOG),
             fill("Due", DUE.isoformat(), DIALOG),
             tick("carl", ANNOTATORS),
             tick("bob", ANNOTATORS),

@@ -147,6 +147,8 @@ class TestSending:
         uploads = page.get_by_role("list", name="Uploads")
         page.get_by_label("Dataset", exact=True).fill("sent")
         page.set_input_files("#import-file", films)
+        expect(uploads).to_contain_text("MB")
+        expect(page.get_by_label("Dataset", exact=True)).to_have_value("sent")
         # Before they are here.
         page.get_by_role("button", name="Add and find its shots").click()
         page.get_by_role("link", name="Open long").wait_for()
@@ -345,14 +347,180 @@ class TestInstants:
         assert [row["key"] for row in rows] == [f"cup final/{n}.png" for n in (0, 40, 60)]
 
 
+@pytest.fixture
+def link(recording: int, server: str) -> str:
+    """The page of a link of the second shot, a replay, to the first one, without an instant."""
+    with httpx.Client(base_url=f"{server}/api/v1/recordings/{recording}") as client:
+        shots = client.get("/shots")
+        kinds = ("main", "replay", "other")
+        items = [
+            {"first": one["first"], "last": one["last"], "kind": kind}
+            for one, kind in zip(shots.json()["items"], kinds, strict=True)
+        ]
+        tag = {"If-Match": shots.headers["etag"]}
+        assert client.put("/shots", json={"shots": items}, headers=tag).status_code == 200
+        both = {
+            "live": {"first": 0, "last": LONG - 1},
+            "replay": {"recording": recording, "first": LONG, "last": 2 * LONG - 1},
+        }
+        made = client.post("/links", json=both).json()
+    return f"/recordings/{recording}/links/{made['id']}"
+
+
+def side(page: Page, name: str, frame: int) -> None:
+    """Wait until a side shows a frame."""
+    page.wait_for_selector(f'.linking__side[aria-label="{name}"][data-frame="{frame}"] img')
+
+
+def linked(page: Page, link: str) -> list[tuple[int, int]]:
+    """The instants as the server has them."""
+    found = page.request.get(f"/api/v1{link}").json()["instants"]
+    return [(one["live"], one["replay"]) for one in found]
+
+
+class TestLinking:
+    def test_a_replay_leads_to_its_live_shot(
+        self, recording: int, link: str, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, recording)
+        page.keyboard.press("ArrowDown")
+        shows(page, 40)
+        card = page.get_by_role("region", name="Links")
+        expect(card).to_contain_text("0 instants")
+        card.get_by_role("link", name="frames 0 to 39").click()
+        side(page, "Live", 0)
+        page.get_by_role("button", name="Remove this link").click()
+        shows(page, 0)
+        page.keyboard.press("ArrowDown")
+        shows(page, 40)
+        expect(card).to_contain_text("Main camera, 1.6 s long, ends 0.0 s before the replay.")
+        card.get_by_role("button", name="Link to cup final").click()
+        side(page, "Live", 0)
+        side(page, "Replay", 40)
+
+    def test_instants_are_linked_by_keys_and_taken_back(
+        self, link: str, open_page: OpenPage
+    ) -> None:
+        page = open_page(link)
+        side(page, "Replay", 40)
+        times, instants = (page.get_by_role("region", name=name) for name in ("Times", "Instants"))
+        together = page.get_by_role("button", name="Play together")
+        expect(times).to_contain_text("Go to the same instant in both")
+        expect(together).to_have_attribute("title", "Link two instants first")
+        for key in ("ArrowRight", "ArrowRight", "2", "Shift+ArrowRight"):
+            page.keyboard.press(key)
+        side(page, "Live", 2)
+        side(page, "Replay", 65)
+        page.keyboard.press("i")
+        expect(times).to_contain_text("it is taken to run as fast as live")
+        page.get_by_label("Assume that it is").fill("4")
+        times.get_by_role("button", name="Assume").click()
+        expect(times).to_contain_text("it is taken to run 4.0 times slower than live")
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("1")
+        page.keyboard.press("ArrowRight")
+        side(page, "Live", 3)
+        side(page, "Replay", 67)
+        page.keyboard.press("i")
+        expect(times).to_contain_text("The replay runs 2.0 times slower than live (speed 0.500 ±")
+        until(page, lambda: linked(page, link) == [(2, 65), (3, 67)])
+        expect(instants.get_by_role("row")).to_have_count(3)
+        page.keyboard.press("ArrowUp")
+        side(page, "Live", 2)
+        side(page, "Replay", 65)
+        instants.get_by_role("button", name="Remove the instant at live frame 3").click()
+        until(page, lambda: linked(page, link) == [(2, 65)])
+        page.keyboard.press("Control+z")
+        until(page, lambda: linked(page, link) == [(2, 65), (3, 67)])
+
+    def test_the_replay_follows_the_live_shot(self, link: str, open_page: OpenPage) -> None:
+        page = open_page(link)
+        side(page, "Replay", 40)
+        tag = {"If-Match": page.request.get(f"/api/v1{link}").headers["etag"]}
+        pairs = {"instants": [{"live": 10, "replay": 40}, {"live": 29, "replay": 78}]}
+        answer = page.request.put(f"/api/v1{link}/instants", data=pairs, headers=tag)
+        assert answer.ok
+        page.reload()
+        side(page, "Replay", 40)
+        page.keyboard.press("p")
+        expect(page.get_by_role("button", name="Play together")).to_have_attribute(
+            "aria-pressed", "true"
+        )
+        until(page, lambda: frame_of(page, "Live") > 14)
+        page.keyboard.press("k")
+        live = page.get_by_role("slider", name="Live frame")
+        live.focus()
+        live.press("Home")
+        side(page, "Live", 0)
+        for _ in range(12):
+            live.press("ArrowRight")
+        side(page, "Live", 12)
+        side(page, "Replay", 44)
+        page.get_by_role("slider", name="Replay frame").press("ArrowRight")
+        side(page, "Replay", 45)
+        expect(page.get_by_role("button", name="Play together")).to_have_attribute(
+            "aria-pressed", "false"
+        )
+
+    def test_groups_get_the_views_of_linked_replays(
+        self, recording: int, link: str, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, recording)
+        card = page.get_by_role("region", name="Instants")
+        expect(card.get_by_role("button", name="Make groups")).to_have_attribute(
+            "title", "Choose an instant first"
+        )
+        tag = {"If-Match": page.request.get(f"/api/v1{link}").headers["etag"]}
+        pairs = {"instants": [{"live": 10, "replay": 40}, {"live": 29, "replay": 78}]}
+        assert page.request.put(f"/api/v1{link}/instants", data=pairs, headers=tag).ok
+        page.reload()
+        shows(page, 0)
+        page.keyboard.press("i")
+        page.keyboard.press("Shift+ArrowRight")
+        shows(page, 25)
+        page.keyboard.press("i")
+        expect(card.get_by_label("With the views of 1 linked replay")).to_be_checked()
+        card.get_by_label("Propose cameras afterwards").uncheck()
+        card.get_by_role("button", name="Make 2 groups").click()
+        expect(card).to_contain_text(
+            "2 groups made. 1 view of linked replays. 1 view fewer, outside of a replay."
+        )
+        jobs_end(page)
+        rows = page.request.get("/api/v1/groups?dataset=cup").json()["items"]
+        group = page.request.get(f"/api/v1/groups/{rows[1]['id']}").json()
+        assert [view["key"] for view in group["views"]] == ["25.png", "70.png"]
+
+    def test_what_somebody_else_linked_is_not_overwritten(
+        self, link: str, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("412 (Precondition Failed)")
+        page = open_page(link)
+        side(page, "Replay", 40)
+        tag = {"If-Match": page.request.get(f"/api/v1{link}").headers["etag"]}
+        theirs = {"instants": [{"live": 10, "replay": 40}]}
+        assert page.request.put(f"/api/v1{link}/instants", data=theirs, headers=tag).ok
+        page.keyboard.press("i")
+        expect(page.get_by_text("Somebody else has changed this link")).to_be_visible()
+        expect(page.get_by_role("region", name="Instants")).to_contain_text("1 instant")
+        assert linked(page, link) == [(10, 40)]
+
+
+def frame_of(page: Page, name: str) -> int:
+    """Which frame a side shows."""
+    shown = page.locator(f'.linking__side[aria-label="{name}"]').get_attribute("data-frame")
+    return int(shown or -1)
+
+
 class TestPages:
     def test_they_are_usable_by_everybody_and_fit(
-        self, recording: int, open_page: OpenPage
+        self, recording: int, link: str, open_page: OpenPage
     ) -> None:
         page = opened(open_page, recording)
         for path, waited in (
             (f"/recordings/{recording}", ".film__shot img"),
             ("/recordings", ".table tbody tr"),
+            (link, ".linking__side img"),
         ):
             page.goto(path)
             page.wait_for_selector(waited)

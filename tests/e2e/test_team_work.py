@@ -41,7 +41,7 @@ class TestWork:
         tove.keyboard.press("Shift+D")
         dialog = tove.get_by_role("dialog", name="Assign groups")
         dialog.get_by_label("Name").fill("A few")
-        dialog.get_by_label("Limit to first N").fill("3")
+        dialog.get_by_label("Number of groups (the first of the list)").fill("3")
         dialog.get_by_role("button", name="Assign", exact=True).click()
         tove.get_by_role("button", name="See the work").click()
         go_on = tove.get_by_role("button", name="Continue: 3 groups of A few")

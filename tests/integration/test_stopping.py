@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import cv2
 import httpx
 import pytest
 
@@ -26,6 +27,7 @@ from tests.e2e.service import serving
 from tests.homes import copy_home
 from tests.integration.conftest import COMMAND, environment
 from tests.starting import Process
+from tests.videos import numbered, write_pictures
 from tests.waiting import SECONDS
 
 
@@ -177,3 +179,82 @@ class TestStopping:
             assert line.recv(12) == b"HTTP/1.1 503"
             server.wait(SECONDS)
         assert list((home / "uploads").iterdir()) == []
+
+
+class TestIndexing:
+    """A recording whose indexing is killed is indexed by whoever comes next, and never by half."""
+
+    FRAMES = 2000
+
+    @pytest.fixture
+    def data(self, tmp_path: Path) -> Path:
+        """A folder with a film that takes some seconds to index."""
+        (tmp_path / "data").mkdir()
+        small = [cv2.resize(numbered(number), (640, 384)) for number in range(200)]
+        pictures = (small[number % 200] for number in range(self.FRAMES))
+        write_pictures(tmp_path / "data" / "final.mp4", "mp4v", pictures)
+        return tmp_path / "data"
+
+    def indexing(self, client: httpx.Client) -> int:
+        """The job that indexes the film, once it has read frames of it."""
+        body = {"dataset": "cup", "source": {"folder": "data/final.mp4"}}
+        job: int = client.post("/api/v1/recordings", json=body).json()["id"]
+        until(lambda: client.get(f"/api/v1/jobs/{job}").json()["done"] >= 100)
+        return job
+
+    def ended(self, client: httpx.Client, job: int) -> Any:
+        def over() -> Any:
+            found = client.get(f"/api/v1/jobs/{job}").json()
+            return found["state"] in ("done", "failed") and found
+
+        return until(over)
+
+    def test_the_next_server_does_it_and_nothing_is_half(
+        self, server: subprocess.Popen[str], address: str, home: Path, data: Path
+    ) -> None:
+        with httpx.Client(base_url=address, timeout=SECONDS) as client:
+            job = self.indexing(client)
+            workers = children(server.pid)
+            server.kill()
+            server.wait(SECONDS)
+        until(lambda: not any(map(is_alive, workers)))
+        assert not list((home / "recordings").glob("*"))
+        again = subprocess.Popen(
+            [sys.executable, "-c", COMMAND, "serve", "--port", "0"],
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**environment(home), "TOUCHLINE_IMPORT_FOLDERS": str(data)},
+        )
+        try:
+            assert again.stdout is not None
+            base = again.stdout.readline().split()[-1]
+            with httpx.Client(base_url=base, timeout=SECONDS) as client:
+                done = self.ended(client, job)
+                assert (done["state"], done["result"]["frames"]) == ("done", self.FRAMES)
+                (recording,) = client.get("/api/v1/recordings").json()["items"]
+                assert (recording["indexed"], recording["problem"]) == (True, None)
+                assert [path.name for path in (home / "recordings").iterdir()] == [
+                    f"{recording['sha256']}.npz"
+                ]
+        finally:
+            again.kill()
+            again.communicate()
+
+    def test_one_whose_process_is_killed_says_so_and_can_be_indexed_again(
+        self, server: subprocess.Popen[str], address: str, home: Path
+    ) -> None:
+        with httpx.Client(base_url=address, headers={"Origin": address}, timeout=SECONDS) as client:
+            job = self.indexing(client)
+            for worker in children(server.pid):
+                os.kill(worker, signal.SIGKILL)
+            failed = self.ended(client, job)
+            assert failed["state"] == "failed"
+            assert (
+                "final.mp4 was not finished: its process was killed"
+                in (failed["problem"]["detail"])
+            )
+            (recording,) = client.get("/api/v1/recordings").json()["items"]
+            assert not recording["indexed"]
+            assert not list((home / "recordings").glob("*"))
+            body = client.post(f"/api/v1/recordings/{recording['id']}/shots").json()
+            assert self.ended(client, body["id"])["result"]["frames"] == self.FRAMES

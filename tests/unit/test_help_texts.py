@@ -51,7 +51,7 @@ PLAIN_WORDS = """
     sign singular site smallest snapshot solve solving source sources sphere spill spread sqlite squares stacks
     stage staging standpoints starts state statements statistics steps storage store stored straight stream stretches strict
     submit suggested suggestions summary surface swap synloc tab table tall team term terminal text threads
-    threshold ticks time tokens tools trace tracing track transfer transitions tree trees triangulate tries truth types
+    threshold ticks time tokens tools trace tracing track tracking transfer transitions tree trees triangulate tries truth types
     undo undrawn upload v3 v3d video viewport viewports virtual visibility wal walk warm web what when window words
     work worker workspace write writer zip
 """

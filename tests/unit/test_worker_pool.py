@@ -130,7 +130,7 @@ class TestResultUnless:
             return False
 
         async def ask() -> int:
-            return await pool.submit(os.getpid).result_unless(here)
+            return await pool.submit(os.getpid).result_unless_client_gone(here)
 
         assert asyncio.run(ask()) != os.getpid()
 
@@ -139,7 +139,7 @@ class TestResultUnless:
             return True
 
         task = PoolTask(lambda error: error)
-        assert asyncio.run(task.result_unless(gone)) is None
+        assert asyncio.run(task.result_unless_client_gone(gone)) is None
         assert task.future.cancelled()
 
 

@@ -93,7 +93,7 @@ AUTOCOMMIT = {"touchline_glance": True}
 """Options of an engine that begins no transactions: each statement is one."""
 
 
-def unstorable_text() -> InputError:
+def unstorable_text_error() -> InputError:
     """What is said of a text that one of the databases cannot keep; both refuse it."""
     return InputError(
         "a text holds a character that the database cannot keep, such as U+0000",

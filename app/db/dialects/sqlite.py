@@ -14,7 +14,7 @@ from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.db.dialects.dialect import AUTOCOMMIT, Alone, Failure, unstorable_text
+from app.db.dialects.dialect import AUTOCOMMIT, Alone, Failure, unstorable_text_error
 from app.db.session import Session
 from app.errors import StorageError
 
@@ -171,7 +171,7 @@ def _refuse_null_characters(
     for row in values if many else (values,):
         for value in row.values() if isinstance(row, dict) else row:
             if isinstance(value, str) and "\0" in value:
-                raise unstorable_text()
+                raise unstorable_text_error()
 
 
 def _wait_for_nobody(connection: Any, _record: object) -> None:

@@ -34,7 +34,7 @@ def unused_calibrations(session: Session) -> list[str]:
     return [] if _has_unsolved(session) else list(session.scalars(_UNUSED))
 
 
-def delete_calibrations(session: Session, keys: Sequence[str]) -> int:
+def delete_if_unused(session: Session, keys: Sequence[str]) -> int:
     """Delete those of some calibrations that are spare still; returns how many.
 
     Those that a version needs go on in it (a trigger sees to that).

@@ -14,7 +14,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets import queries as removal
-from app.features.datasets.orphan_queries import delete_calibrations, unused_calibrations
+from app.features.datasets.orphan_queries import delete_if_unused, unused_calibrations
 from app.features.datasets.queries import (
     dataset_names,
     dataset_rows,
@@ -324,7 +324,7 @@ def delete_unused_calibrations(store: Store, wanted: Callable[[], bool] = lambda
         if not wanted():
             break
         with store.write() as session:
-            gone += delete_calibrations(session, keys[start : start + CALIBRATIONS_AT_ONCE])
+            gone += delete_if_unused(session, keys[start : start + CALIBRATIONS_AT_ONCE])
     return gone
 
 

@@ -13,7 +13,7 @@ from app.errors import InputError
 from app.features.datasets.service import DatasetHead
 from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
 from app.features.groups.state import GroupState, VerdictState, read_states
-from app.features.groups.view_queries import NamedView, named_views
+from app.features.groups.view_queries import ViewFileFields, named_views
 from app.features.versions.membership import policy_settings, version_settings, version_stamp
 from app.features.versions.queries import BATCH, VersionGroup, read_rows
 from app.features.versions.service import FrozenGroup, Version, thaw, thaw_outlines
@@ -192,7 +192,7 @@ def frozen_record(item: FrozenGroup) -> ExportRecord:
     )
 
 
-def _outline(views: list[NamedView]) -> Group:
+def _outline(views: list[ViewFileFields]) -> Group:
     """A group of views without lines and balls."""
     first = views[0]
     return Group(
@@ -200,7 +200,7 @@ def _outline(views: list[NamedView]) -> Group:
     )
 
 
-def _bare_view(item: NamedView) -> View:
+def _bare_view(item: ViewFileFields) -> View:
     size = ImageSize(item.width, item.height)
     station = Station(item.station, size, shared=item.shared, flipped=item.flipped)
     return View(item.key, station, media=item.media)

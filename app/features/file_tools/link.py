@@ -101,7 +101,7 @@ def _read_view(folder: Path, report: Report) -> BallRays:
     cameras = by_frame(read_cameras(folder, report))
     if not cameras:
         raise report.refusal(f"{folder} holds no camera_<frame>.json")
-    rows = _read_ball(folder / BALL_FILE, report)
+    rows = read_ball(folder / BALL_FILE, str(folder / BALL_FILE), report)
     seen = [(time, pixel, cameras[frame]) for frame, time, pixel in rows if frame in cameras]
     if not seen:
         raise InputError(
@@ -125,23 +125,35 @@ def _read_view(folder: Path, report: Report) -> BallRays:
     return ball_rays([one[0] for one in kept], [one[1] for one in kept], [one[2] for one in kept])
 
 
-def _read_ball(path: Path, report: Report) -> list[tuple[int, float, tuple[float, float]]]:
-    """Frame, time in seconds and pixel of each row with a ball."""
+def read_ball(
+    path: Path, name: str, report: Report
+) -> list[tuple[int, float, tuple[float, float]]]:
+    """Frame, time in seconds and pixel of each row with a ball of a ``ball.csv``.
+
+    Args:
+        path: The file.
+        name: How complaints call it.
+        report: Gets what is left out: repeated frames, cells that are no numbers.
+
+    Raises:
+        DatasetFormatError: It has other columns.
+        InputError: It cannot be read.
+    """
     try:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(
-            f"{path} cannot be read; it has the columns {','.join(_COLUMNS)}"
+            f"{name} cannot be read; it has the columns {','.join(_COLUMNS)}"
         ) from error
     found = []
     frames = set()
-    for line, row in read_rows(content, str(path), _COLUMNS, DEFAULT_LIMITS):
+    for line, row in read_rows(content, name, _COLUMNS, DEFAULT_LIMITS):
         if is_missing(row.get("x")) and is_missing(row.get("y")):
             continue
         try:
-            frame, time, x, y = (_number(row, name, path, line) for name in _COLUMNS)
+            frame, time, x, y = (_number(row, column, name, line) for column in _COLUMNS)
             if not frame.is_integer():
-                raise DatasetFormatError(str(path), f"line {line}", "frame", "is no whole number")
+                raise DatasetFormatError(name, f"line {line}", "frame", "is no whole number")
             if frame in frames:
                 raise DatasetFormatError(
                     str(path), f"line {line}", "frame", f"{frame:.0f} stands there a second time"
@@ -154,12 +166,12 @@ def _read_ball(path: Path, report: Report) -> list[tuple[int, float, tuple[float
     return found
 
 
-def _number(row: Mapping[str, str], name: str, path: Path, line: int) -> float:
-    text = row.get(name)
+def _number(row: Mapping[str, str], column: str, name: str, line: int) -> float:
+    text = row.get(column)
     try:
         value = float(text or "")
     except ValueError:
         value = float("nan")
     if not np.isfinite(value) or abs(value) > 1e9:
-        raise DatasetFormatError(str(path), f"line {line}", name, f'is "{text}", no number')
+        raise DatasetFormatError(name, f"line {line}", column, f'is "{text}", no number')
     return value

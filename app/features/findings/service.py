@@ -22,7 +22,7 @@ from app.features.queue.listing_queries import (
     either,
     lists,
 )
-from app.features.queue.queries import read_noticed, refresh_queue
+from app.features.queue.queries import read_import_findings, refresh_queue
 from app.features.solutions.queries import is_solved
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group
@@ -178,7 +178,7 @@ def set_dismissal(
                     session, stored.dataset_id, group_id, dismissal, dismissed=dismissed
                 )
                 refresh_queue(session, [group_id])
-                dismissals = read_noticed(session, [group_id])[1][group_id]
+                dismissals = read_import_findings(session, [group_id])[1][group_id]
                 after = replace(record, dismissals=dismissals).state(solution)
                 session.respond(after)
                 return after

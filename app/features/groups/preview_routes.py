@@ -97,7 +97,7 @@ class Previews:
         worker = least_busy(self._large.workers if large else self.workers)
         if worker is not None:
             task = worker.submit(solve_apart, self._settings, group_id, changes)
-            found: bytes | None = await task.result_unless(request.is_disconnected)
+            found: bytes | None = await task.result_unless_client_gone(request.is_disconnected)
             if found is not None:
                 return found
             if await request.is_disconnected():

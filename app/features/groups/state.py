@@ -16,7 +16,7 @@ from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.undo_stacks import UndoStacks, read_stacks
 from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
-from app.features.queue.queries import import_findings, is_fixed, read_noticed
+from app.features.queue.queries import import_findings, is_fixed, read_import_findings
 from app.features.solutions.queries import SolutionKey, read_solutions
 from app.features.verdicts.queries import StoredVerdict, read_last_verdicts
 from app.soccer.finding import Dismissal, Finding
@@ -301,7 +301,7 @@ def read_record(session: Session, group_id: int) -> Record:
 def read_records(session: Session, group_ids: Sequence[int]) -> list[Record]:
     """Records of groups in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
-    noticed, dismissals = read_noticed(session, group_ids)
+    noticed, dismissals = read_import_findings(session, group_ids)
     verdicts = read_last_verdicts(session, group_ids)
     stacks = read_stacks(session, group_ids)
     return [

@@ -102,7 +102,7 @@ def dataset_views(
 
 
 @dataclass(frozen=True)
-class NamedView(_Framed):
+class ViewFileFields(_Framed):
     """What names the files of a view in an export."""
 
     group_id: int
@@ -120,7 +120,7 @@ class NamedView(_Framed):
     media_frame: int | None
 
 
-def named_views(session: Session, group_ids: Sequence[int]) -> list[NamedView]:
+def named_views(session: Session, group_ids: Sequence[int]) -> list[ViewFileFields]:
     """The views of a few hundred groups in the order of their dataset."""
     view, group, station = ViewModel, GroupModel, StationModel
     statement = (
@@ -135,7 +135,7 @@ def named_views(session: Session, group_ids: Sequence[int]) -> list[NamedView]:
         .order_by(group.number, view.position)
     )  # fmt: skip
     rows: Iterable[Any] = session.execute(statement)
-    return [NamedView(*row) for row in rows]
+    return [ViewFileFields(*row) for row in rows]
 
 
 def frame_files(session: Session, dataset_id: int) -> list[str]:

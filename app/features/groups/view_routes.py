@@ -233,10 +233,14 @@ async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict
     try:
         if view.media.frame is not None:
             indexing = await to_thread.run_sync(frames.ask_fetch, view.media)
-            if indexing is not None and not await indexing.result_unless(request.is_disconnected):
+            if indexing is not None and not await indexing.result_unless_client_gone(
+                request.is_disconnected
+            ):
                 return None
         task = frames.ask_neighbours(view.media, view.group_key, view.static)
-        found: dict[int, Media] | None = await task.result_unless(request.is_disconnected)
+        found: dict[int, Media] | None = await task.result_unless_client_gone(
+            request.is_disconnected
+        )
     except (WorkerEnded, NotFoundError, ImageError, TooLargeError, StorageError):
         return {}
     return found
@@ -265,10 +269,12 @@ async def _picture(
         if found is not None:
             return found
         fetching = await to_thread.run_sync(frames.ask_fetch, view.media)
-        if fetching is not None and not await fetching.result_unless(request.is_disconnected):
+        if fetching is not None and not await fetching.result_unless_client_gone(
+            request.is_disconnected
+        ):
             return None
         task = frames.ask(view.media, width, view.flipped)
-        made: SentPicture | None = await task.result_unless(request.is_disconnected)
+        made: SentPicture | None = await task.result_unless_client_gone(request.is_disconnected)
         return made
 
 

@@ -396,7 +396,10 @@ class UploadWriter:
                 return shared
             # What lies there has no record, so nobody can have been told of it.
             _remove(place)
-        raise StorageError("the upload could not be put in its place", hint="Send it again.")
+        raise StorageError(
+            "the upload could not be put in its place",
+            hint="Wait, then send it again with the same Idempotency-Key.",
+        )
 
     def abort(self) -> None:
         """Leave nothing behind."""

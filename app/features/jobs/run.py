@@ -142,6 +142,13 @@ def _indexed(result: Json) -> str:
 
 def _taken(result: Json) -> str:
     there = f"; {result['unchanged']:,} were there before" if result["unchanged"] else ""
+    changed, views, outside = (
+        result.get(name, 0) for name in ("changed", "linked_views", "outside")
+    )
+    if changed:
+        there += f"; {plural(changed, 'group')} got views of replays"
+    if views or outside:
+        there += f"; {plural(views, 'view')} of linked replays, {outside:,} outside of them"
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
@@ -157,6 +164,14 @@ def _tracked(result: Json) -> str:
     counts = ", ".join(f"{result[name]:,} {name}" for name in ("tracked", "bridged", "lost"))
     given = f"; {plural(result['groups'], 'group')} got another camera" if result["groups"] else ""
     return f"{plural(result['frames'], 'frame')} of {result['name']}: {counts}{given}."
+
+
+def _linked(result: Json) -> str:
+    live, replay = result["rays"]
+    seen = f"{live:,} live rays, {replay:,} of the replay"
+    left = f", {result['left_out']:,} left out" if result["left_out"] else ""
+    told = "The ball tells the times" if result["reason"] is None else result["reason"].rstrip(".")
+    return f"{told} ({seen}{left})."
 
 
 _ENDINGS: Mapping[str, Callable[[Json], str]] = {
@@ -177,6 +192,7 @@ _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "instants": _taken,
     "ball": _ball,
     "track": _tracked,
+    "link": _linked,
 }
 """By the kind of the job."""
 

@@ -29,6 +29,7 @@ JobKind = Literal[
     "instants",
     "ball",
     "track",
+    "link",
 ]
 
 

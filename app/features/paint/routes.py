@@ -125,7 +125,7 @@ async def propose_lines(
 async def _answer(request: Request, question: PaintQuestion, ask: Callable[[], PoolTask]) -> Any:
     """What was found, or None where nobody waits for it any more."""
     with with_view_in_error(question.view.key):
-        return await ask().result_unless(request.is_disconnected)
+        return await ask().result_unless_client_gone(request.is_disconnected)
 
 
 proposals_router = APIRouter(tags=["datasets"], route_class=Route)

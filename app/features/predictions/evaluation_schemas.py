@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from app.evaluation.comparison import Difference, FrameDifference
+from app.evaluation.comparison import Difference, FrameOfTwoRuns
 from app.evaluation.result import FrameResult
 from app.evaluation.table import Cell, Table
 from app.features.predictions.evaluation import RunComparison, read_tables
@@ -144,7 +144,7 @@ class ComparisonDocument(Document):
     gained: int = Field(description="Frames that only the second run has a value for.")
     lost: int
     mean_change: float | None
-    frames: list[FrameDifference] = Field(
+    frames: list[FrameOfTwoRuns] = Field(
         description="Frames that differ: gained and lost ones, then the largest change first."
     )
     next: str | None

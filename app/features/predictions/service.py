@@ -83,7 +83,7 @@ def add_predictions(
     return save_predictions(
         store,
         dataset,
-        set_name(first) if name is None else name,
+        prediction_set_name(first) if name is None else name,
         boxes.detections,
         cameras.cameras,
         names=names,
@@ -241,11 +241,11 @@ def read_set(session: Session, set_id: int) -> PredictionSet:
     return found[0]
 
 
-def set_name(path: Path) -> str:
+def prediction_set_name(path: Path) -> str:
     """A file's name as the name of a set: ASCII letters and digits, else ``-``.
 
     Example:
-        >>> set_name(Path("runs/best model.json"))
+        >>> prediction_set_name(Path("runs/best model.json"))
         'best-model'
     """
     return re.sub(r"[^A-Za-z0-9]", "-", path.stem).strip("-")[:80] or "predictions"

@@ -180,7 +180,7 @@ def _refresh(session: Session, ids: Sequence[int]) -> None:
 def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of groups as they follow from everything else."""
     views, verdicts = _views(session, ids), _verdicts(session, ids)
-    (findings, dismissals), edited = read_noticed(session, ids), edited_groups(session, ids)
+    (findings, dismissals), edited = read_import_findings(session, ids), edited_groups(session, ids)
     checked = _checked(session, dismissals, findings)
     rows = []
     for head, summary in _heads(session, ids):
@@ -264,7 +264,7 @@ def _verdicts(session: Session, ids: Sequence[int]) -> dict[int, Any]:
     return {row.group_id: row for row in rows}
 
 
-def read_noticed(
+def read_import_findings(
     session: Session, ids: Sequence[int]
 ) -> tuple[dict[int, list[Any]], dict[int, GroupDismissals]]:
     """What imports noticed about groups and about the shared stations of their views, and which
@@ -282,8 +282,8 @@ def read_noticed(
 
 
 def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
-    """The first part of ``read_noticed``."""
-    return read_noticed(session, ids)[0]
+    """The first part of ``read_import_findings``."""
+    return read_import_findings(session, ids)[0]
 
 
 def _head_values(head: Any, views: Sequence[Any]) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from pathlib import PurePath
+from typing import Any, NamedTuple
 
 from sqlalchemy import delete, insert, select
 
@@ -12,6 +13,15 @@ from app.features.datasets.tables import GroupModel, StationModel, ViewModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.alias_queries import shown_actor
 from app.features.recordings.tables import ShotCamerasModel
+
+
+class FrameView(NamedTuple):
+    """A view that shows a frame of a recording: number of the frame, id of its group, and its key."""
+
+    number: int
+    group: int
+    key: str
+    has_lines: bool
 
 
 def list_cameras_rows(session: Session, recording_id: int) -> Sequence[Any]:
@@ -23,16 +33,22 @@ def list_cameras_rows(session: Session, recording_id: int) -> Sequence[Any]:
     return session.execute(statement.order_by(model.first)).all()
 
 
-def drawn_keys(session: Session, dataset_id: int, name: str) -> list[str]:
-    """Keys of the groups that were taken from a recording and have lines."""
+def views_of_video(session: Session, dataset_id: int, sha256: str) -> list[FrameView]:
+    """The views of a dataset that show a frame of a video, in any group: their pictures are kept below its sha256."""
+    kept = ViewModel.media_path
     statement = (
-        select(GroupModel.key)
-        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        select(kept, ViewModel.group_id, ViewModel.key, StationModel.lines != "{}")
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(GroupModel.dataset_id == dataset_id, GroupModel.match == name)
-        .where(StationModel.lines != "{}")
+        .where(GroupModel.dataset_id == dataset_id, kept.contains(f"/{sha256}/"))
+        .order_by(ViewModel.id)
     )
-    return list(session.scalars(statement))
+    found = []
+    for path, group, key, has_lines in session.execute(statement):
+        number = PurePath(path or "").stem
+        if number.isascii() and number.isdigit():
+            found.append(FrameView(int(number), group, key, has_lines))
+    return found
 
 
 def delete_overlapping(session: Session, recording_id: int, first: int, last: int) -> Sequence[Any]:

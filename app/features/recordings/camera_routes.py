@@ -66,7 +66,7 @@ def track_cameras(
     """Follow the camera of a stretch without a cut: a camera for each of its frames.
 
     Lines that were drawn in groups of its frames are known. The cameras take the place of those that share a
-    frame with them; groups of its frames get theirs as given, unless somebody has given or drawn another one.
+    frame with them; groups of its frames get them as given, unless somebody has given or drawn another one.
     """
     return request_cameras(
         services.jobs, services.store, recording, wanted.first, wanted.last, actor=actor

@@ -29,7 +29,7 @@ class CamerasRequest(BaseModel):
     last: Frame = Field(description="Number of its last frame.")
 
 
-class SummaryDocument(Document, shows=CameraSummary):
+class CameraSummaryDocument(Document, shows=CameraSummary):
     """What became of the frames of a stretch."""
 
     frames: int = Field(description="How many frames there are.")
@@ -51,8 +51,8 @@ class CamerasDocument(Document):
     recording: int = Field(description="Id of the recording.")
     first: int = Field(description="Number of its first frame, from 0.")
     last: int = Field(description="Number of its last frame.")
-    summary: SummaryDocument = Field(description="What became of its frames.")
-    before: SummaryDocument | None = Field(
+    summary: CameraSummaryDocument = Field(description="What became of its frames.")
+    before: CameraSummaryDocument | None = Field(
         description="The same of the cameras that these took the place of."
     )
     revision: int = Field(description="How often the stretch was tracked.")
@@ -71,8 +71,8 @@ class FrameCamerasDocument(Document):
 
     first: int = Field(description="Number of the first frame.")
     last: int = Field(description="Number of the last frame.")
-    size: tuple[int, int] = Field(description="Width and height of a frame, pixels.")
-    principal_point: tuple[float, float] | None = Field(description="Of every camera, pixels.")
+    size: list[int] = Field(description="Width and height of a frame, pixels.")
+    principal_point: list[float] | None = Field(description="Of every camera, pixels.")
     outcome: str = Field(description="A letter a frame: `T` tracked, `B` bridged, `L` lost.")
     time: list[float] = Field(description="When each is shown, seconds after the first frame.")
     supported: list[float | None] = Field(description="Share of the visible markings with paint.")
@@ -100,8 +100,8 @@ class FrameCamerasDocument(Document):
         return FrameCamerasDocument(
             first=frames[0].number,
             last=frames[-1].number,
-            size=(size.width, size.height),
-            principal_point=None if first is None else first.principal_point,
+            size=[size.width, size.height],
+            principal_point=None if first is None else [*first.principal_point],
             outcome="".join(frame.outcome[0].upper() for frame in frames),
             time=[frame.time for frame in frames],
             **columns,

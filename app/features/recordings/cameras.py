@@ -29,20 +29,17 @@ from app.features.pitches.queries import edited_pitches
 from app.features.recordings.camera_queries import (
     delete_overlapping,
     digests_of,
-    drawn_keys,
     insert_cameras,
     list_cameras_rows,
+    views_of_video,
 )
 from app.features.recordings.service import (
     Recording,
-    frames_of_keys,
     get_recording,
-    groups_taken,
     in_worker,
     need_recording,
     read_index,
 )
-from app.geometry.camera import Camera
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines
 from app.soccer.pitch import Pitch
@@ -131,8 +128,8 @@ def list_cameras(store: Store, recording_id: int) -> list[ShotCameras]:
     with store.read() as session:
         recording = need_recording(session, recording_id)
         rows = list_cameras_rows(session, recording_id)
-        keys = drawn_keys(session, recording.dataset_id, recording.name) if rows else []
-    drawn = sorted(frames_of_keys(keys))
+        views = views_of_video(session, recording.dataset_id, recording.sha256) if rows else []
+    drawn = sorted({view.number for view in views if view.has_lines})
     return [_of_row(row, recording.sha256, drawn) for row in rows]
 
 
@@ -223,8 +220,11 @@ def track_now(
     require_stretch(recording, first, last)
     sha256 = recording.require_readable()
     policy = get_dataset_head(store, recording.dataset_id).policy.calibration
-    groups = _groups_of(store, recording, first, last)
-    lines = {number: found for number, group in groups.items() if (found := _lines(group, sha256))}
+    lines: dict[int, Lines] = {}
+    for number, stored, key in _views_of(store, recording, first, last, with_lines=True):
+        station = stored.stations[key].station
+        if not (station.flipped or station.picture):
+            lines.setdefault(number, station.lines)
     with store.read() as session:
         pitch = edited_pitches(session, recording.dataset_id, [recording.name])
     known = (store.settings, sha256, first, last, lines, pitch.get(recording.name), policy)
@@ -280,7 +280,8 @@ def save_cameras(
             f"the cameras of {recording.name} cannot be kept ({error.strerror})",
             hint="Free some space, and track the shot again.",
         ) from error
-    before = _given_before(store, recording, stretch)
+    views = _views_of(store, recording, first, last)
+    tracked_before = cameras_at(store, recording, {number for number, _, _ in views})
     summary = _summary(tracked, annotated)
     with store.write() as session:
         row = need_recording(session, recording.id)
@@ -305,7 +306,7 @@ def save_cameras(
             revision=1 + max((old.revision for old in replaced), default=0),
             actor=actor,
         )
-        changed = _give(session, recording, tracked.frames, before, actor)
+        changed = _give(session, recording, tracked.frames, views, tracked_before, actor)
         add_audit_event(
             session,
             actor,
@@ -355,67 +356,40 @@ def _of_row(row: Any, sha256: str | None, drawn: Sequence[int]) -> ShotCameras:
     )
 
 
-def _groups_of(store: Store, recording: Recording, first: int, last: int) -> dict[int, StoredGroup]:
-    """The groups that were taken from a stretch, by the number of their frame."""
-    taken = groups_taken(store, recording)
-    wanted = {taken[number]: number for number in sorted(taken) if first <= number <= last}
-    ids, found = list(wanted), dict[int, StoredGroup]()
+def _views_of(
+    store: Store, recording: Recording, first: int, last: int, *, with_lines: bool = False
+) -> list[tuple[int, StoredGroup, str]]:
+    """The views that show a frame of a stretch, with its number, their group and their key."""
+    sha256 = recording.require_readable()
+    with store.read() as session:
+        shown = views_of_video(session, recording.dataset_id, sha256)
+    wanted = [one for one in shown if first <= one.number <= last]
+    wanted = [one for one in wanted if one.has_lines or not with_lines]
+    ids, groups = sorted({one.group for one in wanted}), dict[int, StoredGroup]()
     for start in range(0, len(ids), _BATCH):
         with store.read() as session:
-            stored = read_groups(session, ids[start : start + _BATCH])
-        found.update({wanted[number]: group for number, group in stored.items()})
-    return found
-
-
-def _lines(stored: StoredGroup, sha256: str) -> Lines | None:
-    """The lines that somebody drew in a frame of a recording, or accepted; None where there are none."""
-    if not _is_frame(stored, sha256):
-        return None
-    station = stored.group.views[0].station
-    return None if station.flipped or station.picture else station.lines or None
-
-
-def _is_frame(stored: StoredGroup, sha256: str) -> bool:
-    """Whether a group shows a frame of the video of that content."""
-    views = stored.group.views
-    shown = (views[0].extras.metadata or {}).get("recording") if len(views) == 1 else None
-    return isinstance(shown, dict) and shown.get("sha256") == sha256
-
-
-def _given_before(
-    store: Store, recording: Recording, stretch: tuple[int, int]
-) -> dict[int, tuple[StoredGroup, Camera | None]]:
-    """Groups of a stretch by the number of their frame, with the camera that the tracker gave them before."""
-    sha256 = recording.require_readable()
-    groups = {
-        number: stored
-        for number, stored in _groups_of(store, recording, *stretch).items()
-        if _is_frame(stored, sha256)
-    }
-    cameras = cameras_at(store, recording, groups)
-    return {
-        number: (stored, cameras[number].camera if number in cameras else None)
-        for number, stored in groups.items()
-    }
+            groups |= read_groups(session, ids[start : start + _BATCH])
+    return [(one.number, groups[one.group], one.key) for one in wanted if one.group in groups]
 
 
 def _give(
     session: Session,
     recording: Recording,
     frames: Sequence[FrameCamera],
-    groups: Mapping[int, tuple[StoredGroup, Camera | None]],
+    views: Sequence[tuple[int, StoredGroup, str]],
+    before: Mapping[int, FrameCamera],
     actor: str,
 ) -> int:
-    """Give groups the cameras of their frames; returns how many have another one now."""
-    found = {frame.number: frame for frame in frames}
-    batch = []
-    for number, (stored, tracked) in groups.items():
-        view, frame = stored.group.views[0], found[number]
-        given, kept = view.station.given, stored.stations[view.key]
-        by_track = given is not None and given == tracked
-        free = given is None and not view.station.lines and frame.camera is not None
+    """Give views the cameras of their frames, unless somebody gave or drew another; returns how many have another one now."""
+    found, batch = {frame.number: frame for frame in frames}, []
+    for number, stored, key in views:
+        kept, frame = stored.stations[key], found[number]
+        station = kept.station
+        by_track = station.given is not None and number in before
+        by_track = by_track and station.given == before[number].camera
+        free = station.given is None and not station.lines and frame.camera is not None
         if by_track or free:
-            place = NamedStation(kept.id, stored.id, stored.group.match, view.size)
+            place = NamedStation(kept.id, stored.id, stored.group.match, station.size)
             batch.append((place, GivenCamera(frame.camera, frame.covariance)))
     report = IngestReport()
     attach_cameras(session, recording.dataset_id, batch, SOURCE, actor, report)

@@ -12,7 +12,7 @@ from app.terminal.remote import follow, some
 from app.terminal.server import connected, given_server
 from app.terminal.terminal import print_json, print_values, show_progress
 
-TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "shots", "sha256")
+TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "damaged", "shots", "sha256")
 
 
 def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:

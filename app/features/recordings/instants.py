@@ -5,8 +5,9 @@ The recording may be gone later: its groups have their frames, and say which one
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,15 @@ from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_row
 from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
 from app.features.recordings.cameras import SOURCE, cameras_at
-from app.features.recordings.service import Recording, get_recording, groups_taken, read_index
+from app.features.recordings.link_frames import linked_frames
+from app.features.recordings.links import list_links
+from app.features.recordings.service import (
+    Recording,
+    get_recording,
+    groups_taken,
+    read_index,
+    single_views,
+)
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
@@ -41,14 +50,52 @@ class Taken:
     Attributes:
         name: Of the recording.
         new: Groups that were made.
-        unchanged: Groups that were there already.
-        cameras: New ones that have the camera of their frame.
+        changed: Groups of one view that got those of linked replays.
+        unchanged: Groups that were there already, and stay as they are.
+        linked_views: Views of linked replays in the groups that were made or changed.
+        outside: Times that an instant of those is outside of the stretch of a linked replay.
+        cameras: Views of those groups that have the camera of their frame.
     """
 
     name: str
     new: int
+    changed: int
     unchanged: int
+    linked_views: int
+    outside: int
     cameras: int
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A frame that is a view of a group.
+
+    Attributes:
+        recording, index: Of what.
+        number: Of the frame.
+        tracked: What the tracker found of it; None: it was not tracked.
+        link: Of a frame of a replay: what is said of how it shows the group's instant.
+    """
+
+    recording: Recording
+    index: RecordingIndex
+    number: int
+    tracked: FrameCamera | None
+    link: Mapping[str, Any] | None = None
+
+    @property
+    def place(self) -> str:
+        """Where it is kept, below the recordings of the home."""
+        return f"{self.index.facts.sha256}/{self.number}.png"
+
+
+@dataclass
+class _LinkedViews:
+    """Views of linked replays by their live frame."""
+
+    of: defaultdict[int, list[_Shown]] = field(default_factory=lambda: defaultdict(list))
+    missed: list[int] = field(default_factory=list)
+    """Live frames that are outside of the stretch of a replay, once for each such replay."""
 
 
 def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
@@ -76,9 +123,14 @@ def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
 
 
 def take_instants(
-    store: Store, recording_id: int, frames: Sequence[int], actor: str, progress: ReportProgress
+    store: Store,
+    recording_id: int,
+    frames: Sequence[int],
+    linked: bool,
+    actor: str,
+    progress: ReportProgress,
 ) -> Taken:
-    """Make a group of one view of each instant; in a worker process, which decodes.
+    """Make a group of each instant: of one view, or with those of linked replays; in a worker process, which decodes.
 
     Killed anywhere and started again, it ends in the same state.
 
@@ -86,58 +138,117 @@ def take_instants(
         store: The database.
         recording_id: Which recording.
         frames: Numbers of its frames.
+        linked: Whether the frames of linked replays that show the same are further views. Groups of one view that
+            are there already get them, too.
         actor: Who wants it.
         progress: Called with instants done and in all.
 
     Raises:
-        ConflictError, InputError: As ``require_instants``.
+        ConflictError, InputError: As ``require_instants``, also of the recording of a replay.
         ImageError: A frame cannot be decoded.
         StorageError: The disk refuses.
     """
     recording = get_recording(store, recording_id)
     numbers = require_instants(recording, frames)
     there = groups_taken(store, recording)
-    wanted = [number for number in numbers if number not in there]
+    replays = _linked_views(store, recording, numbers) if linked else _LinkedViews()
+    single = single_views(store, recording) if linked else set()
+    wanted = [n for n in numbers if n not in there or (n in single and n in replays.of)]
     index = read_index(store.settings, recording.require_readable())
     origin, report = Origin(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
     tracked = cameras_at(store, recording, wanted)
-    groups = _groups(store.settings, recording, index, wanted, tracked)
+    live = [_Shown(recording, index, number, tracked.get(number)) for number in wanted]
+    groups = _groups(store.settings, live, replays.of)
     while batch := list(islice(groups, BATCH)):
         with store.write() as session:
             ingest_batch(session, origin, batch, report, set())
         done += len(batch)
         progress(done, total)
-    known = sum(frame.camera is not None for frame in tracked.values())
-    return Taken(recording.name, report.new, len(numbers) - len(wanted), known)
+    linked_views = [view for number in wanted for view in replays.of.get(number, ())]
+    return Taken(
+        recording.name,
+        report.new,
+        report.changed,
+        len(numbers) - len(wanted),
+        len(linked_views),
+        sum(number in wanted for number in replays.missed),
+        sum(
+            view.tracked is not None and view.tracked.camera is not None
+            for view in (*live, *linked_views)
+        ),
+    )
+
+
+def _linked_views(store: Store, recording: Recording, numbers: Sequence[int]) -> _LinkedViews:
+    """The frames of all linked replays that show what live frames show; those of usable links alone."""
+    found = _LinkedViews()
+    for link in list_links(store, recording.id):
+        asked = [number for number in numbers if number in link.live.frames]
+        if link.live.recording != recording.id or not link.map.is_usable or not asked:
+            continue
+        replay = get_recording(store, link.replay.recording)
+        index = read_index(store.settings, replay.require_readable())
+        same = linked_frames(store, link)
+        frames = {number: same.replay[number - same.first] for number in asked}
+        tracked = cameras_at(store, replay, [one for one in frames.values() if one is not None])
+        for number, frame in frames.items():
+            if frame is None:
+                found.missed.append(number)
+                continue
+            told = {
+                "link": link.id,
+                "live_frame": number,
+                "off_s": same.off_s[number - same.first],
+                "repeated": frame in same.repeated,
+                "blended": frame in same.blended,
+            }
+            view = _Shown(replay, index, frame, tracked.get(frame), told)
+            if all(view.place != other.place for other in found.of[number]):
+                found.of[number].append(view)
+    return found
 
 
 def _groups(
-    settings: Settings,
-    recording: Recording,
-    index: RecordingIndex,
-    numbers: Iterable[int],
-    tracked: Mapping[int, FrameCamera],
+    settings: Settings, live: Sequence[_Shown], linked: Mapping[int, Sequence[_Shown]]
 ) -> Iterator[Group]:
-    facts = index.facts
-    size = ImageSize(facts.width, facts.height)
-    folder = settings.recordings / facts.sha256
-    for number, image in read_frames(recording.path, index, numbers):
-        key = f"{recording.name}/{number}.png"
-        path = _kept(folder / f"{number}.png", image)
-        station, shown = Station(key, size), _provenance(recording, index, number)
-        frame = tracked.get(number)
-        if frame is not None and frame.camera is not None:
-            station = station.with_given(frame.camera, frame.covariance)
-            shown["camera"] = _given_by_track(frame)
-        view = View(
-            f"{number}.png",
-            station,
-            media=Media(str(path)),
-            extras=Extras(metadata={"recording": shown}),
-        )
-        yield Group(key, (view,), match=recording.name, label=f"Frame {number}")
+    for start in range(0, len(live), BATCH):
+        some = live[start : start + BATCH]
+        _keep(settings, [*some, *(view for one in some for view in linked.get(one.number, ()))])
+        for one in some:
+            match = one.recording.name
+            key = f"{match}/{one.number}.png"
+            views = [_view(settings, one, f"{one.number}.png", key)]
+            for other in linked.get(one.number, ()):
+                name = f"{other.number}.png"
+                if other.recording.id != one.recording.id:
+                    name = f"{other.recording.name}_{name}"
+                views.append(_view(settings, other, name, f"{key}/{name}"))
+            yield Group(key, tuple(views), match=match, label=f"Frame {one.number}")
+
+
+def _keep(settings: Settings, views: Sequence[_Shown]) -> None:
+    """Keep frames, each recording read once and forwards."""
+    by_place = {view.place: view for view in views}
+    missing = [one for one in by_place.values() if not (settings.recordings / one.place).is_file()]
+    for number in {one.recording.id for one in missing}:
+        mine = {one.number: one for one in missing if one.recording.id == number}
+        any_one = next(iter(mine.values()))
+        for at, image in read_frames(any_one.recording.path, any_one.index, sorted(mine)):
+            _kept(settings.recordings / mine[at].place, image)
+
+
+def _view(settings: Settings, shown: _Shown, name: str, key: str) -> View:
+    """The view of a frame that is kept; ``key`` is that of its station."""
+    facts, frame = shown.index.facts, shown.tracked
+    station = Station(key, ImageSize(facts.width, facts.height))
+    told = {**_provenance(shown.recording, shown.index, shown.number), **(shown.link or {})}
+    if frame is not None and frame.camera is not None:
+        station = station.with_given(frame.camera, frame.covariance)
+        told["camera"] = _given_by_track(frame)
+    media = Media(str(settings.recordings / shown.place))
+    return View(name, station, media=media, extras=Extras(metadata={"recording": told}))
 
 
 def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -122,8 +122,27 @@ def index_work(store: Store, progress: JobProgress) -> Json:
     }
 
 
+@dataclass(frozen=True)
+class InstantOptions:
+    """How groups are made of instants.
+
+    Attributes:
+        propose: Whether cameras are proposed for the new groups afterwards.
+        linked: Whether the frames of linked replays are further views.
+    """
+
+    propose: bool = True
+    linked: bool = False
+
+
 def request_instants(
-    jobs: Jobs, store: Store, recording_id: int, frames: Sequence[int], propose: bool, *, actor: str
+    jobs: Jobs,
+    store: Store,
+    recording_id: int,
+    frames: Sequence[int],
+    options: InstantOptions,
+    *,
+    actor: str,
 ) -> Job:
     """Make groups of instants, soon.
 
@@ -132,7 +151,7 @@ def request_instants(
         store: The database.
         recording_id: Which recording.
         frames: Numbers of its frames.
-        propose: Whether cameras are proposed for the new groups afterwards.
+        options: How.
         actor: Who wants it.
 
     Raises:
@@ -146,7 +165,7 @@ def request_instants(
         partial(instants_work, jobs, store),
         dataset_id=recording.dataset_id,
         actor=actor,
-        request={"recording": recording_id, "frames": numbers, "propose": propose},
+        request={"recording": recording_id, "frames": numbers, **asdict(options)},
     )
 
 
@@ -160,12 +179,19 @@ def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
 
     with left_to_next_server(progress):
         taken = take_in_worker(
-            store, recording, asked["frames"], actor=actor, progress=step, stop=progress.check
+            store,
+            recording,
+            asked["frames"],
+            linked=asked.get("linked", False),
+            actor=actor,
+            progress=step,
+            stop=progress.check,
         )
     solve = proposals = None
-    if taken["new"]:
+    if taken["new"] or taken["changed"]:
         solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id
-        if asked["propose"] and taken["cameras"] < taken["new"]:
+        views = taken["new"] + taken["changed"] + taken["linked_views"]
+        if asked["propose"] and taken["cameras"] < views:
             number, match = recording.dataset_id, recording.name
             proposals = PROPOSALS.request(jobs, store, number, match, actor=actor).id
     groups = groups_taken(store, recording)
@@ -182,6 +208,7 @@ def take_in_worker(
     recording: Recording,
     frames: Sequence[int],
     *,
+    linked: bool,
     actor: str,
     progress: ReportProgress,
     stop: Any,
@@ -195,6 +222,7 @@ def take_in_worker(
             take_instants,
             recording.id,
             frames,
+            linked,
             actor,
             limits=limits,
             progress=progress,

@@ -10,7 +10,8 @@ import numpy as np
 
 from app.db.store import Store
 from app.errors import InputError
-from app.features.recordings.links import ShotLink, list_links, need_link, shot_seconds, step_of
+from app.features.recordings.link_values import ShotLink
+from app.features.recordings.links import list_links, need_link, shot_seconds, step_of
 from app.features.recordings.service import (
     Recording,
     Shot,
@@ -20,7 +21,7 @@ from app.features.recordings.service import (
     read_index_at,
 )
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.tracking.link import SLOWEST
+from app.tracking.link_fit import SLOWEST
 from app.video.repeats import blended, repeated
 
 SUGGESTED = 6

@@ -6,27 +6,24 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from app.features.recordings.link_frames import linked_frames, suggest_live
+from app.features.jobs.queries import Job
+from app.features.recordings.link_ball import request_ball_link
+from app.features.recordings.link_frames import LinkedFrames, linked_frames, suggest_live
 from app.features.recordings.link_schemas import (
+    BallLinkRequest,
     InstantsEdit,
     LinkDocument,
-    LinkedFramesDocument,
     LinkList,
     LiveSuggestions,
     NewLink,
 )
-from app.features.recordings.links import (
-    ShotLink,
-    add_link,
-    get_link,
-    list_links,
-    remove_link,
-    set_instants,
-)
+from app.features.recordings.link_values import ShotLink
+from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
 from app.finite import MAX_ID
 from app.http.conflicts import current_state
 from app.http.cursor import paged
-from app.http.deps import Actor, AppStore, Id, IfMatch
+from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
+from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.respond import document, no_content, responds
@@ -55,7 +52,9 @@ def _made(found: ShotLink) -> Response:
 @paged()
 def get_links(recording: Id, store: AppStore) -> LinkList:
     """The links of a recording, in which it has the live shot or the replay."""
-    return LinkList.model_validate({"items": list_links(store, recording)})
+    return LinkList(
+        items=[LinkDocument.model_validate(one) for one in list_links(store, recording)]
+    )
 
 
 @router.post(
@@ -93,7 +92,7 @@ def add_one(recording: Id, wanted: NewLink, store: AppStore, actor: Actor) -> Sh
 @paged()
 def get_suggestions(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveSuggestions:
     """Live shots that the replay at a frame may show, the likeliest first, and why."""
-    return LiveSuggestions.model_validate({"items": suggest_live(store, recording, frame)})
+    return LiveSuggestions(items=suggest_live(store, recording, frame))
 
 
 @router.get("/links/{link}", operation_id="getLink", responses={**responses(404), 200: TAGGED})
@@ -107,10 +106,9 @@ def get_one(recording: Id, link: LinkId, store: AppStore, response: Response) ->
 
 @router.get("/links/{link}/frames", operation_id="getLinkedFrames", responses=responses(404, 409))
 @may(Action.READ, recording=OwnedKind.RECORDING)
-def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFramesDocument:
+def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
     """Which frame of the replay shows the same as each live frame."""
-    found = linked_frames(store, get_link(store, recording, link))
-    return LinkedFramesDocument.model_validate(found)
+    return linked_frames(store, get_link(store, recording, link))
 
 
 @router.put(
@@ -144,6 +142,24 @@ def put_instants(
             if_match,
             actor=actor,
         )
+
+
+@router.post("/links/{link}/ball", operation_id="linkByBall", **by_job(404, 413, 415))
+@may(
+    Action.LEAD,
+    recording=OwnedKind.RECORDING,
+    body={"live_upload": OwnedKind.UPLOAD, "replay_upload": OwnedKind.UPLOAD},
+)
+@responds(job_answer)
+def link_by_ball(
+    recording: Id, link: LinkId, wanted: BallLinkRequest, services: AppServices, actor: Actor
+) -> Job:
+    """Find the times of a link from the ball, near its instants: rays of the same instant meet.
+
+    Both shots need cameras over time, or groups with given cameras. What the ball does not tell is refused in words.
+    """
+    uploads = {"live": wanted.live_upload, "replay": wanted.replay_upload}
+    return request_ball_link(services.jobs, services.store, recording, link, uploads, actor=actor)
 
 
 @router.delete(

@@ -7,13 +7,13 @@ the first frame of their shot.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from app.canonical import canonical, digest_of
+from app.canonical import canonical
 from app.config import Settings
 from app.db.json_columns import parse
 from app.db.session import Session
@@ -28,136 +28,24 @@ from app.features.recordings.link_queries import (
     list_link_rows,
     update_link,
 )
+from app.features.recordings.link_values import (
+    LinkedShot,
+    LinkMap,
+    ShotLink,
+    described,
+    etag_of,
+    link_of,
+    shots_of_link,
+)
 from app.features.recordings.service import frame_seconds, need_recording
 from app.geometry.arrays import FloatArray
 from app.plural import plural
-from app.soccer.choices import LinkOutcome, LinkSource
-from app.tracking.time_map import TimeMap, map_of_instants
+from app.tracking.time_map import map_of_instants
 
 MAX_INSTANTS = 100
 """Of a link; ten make a map as good as it gets."""
 MAX_LINKS = 10_000
 """Of a recording."""
-
-
-@dataclass(frozen=True)
-class LinkedShot:
-    """One side of a link.
-
-    Attributes:
-        recording: Id of its recording.
-        name: Name of its recording.
-        first, last: Numbers of its frames.
-    """
-
-    recording: int
-    name: str
-    first: int
-    last: int
-
-    @property
-    def frames(self) -> range:
-        """Numbers of its frames."""
-        return range(self.first, self.last + 1)
-
-
-@dataclass(frozen=True)
-class Instant:
-    """One instant of the match in both shots.
-
-    Attributes:
-        live, replay: Frames that show it.
-        residual: Live frames by which the map puts the frame of the replay later; None without a map.
-    """
-
-    live: int
-    replay: int
-    residual: float | None = None
-
-
-@dataclass(frozen=True)
-class LinkPiece:
-    """A part of a replay that runs at one speed.
-
-    Attributes:
-        first, last: Frames of the replay in which it begins and ends.
-        first_s, last_s: The same, seconds after the first frame of the replay.
-        offset_s, speed: ``live = offset + speed * replay``, seconds after the first frames of the shots.
-        speed_sigma: Standard deviation of the speed.
-    """
-
-    first: int
-    last: int
-    first_s: float
-    last_s: float
-    offset_s: float
-    speed: float
-    speed_sigma: float
-
-
-@dataclass(frozen=True)
-class LinkMap:
-    """Which time of the live shot each time of a replay shows.
-
-    Attributes:
-        outcome: ``none``: nothing is known; ``offset``: the speed is assumed; ``linked``: offset and speed are known,
-            or those of all pieces; ``unobservable``: they cannot be told.
-        found_by: From what: ``instants`` of people, or the ``ball``.
-        reason: Why there is no map of one offset and speed.
-        offset_s, speed: ``live = offset + speed * replay``, seconds after the first frames of the shots.
-        offset_sigma_s, speed_sigma: Their standard deviations.
-        sigma_s: Standard deviation of the live time of the middle of the replay, seconds.
-        miss_m: Median distance of the ball's rays, where it was found by them.
-        pieces: Where the speed changes.
-    """
-
-    outcome: LinkOutcome
-    found_by: LinkSource | None = None
-    reason: str | None = None
-    offset_s: float | None = None
-    speed: float | None = None
-    offset_sigma_s: float | None = None
-    speed_sigma: float | None = None
-    sigma_s: float | None = None
-    miss_m: float | None = None
-    pieces: tuple[LinkPiece, ...] = ()
-
-    @property
-    def is_usable(self) -> bool:
-        """Whether it says a live time for each time of the replay."""
-        return self.outcome in ("offset", "linked")
-
-    def live(self, times: FloatArray) -> FloatArray:
-        """Live times of times of the replay, seconds after the first frames, shape (N,)."""
-        pieces = tuple(
-            TimeMap(None, one.offset_s, one.speed, first=one.first_s, last=one.last_s)
-            for one in self.pieces
-        )
-        return TimeMap(None, self.offset_s, self.speed, pieces=pieces).live(times)
-
-
-@dataclass(frozen=True)
-class ShotLink:
-    """A link as it stands.
-
-    Attributes:
-        live: The live shot.
-        replay: The shot that shows it again.
-        instants: What people linked, by the frames of the replay.
-        assumed_speed: Speed of the replay while one instant is linked; None: that of the live shot.
-        map: What follows from them.
-    """
-
-    id: int
-    dataset_id: int
-    live: LinkedShot
-    replay: LinkedShot
-    instants: tuple[Instant, ...]
-    assumed_speed: float | None
-    map: LinkMap
-    actor: str
-    created: str
-    etag: str
 
 
 def list_links(store: Store, recording_id: int) -> list[ShotLink]:
@@ -168,7 +56,7 @@ def list_links(store: Store, recording_id: int) -> list[ShotLink]:
     """
     with store.read() as session:
         need_recording(session, recording_id)
-        return [_link(row) for row in list_link_rows(session, recording_id)]
+        return [link_of(row) for row in list_link_rows(session, recording_id)]
 
 
 def get_link(store: Store, recording_id: int, link_id: int) -> ShotLink:
@@ -178,7 +66,7 @@ def get_link(store: Store, recording_id: int, link_id: int) -> ShotLink:
         NotFoundError: The recording has no such link.
     """
     with store.read() as session:
-        return _link(need_link(session, recording_id, link_id))
+        return link_of(need_link(session, recording_id, link_id))
 
 
 def need_link(session: Session, recording_id: int, link_id: int) -> Any:
@@ -240,8 +128,8 @@ def add_link(
                 assumed_speed=None,
                 map=canonical(asdict(LinkMap("none"))),
             )
-            _note(session, actor, "replay linked", find_link(session, number))
-        found = _link(find_link(session, number))
+            note_link(session, actor, "replay linked", find_link(session, number))
+        found = link_of(find_link(session, number))
         session.respond(found)
     return found
 
@@ -272,7 +160,8 @@ def _require_shot(session: Session, recording: int, first: int, last: int, point
     return row
 
 
-def _note(session: Session, actor: str, did: str, row: Any) -> None:
+def note_link(session: Session, actor: str, did: str, row: Any) -> None:
+    """Write into the log what somebody did to a link."""
     what = {"link": row.id, "live": row.live_name, "replay": row.replay_name}
     frames = {"live_first": row.live_first, "replay_first": row.replay_first}
     add_audit_event(session, actor, did, row.dataset_id, **what, **frames)
@@ -308,22 +197,31 @@ def set_instants(
     with store.write() as session:
         row = need_link(session, recording_id, link_id)
         if if_match is not None:
-            require_etag(_etag(row), if_match, "this link")
-        live, replay = _shots(row)
-        pairs = _sound(instants, live, replay)
+            require_etag(etag_of(row), if_match, "this link")
+        pairs = _sound(instants, *shots_of_link(row))
         made, residuals = _map_of(store.settings, row, pairs, assumed_speed)
-        kept = [[*pair, off] for pair, off in zip(pairs, residuals, strict=True)]
-        values = {
-            "instants": canonical(kept),
-            "assumed_speed": assumed_speed,
-            "map": canonical(asdict(made)),
-        }
-        if any(getattr(row, name) != value for name, value in values.items()):
-            update_link(session, link_id, **values, revision=row.revision + 1)
-            _note(session, actor, "instants linked", row)
-        found = _link(find_link(session, link_id))
+        if save_map(session, row, pairs, made, residuals, assumed_speed=assumed_speed):
+            note_link(session, actor, "instants linked", row)
+        found = link_of(find_link(session, link_id))
         session.respond(found)
     return found
+
+
+def save_map(
+    session: Session,
+    row: Any,
+    pairs: Sequence[tuple[int, int]],
+    made: LinkMap,
+    residuals: Sequence[float | None],
+    **more: Any,
+) -> bool:
+    """Keep the instants of a link and its map; returns whether anything is another."""
+    kept = [[*pair, off] for pair, off in zip(pairs, residuals, strict=True)]
+    values = {"instants": canonical(kept), "map": canonical(asdict(made)), **more}
+    if all(getattr(row, name) == value for name, value in values.items()):
+        return False
+    update_link(session, row.id, **values, revision=row.revision + 1)
+    return True
 
 
 def remove_link(store: Store, recording_id: int, link_id: int, *, actor: str) -> None:
@@ -335,7 +233,7 @@ def remove_link(store: Store, recording_id: int, link_id: int, *, actor: str) ->
     with store.write() as session:
         row = need_link(session, recording_id, link_id)
         delete_link(session, link_id)
-        _note(session, actor, "link removed", row)
+        note_link(session, actor, "link removed", row)
         session.respond(None)
 
 
@@ -386,97 +284,36 @@ def _map_of(
     assumed_speed: float | None,
 ) -> tuple[LinkMap, list[float | None]]:
     """The map of instants, and the residual of each in live frames."""
-    live, replay = _shots(row)
-    times = shot_seconds(settings, row.replay_sha256, replay)
-    live_times = shot_seconds(settings, row.live_sha256, live)
-    given = np.array(
-        [(live_times[one - live.first], times[other - replay.first]) for one, other in pairs]
-    ).reshape(-1, 2)
-    step = step_of(live_times)
-    made = described(
-        map_of_instants(given, step, assumed_speed), replay, times, "instants" if pairs else None
-    )
-    if not made.is_usable:
-        return made, [None] * len(pairs)
-    return made, ((made.live(given[:, 1]) - given[:, 0]) / step).tolist()
+    _, replay = shots_of_link(row)
+    live_times, times = link_seconds(settings, row)
+    given = instant_seconds(row, pairs, live_times, times)
+    found = map_of_instants(given, step_of(live_times), assumed_speed)
+    made = described(found, replay, times, "instants" if pairs else None)
+    return made, residuals_of(made, given, live_times)
 
 
-def described(
-    made: TimeMap, replay: LinkedShot, times: FloatArray, found_by: LinkSource | None
-) -> LinkMap:
-    """A map as it is kept and shown.
-
-    Args:
-        made: Of seconds after the first frames of the shots.
-        replay: The replay.
-        times: Of its frames, seconds after its first one, shape (N,).
-        found_by: From what it was found.
-    """
-    frames = np.searchsorted(times, [[one.first, one.last] for one in made.pieces])
-    pieces = tuple(
-        LinkPiece(
-            replay.first + int(ends[0]),
-            min(replay.first + int(ends[1]), replay.last),
-            one.first,
-            one.last,
-            float(one.offset or 0.0),
-            float(one.speed or 0.0),
-            _sigma(one)[1] or 0.0,
-        )
-        for one, ends in zip(made.pieces, frames, strict=True)
-    )
-    outcome: LinkOutcome = "linked"
-    if made.reason is not None and not pieces:
-        known = made.by_hand and made.offset is not None
-        outcome = "offset" if known else "none" if found_by is None else "unobservable"
-    if outcome in ("none", "unobservable"):
-        return LinkMap(outcome, found_by, made.reason, miss_m=made.miss)
-    whole = not pieces
-    return LinkMap(
-        outcome,
-        found_by,
-        made.reason,
-        made.offset if whole else None,
-        made.speed if whole else None,
-        *(_sigma(made) if whole else (None, None)),
-        made.sigma_at(float(times[-1]) / 2) if whole else None,
-        made.miss,
-        pieces,
-    )
-
-
-def _sigma(made: TimeMap) -> tuple[float | None, float | None]:
-    if made.covariance is None:
-        return None, None
-    offset, speed = np.sqrt(np.maximum(made.covariance.diagonal(), 0.0)).tolist()
-    return offset, speed
-
-
-def _shots(row: Any) -> tuple[LinkedShot, LinkedShot]:
+def link_seconds(settings: Settings, row: Any) -> tuple[FloatArray, FloatArray]:
+    """When the frames of the live shot and of the replay are shown, seconds after the first ones."""
+    live, replay = shots_of_link(row)
     return (
-        LinkedShot(row.live_id, row.live_name, row.live_first, row.live_last),
-        LinkedShot(row.replay_id, row.replay_name, row.replay_first, row.replay_last),
+        shot_seconds(settings, row.live_sha256, live),
+        shot_seconds(settings, row.replay_sha256, replay),
     )
 
 
-def _etag(row: Any) -> str:
-    content = f"{row.instants} {row.assumed_speed} {row.map}"
-    return f'"{row.revision}-{digest_of(content.encode())[:12]}"'
+def instant_seconds(
+    row: Any, pairs: Sequence[tuple[int, int]], live: FloatArray, replay: FloatArray
+) -> FloatArray:
+    """Live and replay time of instants, from the times of the frames, shape (N, 2)."""
+    given = [(live[one - row.live_first], replay[two - row.replay_first]) for one, two in pairs]
+    return np.array(given).reshape(-1, 2)
 
 
-def _link(row: Any) -> ShotLink:
-    live, replay = _shots(row)
-    stored = parse(row.map)
-    made = LinkMap(**{**stored, "pieces": tuple(LinkPiece(**one) for one in stored["pieces"])})
-    return ShotLink(
-        id=int(row.id),
-        dataset_id=int(row.dataset_id),
-        live=live,
-        replay=replay,
-        instants=tuple(Instant(*one) for one in parse(row.instants)),
-        assumed_speed=row.assumed_speed,
-        map=made,
-        actor=row.actor,
-        created=row.created,
-        etag=_etag(row),
-    )
+def residuals_of(made: LinkMap, given: FloatArray, live: FloatArray) -> list[float | None]:
+    """Live frames by which a map puts instants later, from their times and those of the live frames."""
+    if not made.is_usable:
+        return [None] * len(given)
+    residuals: list[float | None] = (
+        (made.live(given[:, 1]) - given[:, 0]) / step_of(live)
+    ).tolist()
+    return residuals

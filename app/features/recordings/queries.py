@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import Select, delete, func, insert, select, update
 
 from app.db.session import Session, now
-from app.features.datasets.tables import DatasetModel, GroupModel
+from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.alias_queries import shown_actor
 from app.features.recordings.tables import RecordingModel
@@ -52,12 +52,18 @@ def names_and_paths(session: Session, dataset_id: int) -> Sequence[Any]:
     return session.execute(select(*columns).where(RecordingModel.dataset_id == dataset_id)).all()
 
 
-def taken_frames(session: Session, dataset_id: int, name: str) -> dict[str, int]:
-    """Ids of the groups that were taken from a recording, by their keys."""
-    statement = select(GroupModel.key, GroupModel.id).where(
+def taken_frames(session: Session, dataset_id: int, name: str) -> Sequence[Any]:
+    """``key``, ``id`` and number of ``views`` of the groups that were taken from a recording."""
+    views = (
+        select(func.count())
+        .where(ViewModel.group_id == GroupModel.id)
+        .correlate(GroupModel)
+        .scalar_subquery()
+    )
+    statement = select(GroupModel.key, GroupModel.id, views.label("views")).where(
         GroupModel.dataset_id == dataset_id, GroupModel.match == name
     )
-    return {row.key: int(row.id) for row in session.execute(statement)}
+    return session.execute(statement).all()
 
 
 def insert_recording(session: Session, dataset_id: int, name: str, path: str, *, actor: str) -> int:

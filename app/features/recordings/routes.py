@@ -11,7 +11,12 @@ from app.canonical import digest_of
 from app.features.datasets.service import dataset_id
 from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, clamp_width
 from app.features.jobs.queries import Job
-from app.features.recordings.jobs import request_index, request_instants, request_recording
+from app.features.recordings.jobs import (
+    InstantOptions,
+    request_index,
+    request_instants,
+    request_recording,
+)
 from app.features.recordings.schemas import (
     InstantsRequest,
     NewRecording,
@@ -140,7 +145,7 @@ async def get_frame(
     if etag_matches(request, etag):
         return Response(status_code=304, headers=headers)
     task = services.recordings.ask(found, frame, wide)
-    data = await task.result_unless(request.is_disconnected)
+    data = await task.result_unless_client_gone(request.is_disconnected)
     if data is None:
         return Response(status_code=CLIENT_GONE)
     services.recordings.ask_ahead(found, frame)
@@ -216,10 +221,13 @@ def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
 def take_instants(
     recording: Id, wanted: InstantsRequest, services: AppServices, actor: Actor
 ) -> Job:
-    """Make a group of one view of each of these frames, which are kept without loss.
+    """Make a group of each of these frames, which are kept without loss.
 
-    A frame that is a group already stays as it is. The recording may be gone afterwards.
+    With `linked`, the frames of linked replays that show the same are further views; each has in `metadata.recording` by
+    how many seconds it is off (`off_s`), and whether it is repeated or blended. A frame that is a group already stays as
+    it is, but for a group of one view that gets linked ones. The recording may be gone afterwards.
     """
+    options = InstantOptions(propose=wanted.propose, linked=wanted.linked)
     return request_instants(
-        services.jobs, services.store, recording, wanted.frames, wanted.propose, actor=actor
+        services.jobs, services.store, recording, wanted.frames, options, actor=actor
     )

@@ -50,6 +50,9 @@ class RecordingDocument(Document):
     height: int | None = Field(description="Of a frame, upright with square pixels.")
     rotation: int | None = Field(description="Degrees by which the file turns its frames.")
     interlaced: bool | None = Field(description="Null: that cannot be told.")
+    damaged: int | None = Field(
+        description="Pictures that cannot be decoded; they are left out, and have no number."
+    )
     shots: int = Field(description="How many shots it has.")
     groups: int = Field(description="How many groups were taken from it.")
     problem: str | None = Field(description="Why its frames cannot be read now.")
@@ -130,4 +133,8 @@ class InstantsRequest(BaseModel):
     frames: Annotated[list[Frame], Field(min_length=1, max_length=MOST_AT_ONCE)]
     propose: StrictBool = Field(
         default=True, description="Whether a job proposes cameras for them afterwards."
+    )
+    linked: StrictBool = Field(
+        default=False,
+        description="Whether the frames of linked replays that show the same are further views of the groups.",
     )

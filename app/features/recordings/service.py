@@ -44,7 +44,7 @@ from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.choices import ShotKind, ShotStart
 from app.soccer.policy import TOUCHLINE
-from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes
+from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds
 from app.video.indexing import index_recording
 from app.video.shots import shots_of_indexed
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits, WorkerProcess
@@ -92,6 +92,7 @@ class Recording:
         seconds: How long it is.
         width, height: Of a frame as people see it, pixels.
         interlaced: Whether its frames show two fields; None where that cannot be told.
+        damaged: How many pictures of the file cannot be decoded; they are left out, and have no number.
         shots: How many it has.
         groups: How many groups were taken from it.
         problem: Why its frames cannot be read now, in a sentence; None: they can.
@@ -113,6 +114,7 @@ class Recording:
     height: int | None
     rotation: int | None
     interlaced: bool | None
+    damaged: int | None
     shots: int
     groups: int
     problem: str | None
@@ -335,16 +337,18 @@ def read_index_at(place: Path) -> RecordingIndex:
     try:
         return index_from_bytes(place.read_bytes())
     except (OSError, InputError) as error:
-        raise ConflictError(
-            "the index of this recording cannot be read", hint="Index it again."
-        ) from error
+        raise _no_index() from error
+
+
+def _no_index() -> ConflictError:
+    return ConflictError("the index of this recording cannot be read", hint="Index it again.")
 
 
 def has_index(store: Store, recording: Recording) -> bool:
     """Whether the index of a recording fits its file, and this version can read it."""
     try:
-        read_index(store.settings, recording.require_readable())
-    except ConflictError:
+        read_index_seconds(index_place(store.settings, recording.require_readable()))
+    except (ConflictError, InputError, OSError):
         return False
     return True
 
@@ -446,8 +450,16 @@ def _require_sound(shots: Sequence[Shot], frames: int) -> None:
 def groups_taken(store: Store, recording: Recording) -> dict[int, int]:
     """Ids of the groups that were taken from a recording, by the number of their frame."""
     with store.read() as session:
-        keys = taken_frames(session, recording.dataset_id, recording.name)
-    return {number: keys[key] for number, key in frames_of_keys(keys).items()}
+        rows = taken_frames(session, recording.dataset_id, recording.name)
+    ids = {row.key: int(row.id) for row in rows}
+    return {number: ids[key] for number, key in frames_of_keys(ids).items()}
+
+
+def single_views(store: Store, recording: Recording) -> set[int]:
+    """Numbers of the frames whose groups have no view but theirs."""
+    with store.read() as session:
+        rows = taken_frames(session, recording.dataset_id, recording.name)
+    return set(frames_of_keys(row.key for row in rows if row.views == 1))
 
 
 def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
@@ -474,7 +486,10 @@ def _shots(settings: Settings, row: Any) -> RecordingShots:
 @lru_cache(maxsize=4)
 def _seconds(index: Path) -> FloatArray:
     """When each frame is shown, by the place of an index: that of a whole match takes a second to read."""
-    return read_index_at(index).seconds
+    try:
+        return read_index_seconds(index)
+    except (OSError, InputError) as error:
+        raise _no_index() from error
 
 
 def frame_seconds(settings: Settings, sha256: str) -> FloatArray:
@@ -494,7 +509,7 @@ def _recording(row: Any) -> Recording:
     path = Path(row.path)
     facts: Mapping[str, Any] = {} if row.facts is None else parse(row.facts)
     names = ("bytes", "frames", "fps", "variable", "seconds")
-    shape = ("width", "height", "rotation", "interlaced")
+    shape = ("width", "height", "rotation", "interlaced", "damaged")
     return Recording(
         id=int(row.id),
         dataset_id=int(row.dataset_id),

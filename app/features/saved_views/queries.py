@@ -28,13 +28,11 @@ def find_saved_view(session: Session, view_id: int) -> SavedViewModel | None:
     return session.row(SavedViewModel, _SAVED.where(SavedViewModel.id == view_id))
 
 
-def insert_saved_view(
-    session: Session, dataset_id: int, name: str, query: str, *, actor: str
-) -> int:
-    """Insert a saved view; returns its id."""
+def insert_saved_view(session: Session, dataset_id: int, *, actor: str, **values: str) -> int:
+    """Insert a saved view with the values of its columns; returns its id."""
     identity = next_id(session, SavedViewModel)
-    values = {"id": identity, "dataset_id": dataset_id, "name": name, "query": query}
-    session.execute(insert(SavedViewModel), [{**values, "actor": actor, "created": now()}])
+    row = {"id": identity, "dataset_id": dataset_id, "actor": actor, "created": now(), **values}
+    session.execute(insert(SavedViewModel), [row])
     return identity
 
 

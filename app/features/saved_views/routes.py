@@ -56,7 +56,8 @@ def _saved(view: SavedView) -> Response:
 @responds(_saved)
 def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor) -> SavedView:
     """Keep a query under a name; 409 when the name is taken."""
-    return saved_views.save_view(store, dataset_id(store, dataset), view.name, view.q, actor=actor)
+    values = view.model_dump()
+    return saved_views.save_view(store, dataset_id(store, dataset), **values, actor=actor)
 
 
 @router.get(

@@ -53,7 +53,7 @@ def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
         return [_saved_view(row, _matching(session, row)) for row in rows if _is_visible(row)]
 
 
-def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: str) -> SavedView:
+def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -> SavedView:
     """Keep a query under a name.
 
     Raises:
@@ -61,7 +61,7 @@ def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: st
         ConflictError: The name is taken; nobody's view is replaced unseen.
     """
     name = checked_title(name, "a saved view")
-    parse_query(query)
+    parse_query(q)
     with store.write() as session:
         rows = dataset_saved_views(session, dataset_id)
         names = [row.name for row in rows]
@@ -79,7 +79,7 @@ def save_view(store: Store, dataset_id: int, name: str, query: str, *, actor: st
                 f"one person has at most {MAX_OWN} saved views in a dataset",
                 hint="Delete one of yours first.",
             )
-        identity = insert_saved_view(session, dataset_id, name, query.strip(), actor=actor)
+        identity = insert_saved_view(session, dataset_id, name=name, query=q.strip(), actor=actor)
         saved = _read(session, identity)
         session.respond(saved)
     return saved

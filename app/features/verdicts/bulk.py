@@ -338,7 +338,10 @@ class BatchRun:
         if session.idempotency_key is None:
             return
         if read_progress(session) != self._left:
-            raise ConflictError("this very request is being carried out", hint="Send it again.")
+            raise ConflictError(
+                "this very request is being carried out",
+                hint="Wait, then send it again with the same Idempotency-Key.",
+            )
         self._left = {"batch": self.batch, **left}
         save_progress(session, self._left)
 

@@ -21,7 +21,7 @@ from app.features.datasets.service import DatasetHead, licence_text, read_datase
 from app.features.findings.queries import GroupDismissals
 from app.features.groups.codecs import policy_to_json
 from app.features.groups.queries import read_groups
-from app.features.queue.queries import read_noticed
+from app.features.queue.queries import read_import_findings
 from app.features.solutions.queries import (
     known_calibrations,
     present_bodies,
@@ -241,7 +241,7 @@ class _Run:
             return {}
         stored = read_groups(self._session, ids)
         solutions = present_bodies(self._session, ids, self._dataset.policy.hash)
-        noticed, dismissals = read_noticed(self._session, ids)
+        noticed, dismissals = read_import_findings(self._session, ids)
         texts: dict[str, str] = {}
         bodies: dict[str, bytes] = {}
         names: set[str] = set()

@@ -151,7 +151,7 @@ def new_salt() -> str:
     return secrets.token_hex(16)
 
 
-def secret_of(settings: Settings, salt: str) -> str:
+def webhook_secret(settings: Settings, salt: str) -> str:
     """The secret of a webhook, as the specification writes it (``whsec_``).
 
     Raises:

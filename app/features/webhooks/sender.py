@@ -21,7 +21,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
 from app.features.batches.progress import notify_of_stalls
 from app.features.datasets.queries import dataset_names
-from app.features.webhooks.messages import Message, read_messages, secret_of, sign
+from app.features.webhooks.messages import Message, read_messages, sign, webhook_secret
 from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,
@@ -301,7 +301,7 @@ class WebhookSender:
     async def _post(self, client: httpx.AsyncClient, row: Any) -> int:
         settings = self._store.settings
         require_allowed(row.url, settings.webhooks)
-        headers = sign(secret_of(settings, row.salt), row.message, self._clock(), row.body)
+        headers = sign(webhook_secret(settings, row.salt), row.message, self._clock(), row.body)
         headers["Content-Type"] = "application/json"
         async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:
             return answer.status_code

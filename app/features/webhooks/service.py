@@ -15,7 +15,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.queries import dataset_name
 from app.features.datasets.service import dataset_id
-from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping, secret_of
+from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping, webhook_secret
 from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,
@@ -104,10 +104,12 @@ def make_webhook(
     """
     require_allowed(url, store.settings.webhooks, "/url")
     number, salt = dataset_id(store, dataset), new_salt()
-    secret = secret_of(store.settings, salt)
+    secret = webhook_secret(store.settings, salt)
     with store.write() as session:
         if len(webhooks_of(session, number)) >= MOST:
-            raise ConflictError(f"this dataset has {MOST} webhooks", hint="Delete one of them.")
+            raise ConflictError(
+                f"a dataset has at most {MOST} webhooks", hint="Delete one of them."
+            )
         made = insert_webhook(session, number, url, _checked_kinds(kinds), salt=salt, by=actor)
         add_audit_event(session, actor, "webhook made", number, url=url)
         return _webhook_of(session, number, made), secret
@@ -150,7 +152,7 @@ def change_webhook(
 def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> tuple[Webhook, str]:
     """Another secret in place of the one that was; what is sent from now on is signed with it."""
     number, salt = dataset_id(store, dataset), new_salt()
-    secret = secret_of(store.settings, salt)
+    secret = webhook_secret(store.settings, salt)
     with store.write() as session:
         found = _webhook_of(session, number, webhook_id)
         update_webhook(session, webhook_id, {"salt": salt})

@@ -178,7 +178,7 @@ class YieldStore:
             self._tried(dataset_id, kept, None)
         self._forget()
 
-    def keep_large_up(self) -> None:
+    def refresh_large_datasets(self) -> None:
         """Bring those tables in step that would let somebody wait."""
         with self._store.read() as session:
             names = dataset_names(session)

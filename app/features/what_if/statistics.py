@@ -88,7 +88,7 @@ class StatisticsStore:
                 raise
         return statistics_of(found.counted)
 
-    def keep_large_up(self) -> None:
+    def refresh_large_datasets(self) -> None:
         """Read those datasets that would let somebody wait."""
         with self._store.read() as session:
             names = dataset_names(session)

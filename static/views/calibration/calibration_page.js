@@ -8,7 +8,7 @@ import { getInfluence, getStation } from '../../api/calibration.js';
 import { ApiError } from '../../api/problem.js';
 import { useKeys } from '../../lib/hooks.js';
 import { useResource } from '../../lib/resource.js';
-import { navigate, page } from '../../lib/router.js';
+import { address, navigate, page, param } from '../../lib/router.js';
 import { picturesOf } from '../../overlays/scene.js';
 import {
 	changed, resetForView, shown, shownSolution, startAsking, view,
@@ -52,6 +52,7 @@ function ViewTabs({ group, current }) {
 	return html`
 		<nav class="header__middle editor__views" aria-label="Views of the group">
 			<a class="button" href=${reviewAddress(group.id)} title="Back to the review (Esc)">‹ Review</a>
+			${param('recording') ? html`<a class="button" href=${address(`/recordings/${param('recording')}`, { frame: param('frame') })} title="Back to the frame of the recording">‹ Recording</a>` : null}
 			${group.views.map((one) => html`
 				<a
 					key=${one.key} class="editor__tab" href=${editorAddress(group.id, one.key)} title=${one.label}

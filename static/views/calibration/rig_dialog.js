@@ -106,7 +106,7 @@ export function RigDialog({ dataset, station, onClose }) {
 		<${FormDialog}
 			wide=${true} title="Adjust static cameras together" onClose=${onClose} onSubmit=${send}
 			buttons=${html`
-				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Undo the adjustment</button>` : null}
+				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Restore the cameras as they were</button>` : null}
 				<button class="button button--primary" type="submit" aria-disabled=${busy} title=${busy ? 'Under way' : ''}>${proposal ? 'Save' : 'Propose'}</button>`}
 		>
 			<p>Balls that several cameras show at once align the cameras with each other; field lines and the cameras in use keep them in place. You see what changes before anything is saved.</p>

@@ -154,8 +154,8 @@ function GroupRow({ one }) {
 function GroupsCard({ found }) {
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-groups">
-			<h2 id="agreement-groups">Groups, the worst first<span class="card__aside">${plural(found.groups.length, 'group')}</span></h2>
-			<div class="table__scroll" tabindex="0" role="region" aria-label="Groups, the worst first">
+			<h2 id="agreement-groups">Groups, most disagreement first<span class="card__aside">${plural(found.groups.length, 'group')}</span></h2>
+			<div class="table__scroll" tabindex="0" role="region" aria-label="Groups, most disagreement first">
 				<table class="table">
 					<thead><tr><th>group</th><th>verdicts</th><th>result</th><th data-numeric="true">differences</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th></tr></thead>
 					<tbody>${found.groups.slice(0, MOST_ROWS).map((one) => html`<${GroupRow} key=${`${one.group} ${one.batch}`} one=${one} />`)}</tbody>

@@ -65,12 +65,13 @@ export function useCameras(one, shot) {
 	}
 	function correct() {
 		if (busy) return;
-		attempt(postInstants(one.id, [frame], false), async (begun) => {
+		attempt(postInstants(one.id, [frame], { propose: false, linked: false }), async (begun) => {
 			const over = await follow(begun, setJob);
 			if (over.state !== 'done') return;
-			// The way back leads to this frame.
-			navigate(address(`/recordings/${one.id}`, { frame: String(frame) }), { replace: true });
-			navigate(`/review/${over.result.group}/calibration`);
+			// Both ways back lead to this frame.
+			const place = { frame: String(frame) };
+			navigate(address(`/recordings/${one.id}`, place), { replace: true });
+			navigate(address(`/review/${over.result.group}/calibration`, { recording: String(one.id), ...place }));
 		});
 	}
 	const frames = id < 0 || found.waiting && found.value?.first !== id ? null : found.value;

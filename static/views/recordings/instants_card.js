@@ -16,13 +16,26 @@ import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 
 /** @import {JobJson} from '../../api/jobs.js' */
-/** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+/** @import {LinkJson, RecordingJson, Shot} from '../../api/recordings.js' */
 
 /** @typedef {{chosen: ReadonlySet<number>, turn: (frame: number) => void, add: (frames: number[]) => void, clear: () => void}} Instants */
 
-/** @param {{one: RecordingJson, shot: Shot | undefined, instants: Instants}} props */
-export function InstantsCard({ one, shot, instants }) {
+/** What became of them, in words. @param {JobJson['result']} result */
+function madeText({ new: made, changed, unchanged, linked_views: views, outside }) {
+	return [
+		`${plural(made, 'group')} made.`,
+		changed ? `${plural(changed, 'group')} got views of replays.` : '',
+		unchanged ? `${plural(unchanged, 'frame')} ${unchanged === 1 ? 'was a group already and stays as it is' : 'were groups already and stay as they are'}.` : '',
+		views ? `${plural(views, 'view')} of linked replays.` : '',
+		outside ? `${plural(outside, 'view')} fewer, outside of a replay.` : '',
+	].filter(Boolean).join(' ');
+}
+
+/** @param {{one: RecordingJson, shot: Shot | undefined, instants: Instants, links: LinkJson[]}} props */
+export function InstantsCard({ one, shot, instants, links }) {
 	const [propose, setPropose] = useState(true);
+	const [linked, setLinked] = useState(true);
+	const usable = links.filter(({ live, map }) => live.recording === one.id && ['offset', 'linked'].includes(map.outcome)).length;
 	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
 	const { error, attempt } = useAttempt();
 	const { chosen } = instants;
@@ -31,7 +44,7 @@ export function InstantsCard({ one, shot, instants }) {
 	const every = withForm((said) => { if (shot) instants.add(everyOf(shot, Number(said.get('step')))); });
 	function make() {
 		if (why) return;
-		attempt(postInstants(one.id, [...chosen], propose), async (begun) => {
+		attempt(postInstants(one.id, [...chosen], { propose, linked: linked && usable > 0 }), async (begun) => {
 			const over = await follow(begun, setJob);
 			if (over.state === 'done') instants.clear();
 		});
@@ -46,14 +59,16 @@ export function InstantsCard({ one, shot, instants }) {
 			</p>
 			<form class="buttons" onSubmit=${every}>
 				<label for="instants-step">Every</label>
-				<input class="field film__step" id="instants-step" name="step" type="number" min="1" max="100000" required value=${Math.round(one.fps ?? 25)} />
+				<input class="field film__step" id="instants-step" name="step" type="number" min="1" max="100000" required defaultValue=${Math.round(one.fps ?? 25)} />
 				<span>frames</span>
 				<button class="button" type="submit">of this shot</button>
 			</form>
 			<label class="form__check"><input type="checkbox" checked=${propose} onChange=${withTick(setPropose)} />Propose cameras afterwards</label>
-			<p class="buttons"><button class="button button--primary" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${make}>Make ${plural(chosen.size, 'group')}</button></p>
+			${usable ? html`<label class="form__check"><input type="checkbox" checked=${linked} onChange=${withTick(setLinked)} />With the views of ${plural(usable, 'linked replay')}</label>` : null}
+			<p class="buttons"><button class="button button--primary" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${make}>Make ${chosen.size ? plural(chosen.size, 'group') : 'groups'}</button></p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}
+			${job?.state === 'done' ? html`<p role="status">${madeText(job.result)}</p>` : null}
 			${one.groups ? html`<p><a class="link" href=${queueAddress(one.dataset, query)}>${plural(one.groups, 'group')} of this recording</a></p>` : null}
 		</section>
 	`;

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useCallback, useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
 import { listen } from '../../api/events.js';
-import { getRecording, getShots, putShots } from '../../api/recordings.js';
+import { getLinks, getRecording, getShots, putShots } from '../../api/recordings.js';
 import { ApiError } from '../../api/problem.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
 import { page, param } from '../../lib/router.js';
@@ -19,6 +19,7 @@ import { CameraCard } from './camera_card.js';
 import { CameraCurves, CameraLines } from './camera_curves.js';
 import { useCameraKeys, useCameras } from './camera_state.js';
 import { InstantsCard } from './instants_card.js';
+import { LinkCard } from './link_card.js';
 import { keysOfRecording } from './recording_keys.js';
 import { FindAgain, ShotCard } from './shot_card.js';
 import { Strip } from './strip.js';
@@ -139,6 +140,7 @@ function clock(shots, one) {
 function Film({ one, reload }) {
 	const { list, latest, error, read, change, undo, remember } = useShots(one.id);
 	const instants = useInstants();
+	const links = useResource((signal) => getLinks(one.id, signal), [one.id]).value?.items ?? [];
 	useEffect(() => {
 		const end = openFilm({ id: one.id, frames: one.frames ?? 0, fps: one.fps ?? 25 });
 		// Whoever comes back from the lines of a frame is shown it again.
@@ -169,7 +171,8 @@ function Film({ one, reload }) {
 			<div class="film__rail">
 				<${ShotCard} one=${one} shots=${list.items} at=${at} change=${change} remember=${remember} />
 				<${CameraCard} one=${one} cameras=${cameras} />
-				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} />
+				<${LinkCard} one=${one} shots=${list.items} shot=${list.items[at]} links=${links} />
+				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} links=${links} />
 			</div>
 			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} goTo=${goTo} />
 			<${CameraCurves} cameras=${cameras} />

@@ -7,7 +7,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { listen } from '../../api/events.js';
 import { deleteRecording, getRecordings, postRecording } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
-import { withForm } from '../../lib/field.js';
+import { withForm, withValue } from '../../lib/field.js';
 import { count, plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
@@ -26,11 +26,11 @@ import { VideoField } from './video_uploads.js';
 /** @import {RecordingJson} from '../../api/recordings.js' */
 
 /** What is known of it, in words. @param {RecordingJson} one */
-export function factsOf({ width, height, fps, variable, interlaced, seconds, frames }) {
+export function factsOf({ width, height, fps, variable, interlaced, damaged, seconds, frames }) {
 	if (frames === null) return 'not indexed yet';
 	return [
 		`${width} × ${height}`, `${Number((fps ?? 0).toFixed(3))} frames a second${variable ? ' (variable)' : ''}`,
-		lengthText(seconds ?? 0), plural(frames, 'frame'), interlaced ? 'interlaced' : '',
+		lengthText(seconds ?? 0), plural(frames, 'frame'), interlaced ? 'interlaced' : '', damaged ? `${plural(damaged, 'damaged picture')} left out` : '',
 	].filter(Boolean).join(' · ');
 }
 
@@ -52,6 +52,7 @@ function Row({ one, remove }) {
 function AddCard({ added }) {
 	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
 	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const [typed, setTyped] = useState(/** @type {string | null} */ (null));
 	const { error, attempt } = useAttempt();
 	const waiting = videoUploads.value.some(({ state, dataset: its }) => its === null && ['queued', 'sending', 'waiting', 'here'].includes(state));
 	const busy = job !== null && !isOver(job) && source !== null;
@@ -73,7 +74,7 @@ function AddCard({ added }) {
 			<form class="form" onSubmit=${send}>
 				<div class="form__row">
 					<label for="recording-dataset">Dataset</label>
-					<input class="field" id="recording-dataset" name="dataset" list="recording-datasets" maxlength="100" autocomplete="off" required value=${dataset.value?.name ?? ''} />
+					<input class="field" id="recording-dataset" name="dataset" list="recording-datasets" maxlength="100" autocomplete="off" required value=${typed ?? dataset.value?.name ?? ''} onInput=${withValue(setTyped)} />
 					<datalist id="recording-datasets">${(datasets.value ?? []).map((one) => html`<option key=${one.id} value=${one.name}></option>`)}</datalist>
 					<small>A new name makes a new dataset. Groups that you take from the recording go there.</small>
 				</div>

@@ -128,7 +128,7 @@ export function Timeline() {
 	const limit = group && first ? (group.policy.tau_percent / 100) * diagonal(first) : 1;
 	return html`
 		<section class="card strip-card timeline" aria-label="Timeline" data-loaded=${all !== null} data-playing=${playing.value}>
-			<h2>Error over frames<span class="card__aside">${all ? totals(all) : ''}</span></h2>
+			<h2>Reprojection error, frame by frame<span class="card__aside">${all ? totals(all) : ''}</span></h2>
 			<div class="timeline__tools" role="toolbar" aria-label="Timeline">
 				<button class="button" type="button" aria-pressed=${playing.value} onClick=${togglePlaying}>${playing.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
 				<button class="button" type="button" onClick=${goToWorst}>Worst <kbd>J</kbd></button>

@@ -84,7 +84,7 @@ export function BatchDialog({ dataset, q, total, ticked, onClose }) {
 			<p>${ticked ? html`${count(ticked.count)} ticked groups` : q ? html`${plural(total, 'group')} that match <code>${q}</code>` : html`All ${plural(total, 'group')} of ${dataset.name}`}, in the order of the list. Groups that match later are not added.</p>
 			<div class="form__row"><label for="batch-name">Name</label><input class="field" id="batch-name" name="name" required maxlength="80" autocomplete="off" /></div>
 			<div class="form__columns batch-dialog__fields">
-			<div class="form__row"><label for="batch-size">Limit to first N</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${count(matching)}`} /></div>
+			<div class="form__row"><label for="batch-size">Number of groups (the first of the list)</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${count(matching)}`} /></div>
 			<div class="form__row"><label for="batch-due">Due</label><input class="field" id="batch-due" name="due" type="date" /></div>
 			<div class="form__row"><label for="batch-verdicts">Annotators per group</label><input class="field" id="batch-verdicts" name="verdicts" type="number" min="1" max="5" placeholder="1" /></div>
 			<${GoldFields} dataset=${dataset} />

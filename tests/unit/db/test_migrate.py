@@ -19,7 +19,7 @@ from app.db.backup import verify_backup
 from app.db.dialects.dialect import WRITE
 from app.db.engine import make_engine
 from app.db.home import make_home
-from app.db.locks import DatabaseLock
+from app.db.locks import DatabaseInUse
 from app.db.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision
 from app.db.restore import restore
 from app.db.store import Store
@@ -192,7 +192,7 @@ class TestOldHomes:
 
     def test_is_refused_while_somebody_has_the_database_open(self, settings: Settings) -> None:
         make_old(settings, "0009")
-        lock = DatabaseLock(settings)
+        lock = DatabaseInUse(settings)
         lock.share()
         with pytest.raises(StorageError, match="another Touchline process has the database open"):
             migrate(settings)

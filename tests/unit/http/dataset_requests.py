@@ -137,6 +137,10 @@ def linked_instants(api: Any) -> Request:
     return "PUT", f"{path}/instants", body, etag_of(api, path)
 
 
+def ball_link(api: Any) -> Request:
+    return "POST", f"{linked(api)}/ball", {}, {}
+
+
 def no_link(api: Any) -> Request:
     return "DELETE", linked(api), None, {}
 

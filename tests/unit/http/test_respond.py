@@ -65,6 +65,7 @@ KEPT: dict[str, Made] = {
     "returnIndependentAnnotation": group_requests.take_handed_back,
     "submitGroup": group_requests.submitted,
     "submitIndependentAnnotation": group_requests.take_handed_in,
+    "linkByBall": dataset_requests.ball_link,
     "makeBatch": dataset_requests.batch,
     "makeExport": dataset_requests.export,
     "changeGold": group_requests.gold_start,

@@ -13,7 +13,7 @@ from app.http.bodies import MAX_STRANGERS_BYTES
 from app.http.errors import install_handlers
 from app.http.permissions import Action, OwnedKind, Where, may, open_to_all
 from app.http.request_limits import ClassLimiters
-from app.http.route import Gate, Route, nothing_here, require_permissions, routes_of
+from app.http.route import Gate, Route, answer_no_route, require_permissions, routes_of
 
 JSON = [(b"content-type", b"application/json")]
 BYTES = {"requestBody": {"content": {"application/octet-stream": {}}}}
@@ -65,7 +65,7 @@ class Exchange:
 
     def app(self, most: int, access: Any) -> FastAPI:
         made = FastAPI(openapi_url=None)
-        made.router.route_class, made.router.default = Route, nothing_here
+        made.router.route_class, made.router.default = Route, answer_no_route
         keyless: Any = KeyLess()
         made.state.gate = Gate(access, keyless, ClassLimiters(), most)
         install_handlers(made)

@@ -7,7 +7,7 @@ import pytest
 
 from app.soccer.pitch import Pitch
 from app.tracking.ball_models import BOUNCE, FLIGHT, KICK, ROLL
-from app.tracking.ball_search import knots_of, search
+from app.tracking.ball_search import knots_of, louder, search
 from tests.unit.tracking.test_ball_solve import BALL, BOTH, LEFT, PLACES, RIGHT, TIMES, seen
 
 
@@ -36,6 +36,28 @@ class TestKnots:
         )
         assert knots.far == pytest.approx(far, rel=1e-6)
         assert knots.far_sigma == pytest.approx(knots.far / sizes)
+
+
+class TestLouder:
+    """Cameras that are not exact: rays of one ball that pass each other."""
+
+    @staticmethod
+    def factors(shift: float) -> list[float]:
+        given = seen(BOTH)
+        of_left = np.array([view == "left" for view in given.views])
+        pixels = given.pixels + np.where(of_left[:, None], (0.0, shift), 0.0)
+        knots = knots_of(replace(given, pixels=pixels), TIMES, np.zeros(2))
+        factor = louder(knots, 12.0).noise / knots.noise
+        return [float(factor[knots.view == view].mean()) for view in (0, 1)]
+
+    def test_rays_that_meet_are_as_noisy_as_they_are_said_to_be(self) -> None:
+        assert max(self.factors(0.0)) < 1.2
+
+    def test_those_of_an_inexact_camera_and_its_partner_are_noisier(self) -> None:
+        assert min(self.factors(4.0)) > 4.0
+
+    def test_those_of_another_ball_are_left_to_contradict(self) -> None:
+        assert self.factors(60.0) == [1.0, 1.0]
 
 
 class TestSearch:

@@ -141,6 +141,65 @@ class TestLeftOutFrames:
         assert np.abs(spoilt.position - track.position).max() < 0.2
 
 
+class TestOffsets:
+    @pytest.mark.parametrize("late", [0.01, -0.03])
+    def test_a_view_that_is_late_is_told(self, late: float) -> None:
+        given = seen(BOTH)
+        of_right = np.array([name == "right" for name in given.views])
+        track = tracked(replace(given, times=given.times + np.where(of_right, late, 0.0)))
+        assert [name for name, _ in track.offsets] == ["right"]
+        assert track.offsets[0][1] == pytest.approx(-late, abs=0.003)
+        assert np.median(np.linalg.norm(track.position - PLACES, axis=1)) < 0.03
+
+    def test_views_in_time_are_left_alone(self, track: BallTrack) -> None:
+        assert track.offsets == ()
+
+    def test_views_between_frames_take_part(self) -> None:
+        later = TIMES + 0.017
+        given = seen(BOTH, places=at_times(BALL, later))
+        of_right = np.array([name == "right" for name in given.views])
+        in_time = seen(BOTH)
+        mixed = replace(
+            given,
+            times=np.where(of_right, given.times + 0.017, given.times),
+            pixels=np.where(of_right[:, None], given.pixels, in_time.pixels),
+        )
+        track = tracked(mixed)
+        assert track.offsets == () and "measured" in track.state
+        assert np.median(np.linalg.norm(track.position - PLACES, axis=1)) < 0.03
+
+
+class TestOneView:
+    def test_its_uncertainty_is_large_and_honest(self) -> None:
+        track = tracked(seen({"right": RIGHT}))
+        known = np.isfinite(track.position).all(axis=1)
+        assert known.mean() > 0.6 and "measured" not in track.state
+        off = (track.position - PLACES)[known]
+        inverse = np.linalg.inv(track.covariance[known][:, :3, :3])
+        inside = np.einsum("ni,nij,nj->n", off, inverse, off) < INSIDE_95
+        assert inside.mean() > 0.8
+        assert (np.linalg.norm(off, axis=1) < 1.0).mean() > 0.66
+
+    def test_a_ball_that_stays_in_the_air_is_refused(self) -> None:
+        times = TIMES[:30]
+        places = np.column_stack([20 * times - 15, 5 * times, -6.0 + 4.9 * (times - 0.6) ** 2])
+        given = seen({"right": RIGHT}, places=np.vstack([places, PLACES[30:]]))
+        track = tracked(given.part(given.frames < 130))
+        assert track.reason is not None and "no bounce, kick or known height" in track.reason
+
+    def test_sizes_say_what_rays_leave_open(self) -> None:
+        times = TIMES[:30]
+        places = np.column_stack([20 * times - 15, 5 * times, -6.0 + 4.9 * (times - 0.6) ** 2])
+        given = seen({"right": RIGHT}, places=np.vstack([places, PLACES[30:]]))
+        given = given.part(given.frames < 130)
+        sizes = 0.226 * 1100 / RIGHT.pitch_to_camera(places)[:, 2]
+        track = tracked(replace(given, sizes=sizes, size_sigma=np.full(len(sizes), 0.1)))
+        assert track.reason is None
+        known = np.isfinite(track.position[:30]).all(axis=1)
+        off = np.linalg.norm(track.position[:30][known] - places[known], axis=1)
+        assert known.mean() > 0.5 and np.median(off) < 2 * np.median(track.sigma[:30][known])
+
+
 class TestNonsense:
     """What is no ball is said, without a crash."""
 
@@ -151,6 +210,28 @@ class TestNonsense:
 
     def test_nothing(self) -> None:
         assert tracked(seen(BOTH).part(np.zeros(0, dtype=int))).reason is not None
+
+    def test_no_frames(self) -> None:
+        given = seen(BOTH)
+        track = track_ball(given, FRAMES[:0], TIMES[:0], pitch=Pitch())
+        assert track.reason == "The stretch has no frames." and track.state == ()
+
+    def test_a_pixel_without_a_ray_is_left_out(self) -> None:
+        given = seen(BOTH)
+        pixels = given.pixels.copy()
+        pixels[10] = np.nan
+        track = tracked(replace(given, pixels=pixels))
+        assert track.reason is None and track.state[10] == "one_view"
+
+    def test_one_of_three_views_is_of_another_ball(self) -> None:
+        third = looking((50.0, 40.0, -15.0), (0.0, 0.0, 0.0), 1100.0)
+        given = seen({**BOTH, "third": third})
+        of_third = np.array([name == "third" for name in given.views])
+        other = third.project(PLACES[::-1])[: int(of_third.sum())]
+        pixels = given.pixels.copy()
+        pixels[of_third] = other
+        track = tracked(replace(given, pixels=pixels))
+        assert track.reason is not None and "contradict" in track.reason
 
     def test_one_frame_a_second(self) -> None:
         given = seen(BOTH)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import ImageError, InputError
-from app.soccer.annotation import make_lines
+from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.jaccard import project_markings
@@ -23,6 +23,19 @@ def outcomes(found: list[FrameCamera]) -> list[str]:
 
 def farthest(film: Film, found: list[FrameCamera]) -> float:
     return max(film.off_px(each.number, each.camera) for each in found if each.camera is not None)
+
+
+def drawn(film: Film, number: int) -> Lines:
+    """The lines of a frame where they are."""
+    height, width = film.images[0].shape[:2]
+    shown = project_markings(film.cameras[number], Pitch(), ImageSize(width, height))
+    return make_lines(
+        {
+            name: tuple(ImagePoint(*point) for point in line[:: max(len(line) // 6, 1)].tolist())
+            for name, line in shown.items()
+            if len(line) > 5
+        }
+    )
 
 
 def test_every_frame_is_tracked_without_any_annotation(film: Film, tmp_path: Path):
@@ -43,19 +56,23 @@ def test_every_frame_is_tracked_without_any_annotation(film: Film, tmp_path: Pat
 
 def test_lines_of_one_frame_place_the_frames_before_and_behind_it(film: Film, tmp_path: Path):
     middle = len(film.images) // 2
-    height, width = film.images[0].shape[:2]
-    shown = project_markings(film.cameras[middle], Pitch(), ImageSize(width, height))
-    lines = make_lines(
-        {
-            name: tuple(ImagePoint(*point) for point in line[:: max(len(line) // 6, 1)].tolist())
-            for name, line in shown.items()
-            if len(line) > 5
-        }
-    )
+    lines = drawn(film, middle)
     found = track_clip(film.write(tmp_path), {middle: lines})
     assert outcomes(found) == ["tracked"] * len(film.images)
     assert [frame.number for frame in found if frame.is_keyframe] == [middle]
     assert farthest(film, found) < 1.5
+
+
+def test_lines_of_a_frame_that_shows_nothing_hold_its_camera(film: Film, tmp_path: Path):
+    images, rng = list(film.images), np.random.default_rng(1)
+    for number in (3, 4):
+        images[number] = rng.integers(0, 255, images[number].shape, dtype=np.uint8)
+    found = track_clip(film.write(tmp_path, images), {3: drawn(film, 3)})
+    expected = ["tracked"] * len(images)
+    expected[3:5] = "bridged", "lost"
+    assert outcomes(found) == expected
+    assert found[3].is_keyframe and found[3].error_px is None
+    assert found[3].covariance is not None and farthest(film, found) < 3.0
 
 
 def test_frames_without_paint_are_bridged_by_the_background(film: Film, tmp_path: Path):
@@ -92,15 +109,7 @@ def test_a_film_of_nothing_has_no_camera(tmp_path: Path):
 
 
 def test_lines_of_a_frame_that_is_not_there_are_refused(film: Film, tmp_path: Path):
-    height, width = film.images[0].shape[:2]
-    shown = project_markings(film.cameras[0], Pitch(), ImageSize(width, height))
-    lines = make_lines(
-        {
-            name: tuple(ImagePoint(*point) for point in line[:: max(len(line) // 6, 1)].tolist())
-            for name, line in shown.items()
-            if len(line) > 5
-        }
-    )
+    lines = drawn(film, 0)
     path = film.write(tmp_path, film.images[:2])
     with pytest.raises(InputError, match="has 2 frames, and none of the number 7"):
         track_clip(path, {7: lines})

@@ -12,7 +12,15 @@ from app.errors import ImageError, NotFoundError
 from app.media import video as media_video
 from app.video.frames import RecordingReader, read_frames
 from app.video.indexing import index_recording
-from tests.videos import delay_start, number_of, stretch_pixels, vary_times, write_video
+from tests.videos import (
+    delay_start,
+    number_of,
+    stretch_pixels,
+    turn,
+    unmark_key_frames,
+    vary_times,
+    write_video,
+)
 
 COUNT = 200
 _DICE = random.Random(1)
@@ -27,6 +35,15 @@ def recording(path: Path, kind: str) -> Path:
         vary_times(path, ANY_DURATION)
     if "late" in kind:
         delay_start(path, 1700)
+    return path
+
+
+def damaged(path: Path) -> Path:
+    """The file with noise in its middle."""
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 3000] = np.random.default_rng(1).bytes(3000)
+    path.write_bytes(data)
     return path
 
 
@@ -47,6 +64,57 @@ class TestReadFrames:
         numbers = [COUNT - 1, 0, 150, 149, 151, 40, 199, *range(60, 70), 33, 32]
         found = [number_of(frame[..., ::-1]) for _, frame in read_frames(path, index, numbers)]
         assert found == numbers
+
+    @pytest.mark.parametrize("rate", [50, 60000 / 1001, 24000 / 1001])
+    def test_a_rate_of_television_or_film_is_kept(
+        self, rate: float, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = write_video(tmp_path / "cam1.mp4", "MPG2" if rate < 60 else "mp4v", COUNT, rate)
+        index = index_recording(path, settings)
+        assert index.fps == pytest.approx(rate, rel=1e-5) and not index.is_variable
+        assert index.seconds[-1] == pytest.approx((COUNT - 1) / rate, rel=1e-5)
+        found = [number_of(frame[..., ::-1]) for _, frame in read_frames(path, index, [150, 3])]
+        assert found == [150, 3]
+
+    def test_it_is_found_where_the_only_key_frame_is_a_minute_before(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = unmark_key_frames(write_video(tmp_path / "cam1.mp4", "mp4v", 1023))
+        index = index_recording(path, settings)
+        numbers = [1022, 400, 399]
+        found = [number_of(frame[..., ::-1]) for _, frame in read_frames(path, index, numbers)]
+        assert found == numbers
+
+    @pytest.mark.parametrize("degrees", [90, 180, 270])
+    def test_it_is_upright(self, degrees: int, tmp_path: Path, settings: Settings) -> None:
+        path = turn(write_video(tmp_path / "cam1.mp4", "mp4v", 50), degrees)
+        index = index_recording(path, settings)
+        ((_, frame),) = read_frames(path, index, [40])
+        assert frame.shape[:2] == (index.facts.height, index.facts.width)
+        assert number_of(np.rot90(frame, degrees // 90)[..., ::-1]) == 40
+
+    @pytest.mark.parametrize("kind", ["mp4/mp4v", "ts/MPG2", "webm/VP80"])
+    def test_damaged_pictures_are_left_out_and_all_behind_them_are_there(
+        self, kind: str, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = damaged(recording(tmp_path / "cam1", kind))
+        index = index_recording(path, settings)
+        in_order = dict(read_frames(path, index, range(len(index))))
+        assert number_of(in_order[len(index) - 1][..., ::-1]) == COUNT - 1
+        assert len(index) < COUNT
+        # Where the container itself is torn, times say how much is missing.
+        assert index.facts.damaged or np.diff(index.times).max() > 1.5 * 40
+        # However one comes to it, a number is one frame.
+        for number in (len(index) - 2, 5, len(index) - 30):
+            ((_, frame),) = read_frames(path, index, [number])
+            assert number_of(frame[..., ::-1]) == number_of(in_order[number][..., ::-1])
+
+    def test_an_avi_whose_times_are_counted_anew_behind_damage_is_refused(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = damaged(recording(tmp_path / "cam1", "avi/MJPG"))
+        with pytest.raises(ImageError, match=r"cam1\.avi is damaged: its own table"):
+            index_recording(path, settings)
 
     def test_pixels_are_square(self, tmp_path: Path, settings: Settings) -> None:
         path = stretch_pixels(write_video(tmp_path / "cam1.mp4", "mp4v", 5), 4, 3)

@@ -7,7 +7,13 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError
-from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, time_base_of
+from app.video.index import (
+    RecordingIndex,
+    index_from_bytes,
+    index_to_bytes,
+    read_index_seconds,
+    time_base_of,
+)
 from app.video.indexing import index_recording
 from tests.videos import vary_times, write_video
 
@@ -90,3 +96,15 @@ class TestBytes:
         made = {"empty": b"", "text": b"no index", "half": data[: len(data) // 2]}.get(damage, data)
         with pytest.raises(InputError, match=r"recording\.idx.*make it again"):
             index_from_bytes(made, "recording.idx")
+
+    def test_times_alone_are_read_from_a_file_that_is_whole(
+        self, index: RecordingIndex, tmp_path: Path
+    ) -> None:
+        path = tmp_path / "index.npz"
+        data = index_to_bytes(index)
+        path.write_bytes(data)
+        assert (read_index_seconds(path) == index.seconds).all()
+        place = data.index(b"measured.npy") + 200
+        path.write_bytes(data[:place] + bytes([data[place] ^ 255]) + data[place + 1 :])
+        with pytest.raises(InputError, match="make it again"):
+            read_index_seconds(path)

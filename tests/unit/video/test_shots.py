@@ -8,7 +8,7 @@ import pytest
 
 from app.config import Settings
 from app.video.indexing import index_recording
-from app.video.kinds import LookedAt, frames_to_look_at, kind_of, look_at
+from app.video.kinds import LookedAt, frames_that_tell_kind, kind_of, look_at
 from app.video.shots import find_shots
 from tests.films import Join, freeze, join, rendered, write_film
 from tests.videos import vary_times
@@ -88,8 +88,8 @@ class TestKindOf:
         assert kind_of([looked(*look) for look in looks]) == kind
 
     def test_three_frames_are_looked_at_and_one_of_a_short_shot(self) -> None:
-        assert frames_to_look_at(100, 200, 4.0) == [120, 150, 180]
-        assert frames_to_look_at(100, 110, 0.4) == [105]
+        assert frames_that_tell_kind(100, 200, 4.0) == [120, 150, 180]
+        assert frames_that_tell_kind(100, 110, 0.4) == [105]
 
 
 class TestLookAt:

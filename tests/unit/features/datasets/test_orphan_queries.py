@@ -4,7 +4,7 @@ import pytest
 from sqlalchemy import insert, text
 
 from app.db.store import Store
-from app.features.datasets.orphan_queries import delete_calibrations, unused_calibrations
+from app.features.datasets.orphan_queries import delete_if_unused, unused_calibrations
 from app.features.datasets.queries import delete_solutions, solutions_of
 from app.features.solutions.queries import known_calibrations
 from app.features.solutions.tables import CalibrationModel, SolutionModel
@@ -33,17 +33,17 @@ class TestSpareCalibrations:
             assert found == [[1, 2], []]
             delete_solutions(session, [1])
             assert unused_calibrations(session) == ["a"]
-            assert delete_calibrations(session, KEYS[:2]) == 1
+            assert delete_if_unused(session, KEYS[:2]) == 1
             assert known_calibrations(session, KEYS) == {"b", "c"}
 
     def test_only_those_that_were_found_go(self, solved: Store) -> None:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
-            assert delete_calibrations(session, KEYS[:2]) == 2
+            assert delete_if_unused(session, KEYS[:2]) == 2
             assert known_calibrations(session, KEYS) == {"c"}
 
     def test_they_stay_while_a_group_waits_to_be_solved(self, solved: Store) -> None:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
             session.execute(text("UPDATE queue SET solved = false"))
-            assert (unused_calibrations(session), delete_calibrations(session, KEYS)) == ([], 0)
+            assert (unused_calibrations(session), delete_if_unused(session, KEYS)) == ([], 0)

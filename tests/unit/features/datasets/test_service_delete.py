@@ -54,7 +54,7 @@ def two(store: Store, once, fill, make_group, make_static) -> Store:
         spare = [UnassignedFrame("cam1", "99", Extras(boxes=({"class": "Person"},)))]
         ingest_unassigned(store, "demo", spare, source="spare", actor="ann")
         give_verdicts(store, 1, "", "deferred", actor="ben")
-        save_view(store, 1, "All", "", actor="ben")
+        save_view(store, 1, name="All", q="", actor="ben")
         ingest(store, "other", [make_group(7), make_group(9)], source="test", actor="ann")
         solve_dataset(store, "other")
 

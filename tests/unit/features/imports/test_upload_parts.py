@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import resource
 import shutil
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -165,6 +166,18 @@ class TestPartWriter:
         assert (path.stat().st_size, begin(settings).bytes) == (4000, 4000)
         send(settings, upload, 4000, len(FILM))
         assert upload_path(settings, upload.id).read_bytes() == FILM
+
+    def test_a_part_that_the_disk_takes_half_of_is_taken_back(self, settings: Settings) -> None:
+        upload = send(settings, begin(settings), 0, 4000)
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        try:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (6000, before[1]))
+            with pytest.raises(StorageError, match="4,000 of 10,240 bytes of final"):
+                send(settings, upload, 4000, 8000)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        path = settings.uploads / upload.id / "content" / "final.mp4"
+        assert (path.stat().st_size, begin(settings).bytes) == (4000, 4000)
 
     def test_one_that_is_deleted_meanwhile_is_not_there(self, settings: Settings) -> None:
         upload = begin(settings)

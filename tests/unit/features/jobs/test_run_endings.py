@@ -103,6 +103,29 @@ RESULTS = [
         "1 group made of half.mp4; 3 were there before.",
     ),
     (
+        "instants",
+        {
+            "name": "half.mp4",
+            "new": 1,
+            "changed": 2,
+            "unchanged": 0,
+            "linked_views": 3,
+            "outside": 1,
+        },
+        "1 group made of half.mp4; 2 groups got views of replays; 3 views of linked replays, 1 outside "
+        "of them.",
+    ),
+    (
+        "link",
+        {"reason": None, "rays": (90, 140), "left_out": 0},
+        "The ball tells the times (90 live rays, 140 of the replay).",
+    ),
+    (
+        "link",
+        {"reason": "The ball hardly moves.", "rays": (90, 140), "left_out": 3},
+        "The ball hardly moves (90 live rays, 140 of the replay, 3 left out).",
+    ),
+    (
         "ball",
         {"made": 2, "unchanged": 0, "without": []},
         "The ball was tracked over 2 stretches.",

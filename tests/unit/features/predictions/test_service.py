@@ -16,7 +16,7 @@ from app.features.predictions.service import (
     delete_predictions,
     get_predictions,
     list_predictions,
-    set_name,
+    prediction_set_name,
     view_predictions,
 )
 from app.features.predictions.tables import PredictedCameraModel, PredictionModel
@@ -155,7 +155,7 @@ class TestDeletePredictions:
 
 class TestSetName:
     def test_letters_that_a_set_cannot_have_become_dashes(self) -> None:
-        assert set_name(Path("runs/best model (2).json")) == "best-model--2"
+        assert prediction_set_name(Path("runs/best model (2).json")) == "best-model--2"
 
     def test_a_name_without_a_single_letter_is_replaced(self) -> None:
-        assert set_name(Path("---.json")) == "predictions"
+        assert prediction_set_name(Path("---.json")) == "predictions"

@@ -15,10 +15,10 @@ class TestCheck:
     @pytest.mark.parametrize(
         ("options", "words"),
         [
-            ({"format": "csv"}, "--format says how to read a file of boxes"),
-            ({"category": 32}, "--category says"),
-            ({"size": ImageSize(960, 540)}, "--size says"),
-            ({"images": Path("t.json")}, "--images says"),
+            ({"format": "csv"}, "--format is for a file of boxes"),
+            ({"category": 32}, "--category is for"),
+            ({"size": ImageSize(960, 540)}, "--size is for"),
+            ({"images": Path("t.json")}, "--images is for"),
             (
                 {"cameras_size": ImageSize(960, 540)},
                 "--cameras-size is the size of predicted cameras",
@@ -33,7 +33,7 @@ class TestCheck:
     def test_so_are_those_of_careful_boxes_by_their_own_name(self) -> None:
         careful = PredictionFiles(None, category=1)
         request = SourcesRequest(EvaluationRequest(), PredictionFiles(Path("a-set")), careful)
-        with pytest.raises(InputError, match="--careful-category says"):
+        with pytest.raises(InputError, match="--careful-category is for"):
             request.check()
 
     def test_a_version_has_its_own_groups(self) -> None:

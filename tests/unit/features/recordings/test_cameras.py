@@ -29,8 +29,15 @@ from app.features.recordings.cameras import (
     read_cameras,
     track_stretch,
 )
+from app.features.recordings.links import add_link, set_instants
 from app.features.recordings.queries import update_recording
-from app.features.recordings.service import Recording, get_recording, groups_taken
+from app.features.recordings.service import (
+    Recording,
+    Shot,
+    get_recording,
+    groups_taken,
+    put_shots,
+)
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImagePoint, ImageSize
@@ -136,17 +143,17 @@ def take(api: Any, recording: str, finished: Finished, *frames: int) -> Any:
     return job.result
 
 
-def draw(api: Any, group: int, camera: Camera) -> None:
+def draw(api: Any, group: int, camera: Camera, view: int = 0) -> None:
     """Draw the lines of a frame as a person does."""
     document = api.get(f"/api/v1/groups/{group}")
-    view = document.json()["views"][0]
+    chosen = document.json()["views"][view]
     shown = project_markings(camera, Pitch(), SIZE)
     lines = {
         name: [{"x": x, "y": y} for x, y in line[:: max(len(line) // 6, 1)].round(2).tolist()]
         for name, line in shown.items()
         if len(line) > 5
     }
-    path = f"/api/v1/views/{view['id']}/lines"
+    path = f"/api/v1/views/{chosen['id']}/lines"
     tag = {"If-Match": document.headers["etag"]}
     answer = api.patch(path, json={"lines": lines}, headers=tag)
     assert answer.status_code == 200, answer.text
@@ -252,6 +259,41 @@ def test_a_person_mends_a_frame_and_shot_and_groups_follow(
     before = api.get(f"{recording}/cameras/7?before=true").json()
     assert before["outcome"] == "TTTLLTTT" and before["camera"][3] is None
     assert before["reason"][3] == "no_paint"
+
+
+def test_views_of_linked_replays_are_frames_of_their_shot(
+    app: Any, api: Any, recording: str, found: Recording, finished: Finished, tracker: Tracker
+) -> None:
+    store: Store = app.state.services.store
+    put_shots(
+        store,
+        found.id,
+        [Shot(4, 7, "main", "cut"), Shot(8, 11, "replay", "cut")],
+        None,
+        actor="ann",
+    )
+    link = add_link(store, (found.id, 4, 7), (found.id, 8, 11), actor="ann")
+    set_instants(store, found.id, link.id, [(4, 8), (7, 11)], None, None, actor="ann")
+    track(api, recording, finished, 8, 11)
+    body = {"frames": [5], "propose": False, "linked": True}
+    finished(api.post(f"{recording}/groups", json=body))
+    (group,) = groups_taken(store, found).values()
+
+    def given() -> list[Camera | None]:
+        with store.read() as session:
+            views = read_groups(session, [group])[group].group.views
+        return [view.station.given for view in views]
+
+    assert given() == [None, tracker.truth[5]]
+    tracker.off = 1.0
+    assert track(api, recording, finished, 8, 11)["groups"] == 1
+    assert track(api, recording, finished, 4, 7)["groups"] == 1
+    assert [camera and camera.position[0] for camera in given()] == [
+        tracker.truth[place].position[0] + 1.0 for place in (1, 5)
+    ]
+    draw(api, group, tracker.truth[5], view=1)
+    track(api, recording, finished, 8, 11)
+    assert list(tracker.asked) == [9]
 
 
 def test_a_camera_that_somebody_gave_stays(

@@ -29,7 +29,7 @@ def recording(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def take(store: Store, recording: Recording, *frames: int) -> module.Taken:
-    return take_instants(store, recording.id, frames, "ann", lambda *_: None)
+    return take_instants(store, recording.id, frames, False, "ann", lambda *_: None)
 
 
 class TestTakeInstants:
@@ -69,7 +69,7 @@ class TestTakeInstants:
         other = add_recording(store, "league", recording.path, actor="ann")
         index_now(store, other.id, progress=lambda *_: None, stop=lambda: None)
         monkeypatch.setattr(module, "replace_file", None)
-        assert take_instants(store, other.id, [3], "ann", lambda *_: None).new == 1
+        assert take_instants(store, other.id, [3], False, "ann", lambda *_: None).new == 1
 
 
 class TestRequireInstants:

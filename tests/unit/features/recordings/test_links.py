@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from app.db.log import read_log
-from tests.videos import write_video
+from tests.unit.features.recordings.test_routes import picture_of
+from tests.videos import number_of, write_video
 
 API = "/api/v1/recordings"
 Finished = Callable[[Any], Any]
@@ -201,6 +202,77 @@ class TestLinkedFrames:
         assert (found["repeated"], found["blended"]) == ([24], [26])
         assert found["replay"][:4] == [20, 23, 27, 29]
         assert found["off_s"][2] == pytest.approx(0.04 / 3)
+
+
+class TestLinkedGroups:
+    @staticmethod
+    def taken(api: Any, link: str, finished: Finished, *frames: int, linked: bool = True) -> Any:
+        body = {"frames": list(frames), "propose": False, "linked": linked}
+        job = finished(api.post(f"{link.partition('/links')[0]}/groups", json=body))
+        assert job.state == "done", job.problem
+        return job.result
+
+    @staticmethod
+    def views(api: Any) -> dict[str, list[str]]:
+        rows = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"]
+        groups = [api.get(f"/api/v1/groups/{row['id']}").json() for row in rows]
+        return {one["key"]: [view["key"] for view in one["views"]] for one in groups}
+
+    def test_frames_of_the_replay_that_show_the_same_are_further_views(
+        self, app: Any, api: Any, link: str, finished: Finished
+    ) -> None:
+        # Half as fast, and the replay begins with live frame 4.
+        instants(api, link, (4, 20), (14, 41))
+        result = self.taken(api, link, finished, 2, 10)
+        assert (result["new"], result["linked_views"], result["outside"]) == (2, 1, 1)
+        assert self.views(api) == {
+            "final/2.png": ["2.png"],
+            "final/10.png": ["10.png", "33.png"],
+        }
+        with app.state.services.store.read() as session:
+            body = [entry for entry in read_log(session) if entry.kind == "import"][-1].body
+        told = body["group"]["views"][1]["extras"]["metadata"]["recording"]
+        assert (told["name"], told["frame"], told["live_frame"]) == ("final", 33, 10)
+        assert told["off_s"] == pytest.approx((4 + 13 / 2.1 - 10) * 0.04)
+        assert (told["repeated"], told["blended"]) == (False, False)
+        number = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"][1]["id"]
+        (_, view) = api.get(f"/api/v1/groups/{number}").json()["views"]
+        assert number_of(picture_of(api.get(f"/api/v1/views/{view['id']}/image"))) == 33
+
+    def test_a_group_of_one_view_gets_them_and_others_stay(
+        self, api: Any, link: str, finished: Finished
+    ) -> None:
+        self.taken(api, link, finished, 10, linked=False)
+        instants(api, link, (0, 20), (19, 58))
+        result = self.taken(api, link, finished, 10, 11)
+        assert (result["new"], result["changed"], result["unchanged"]) == (1, 1, 0)
+        views = {"final/10.png": ["10.png", "40.png"], "final/11.png": ["11.png", "42.png"]}
+        assert self.views(api) == views
+        # Another map leaves what was taken as it is.
+        instants(api, link, (0, 20), (10, 30))
+        result = self.taken(api, link, finished, 10, 11)
+        assert (result["new"], result["changed"], result["unchanged"]) == (0, 0, 2)
+        assert (result["linked_views"], result["outside"]) == (0, 0)
+        assert self.views(api) == views
+
+    def test_a_replay_in_another_recording_is_read_from_there(
+        self, api: Any, film: Path, recording: str, finished: Finished
+    ) -> None:
+        write_video(film.parent / "other.mp4", "mp4v", 30)
+        body = {"dataset": "cup", "source": {"folder": "films/other.mp4"}}
+        other = finished(api.post(API, json=body)).result["recording"]
+        replay = {"recording": other, "first": 0, "last": 29}
+        made = api.post(f"{recording}/links", json={"live": LIVE, "replay": replay})
+        link = made.headers["location"]
+        instants(api, link, (0, 0), (10, 20))
+        result = self.taken(api, link, finished, 5, 6)
+        assert (result["new"], result["linked_views"]) == (2, 2)
+        assert self.views(api)["final/5.png"] == ["5.png", "other_10.png"]
+        (film.parent / "other.mp4").unlink()
+        body = {"frames": [7], "propose": False, "linked": True}
+        job = finished(api.post(f"{recording}/groups", json=body))
+        assert "other.mp4 is not where it was imported from" in job.problem["detail"]
+        assert "final/7.png" not in self.views(api)
 
 
 class TestSuggestions:

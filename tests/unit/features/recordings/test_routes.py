@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+import pyarrow.parquet
 import pytest
 
+import touchline
 from app.db.log import read_log
 from app.features.datasets.service import get_dataset
 from app.features.imports.cameras import ingest_cameras
@@ -20,6 +24,7 @@ from tests.cameras import looking
 from tests.films import Join, KnownShot, join, rendered, write_film
 from tests.unit.features.recordings.conftest import FRAMES
 from tests.videos import HEIGHT, WIDTH, number_of, write_video
+from touchline.errors import DataError
 
 API = "/api/v1/recordings"
 Finished = Callable[[Any], Any]
@@ -261,3 +266,67 @@ class TestTakeInstants:
     def test_a_frame_that_is_not_there_is_refused(self, api, recording: str) -> None:
         answer = api.post(f"{recording}/groups", json={"frames": [FRAMES]})
         assert (answer.status_code, answer.json()["pointer"]) == (400, "/frames")
+
+
+class TestVersions:
+    """What was frozen of a recording's groups needs neither the recording nor its index."""
+
+    @pytest.fixture
+    def frozen(self, api, recording: str, finished: Finished) -> int:
+        """A version of the frames 3 and 40."""
+        job = finished(api.post(f"{recording}/groups", json={"frames": [3, 40], "propose": False}))
+        assert job.state == "done", job.problem
+        for row in api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"]:
+            group = api.get(f"/api/v1/groups/{row['id']}")
+            tag = {"If-Match": group.json()["etag"]}
+            body = {"state": "accepted", "note": "from a recording"}
+            answer = api.put(f"/api/v1/groups/{row['id']}/verdict", json=body, headers=tag)
+            assert answer.status_code == 200, answer.text
+        body = {"name": "v1", "groups": "accepted"}
+        made = finished(api.post("/api/v1/datasets/cup/versions", json=body))
+        assert made.state == "done", made.problem
+        return int(made.result["version"])
+
+    def exported(self, api, finished: Finished, version: int, form: str, out: Path) -> Any:
+        """The document of an export with pictures, which is written to a file."""
+        asked = {"dataset": "cup", "format": form, "version": version, "images": "copy"}
+        job = finished(api.post("/api/v1/exports", json=asked))
+        assert job.state == "done", job.problem
+        out.write_bytes(api.get(f"/api/v1/exports/{job.id}/content").content)
+        return api.get(f"/api/v1/exports/{job.id}").json()
+
+    def test_they_outlive_the_file_the_index_and_the_recording(
+        self, app, api, film: Path, recording: str, frozen: int, finished: Finished, tmp_path: Path
+    ) -> None:
+        sha256 = api.get(recording).json()["sha256"]
+        film.unlink()
+        for index in app.state.services.settings.recordings.glob("*.npz"):
+            index.unlink()
+        assert api.delete(recording).status_code == 204
+        verified = finished(api.post(f"/api/v1/versions/{frozen}/verify"))
+        assert (verified.state, verified.result["equal"]) == ("done", 2)
+        out = tmp_path / "v1.zip"
+        told = self.exported(api, finished, frozen, "parquet", out)
+        assert told["missing_images"] in ([], None)
+        version = touchline.open(out)
+        assert [view.key for view in version.views] == ["3.png", "40.png"]
+        picture = cv2.imdecode(np.frombuffer(version.views[1].frame(), np.uint8), cv2.IMREAD_COLOR)
+        assert (number_of(picture), picture.shape) == (40, (HEIGHT, WIDTH, 3))
+        with zipfile.ZipFile(out) as packed, packed.open("views.parquet") as file:
+            rows = pyarrow.parquet.read_table(pyarrow.BufferReader(file.read())).to_pylist()
+        whence = [json.loads(row["extras"])["metadata"]["recording"] for row in rows]
+        assert [(one["sha256"], one["frame"]) for one in whence] == [(sha256, 3), (sha256, 40)]
+        assert [one["seconds"] for one in whence] == [3 / 25, 40 / 25]
+
+    def test_pictures_that_are_gone_are_named(
+        self, app, api, recording: str, frozen: int, finished: Finished, tmp_path: Path
+    ) -> None:
+        settings, sha256 = app.state.services.settings, api.get(recording).json()["sha256"]
+        (settings.recordings / sha256 / "40.png").unlink()
+        told = self.exported(api, finished, frozen, "parquet", tmp_path / "v1.zip")
+        (missing,) = told["missing_images"]
+        assert "40.png" in missing
+        version = touchline.open(tmp_path / "v1.zip")
+        assert version.views[0].frame().startswith(b"\x89PNG")
+        with pytest.raises(DataError):
+            version.views[1].frame()

@@ -15,7 +15,12 @@ from app.features.imports.upload_queries import UploadWriter, keep_upload, uploa
 from app.features.jobs.service import Jobs
 from app.features.recordings import jobs as module
 from app.features.recordings import service
-from app.features.recordings.jobs import request_index, request_instants, resume_recordings
+from app.features.recordings.jobs import (
+    InstantOptions,
+    request_index,
+    request_instants,
+    resume_recordings,
+)
 from app.features.recordings.service import (
     Recording,
     Shot,
@@ -142,5 +147,6 @@ class TestJobs:
             resume_recordings(second, store)
             second.start()
             assert second.wait(number, SECONDS).state == "done"
-            job = request_instants(second, store, recording.id, [1, 2], False, actor="ann")
+            options = InstantOptions(propose=False)
+            job = request_instants(second, store, recording.id, [1, 2], options, actor="ann")
             assert second.wait(job.id, SECONDS).result["new"] == 2

@@ -11,8 +11,8 @@ from app.features.saved_views.queries import (
 class TestSavedViews:
     def test_come_by_name_until_they_are_deleted(self, filled) -> None:
         with filled.write() as session:
-            late = insert_saved_view(session, 1, "late", "sort:newest", actor="ann")
-            early = insert_saved_view(session, 1, "early", "views:2", actor="bob")
+            late = insert_saved_view(session, 1, name="late", query="sort:newest", actor="ann")
+            early = insert_saved_view(session, 1, name="early", query="views:2", actor="bob")
             assert [row.id for row in dataset_saved_views(session, 1)] == [early, late]
             assert dataset_saved_views(session, 2) == []
             found = find_saved_view(session, late)

@@ -16,8 +16,8 @@ def ids(fill, make_group) -> list[int]:
 
 class TestSaveView:
     def test_is_listed_by_name_with_what_matches_now(self, store, ids) -> None:
-        save_view(store, 1, " Of the test ", "split:test ", actor="ann")
-        save_view(store, 1, "All", "", actor="ben")
+        save_view(store, 1, name=" Of the test ", q="split:test ", actor="ann")
+        save_view(store, 1, name="All", q="", actor="ben")
         found = list_saved_views(store, 1)
         assert [(item.name, item.q, item.by, item.groups) for item in found] == [
             ("All", "", "ben", 2),
@@ -26,44 +26,44 @@ class TestSaveView:
         assert list_saved_views(store, 2) == []
 
     def test_a_name_is_taken_once(self, store, ids) -> None:
-        save_view(store, 1, "All", "", actor="ann")
+        save_view(store, 1, name="All", q="", actor="ann")
         with pytest.raises(ConflictError, match='"All"'):
-            save_view(store, 1, "All", "split:test", actor="ben")
+            save_view(store, 1, name="All", q="split:test", actor="ben")
         assert get_view(store, 1).q == ""
 
     @pytest.mark.parametrize("name", ["", "  ", "x" * 81, "a\nb"])
     def test_a_name_can_be_read(self, store, ids, name: str) -> None:
         with pytest.raises(InputError) as caught:
-            save_view(store, 1, name, "", actor="ann")
+            save_view(store, 1, name=name, q="", actor="ann")
         assert caught.value.pointer == "/name"
 
     def test_a_query_that_cannot_be_understood_is_refused(self, store, ids) -> None:
         with pytest.raises(InputError):
-            save_view(store, 1, "Red ones", "colour:red", actor="ann")
+            save_view(store, 1, name="Red ones", q="colour:red", actor="ann")
 
     def test_there_is_an_end_to_them(self, store, ids, monkeypatch) -> None:
         monkeypatch.setattr(saved_views, "MAX_VIEWS", 1)
-        save_view(store, 1, "All", "", actor="ann")
+        save_view(store, 1, name="All", q="", actor="ann")
         with pytest.raises(ConflictError, match="at most 1"):
-            save_view(store, 1, "More", "", actor="ann")
+            save_view(store, 1, name="More", q="", actor="ann")
 
     def test_one_person_has_an_end_before_the_others(self, store, ids, monkeypatch) -> None:
         monkeypatch.setattr(saved_views, "MAX_OWN", 2)
         for name, actor in (("One", "ann"), ("Two", "ann (token nightly)")):
-            save_view(store, 1, name, "", actor=actor)
+            save_view(store, 1, name=name, q="", actor=actor)
         with pytest.raises(ConflictError, match="one person has at most 2"):
-            save_view(store, 1, "Three", "", actor="ann")
-        assert save_view(store, 1, "Three", "", actor="ben").name == "Three"
+            save_view(store, 1, name="Three", q="", actor="ann")
+        assert save_view(store, 1, name="Three", q="", actor="ben").name == "Three"
 
     def test_who_works_alone_has_all_the_room(self, store, ids, monkeypatch) -> None:
         monkeypatch.setattr(saved_views, "MAX_OWN", 0)
-        assert save_view(store, 1, "One", "", actor="local").name == "One"
+        assert save_view(store, 1, name="One", q="", actor="local").name == "One"
 
 
 class TestListSavedViews:
     def test_a_query_of_another_version_finds_nothing_and_spoils_no_list(self, store, ids) -> None:
-        old = save_view(store, 1, "Old", "", actor="ann")
-        save_view(store, 1, "Present", "", actor="ann")
+        old = save_view(store, 1, name="Old", q="", actor="ann")
+        save_view(store, 1, name="Present", q="", actor="ann")
         with store.write() as session:
             changed = update(SavedViewModel).where(SavedViewModel.id == old.id)
             session.execute(changed.values(query="colour:red"))
@@ -73,7 +73,7 @@ class TestListSavedViews:
 
 class TestDeleteView:
     def test_answers_what_it_was(self, store, ids) -> None:
-        saved = save_view(store, 1, "All", "sort:sigma", actor="ann")
+        saved = save_view(store, 1, name="All", q="sort:sigma", actor="ann")
         assert delete_view(store, saved.id) == saved
         assert list_saved_views(store, 1) == []
         with pytest.raises(NotFoundError):

@@ -1,0 +1,264 @@
+"""Links found from the ball: where it is seen in both shots, with the cameras over time, tells which times are the same.
+
+The ball is seen where a file (``ball.csv``) says it, or where the groups that were taken from the shots have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from app.config import Settings
+from app.db.database_worker import SILENCE, run_in_worker
+from app.db.json_columns import Json
+from app.db.store import Store
+from app.errors import ConflictError, InputError, TooLargeError
+from app.features.file_tools.link import read_ball
+from app.features.groups.queries import read_groups
+from app.features.imports.upload_queries import get_upload, upload_path
+from app.features.jobs.queries import Job
+from app.features.jobs.run import JobProgress, left_to_next_server
+from app.features.jobs.service import Jobs
+from app.features.recordings.cameras import cameras_at
+from app.features.recordings.link_values import (
+    LinkedShot,
+    LinkMap,
+    RayMiss,
+    described,
+    etag_of,
+    shots_of_link,
+)
+from app.features.recordings.links import (
+    get_link,
+    instant_seconds,
+    link_seconds,
+    need_link,
+    note_link,
+    residuals_of,
+    save_map,
+)
+from app.features.recordings.service import get_recording, groups_taken
+from app.formats.report import Report
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.plural import plural
+from app.progress import ReportProgress
+from app.tracking.ball_rays import BallRays, ball_rays
+from app.tracking.link import map_of_ball, ray_misses
+from app.worker_process import WorkerEnded, WorkerLimits
+
+KIND = "link"
+_BATCH = 100
+_Seen = tuple[tuple[float, float], Camera | None]
+"""Pixel of the ball, and the camera of its view where that has one of its own."""
+
+
+@dataclass(frozen=True)
+class BallLink:
+    """What became of a link that was sought from the ball.
+
+    Attributes:
+        link: Its id.
+        recording: Id of the recording of its live shot.
+        outcome: That of its map.
+        reason: Why the ball does not tell the times; None: it does.
+        rays: Frames of the live shot and of the replay whose ball has a camera.
+        left_out: Of both, frames whose ball has none, and rows that are of no use.
+    """
+
+    link: int
+    recording: int
+    outcome: str
+    reason: str | None
+    rays: tuple[int, int]
+    left_out: int
+
+
+def request_ball_link(
+    jobs: Jobs,
+    store: Store,
+    recording_id: int,
+    link_id: int,
+    uploads: Mapping[str, str | None],
+    *,
+    actor: str,
+) -> Job:
+    """Find the times of a link from the ball, soon.
+
+    Args:
+        jobs: Carries it out.
+        store: The database.
+        recording_id: One of its recordings.
+        link_id: Which.
+        uploads: Ids of the uploads of ``ball.csv`` of ``live`` and ``replay``; None: the balls of groups.
+        actor: Who wants it.
+
+    Raises:
+        NotFoundError: There is no such link or upload.
+    """
+    link = get_link(store, recording_id, link_id)
+    for upload in uploads.values():
+        if upload is not None:
+            upload_path(store.settings, upload)
+    return jobs.submit(
+        KIND,
+        f"Link frames {link.replay.first} to {link.replay.last} of {link.replay.name} by the ball",
+        partial(ball_link_work, store),
+        dataset_id=link.dataset_id,
+        actor=actor,
+        request={"recording": recording_id, "link": link_id, "uploads": dict(uploads)},
+    )
+
+
+def ball_link_work(store: Store, progress: JobProgress) -> Json:
+    """The work itself; its result says what the ball told."""
+    asked, settings = progress.job.request, store.settings
+    limits = WorkerLimits(settings.import_memory, settings.import_seconds, SILENCE)
+    progress(0, None, "Looking for the times under which the rays of the ball meet.")
+    with left_to_next_server(progress):
+        try:
+            found = run_in_worker(
+                store,
+                "recordings",
+                link_by_ball,
+                asked["recording"],
+                asked["link"],
+                asked["uploads"],
+                progress.job.actor,
+                limits=limits,
+                progress=progress,
+                stop=progress.check,
+            )
+        except WorkerEnded as error:
+            raise TooLargeError(f"the search {error}") from error
+    return asdict(found)
+
+
+def resume_ball_links(jobs: Jobs, store: Store) -> None:
+    """Let what an earlier server was at begin again."""
+    jobs.register_resume(KIND, partial(ball_link_work, store))
+
+
+def link_by_ball(
+    store: Store,
+    recording_id: int,
+    link_id: int,
+    uploads: Mapping[str, str | None],
+    actor: str,
+    _progress: ReportProgress,
+) -> BallLink:
+    """Find the map of a link from the ball, near its instants, and keep it; in a worker process.
+
+    Where the ball does not tell it, a map of instants stays, with the reason beside it.
+
+    Raises:
+        ConflictError: Somebody changed the link meanwhile, or an index is gone.
+        DatasetFormatError: A file is no ``ball.csv``.
+        InputError: A shot has no frame with a ball and a camera.
+        NotFoundError: There is no such link or upload.
+    """
+    with store.read() as session:
+        row = need_link(session, recording_id, link_id)
+    live, replay = shots_of_link(row)
+    live_times, times = link_seconds(store.settings, row)
+    report = Report()
+    sides = [
+        _rays(store, shot, seconds, (live, replay), uploads.get(name), report)
+        for name, shot, seconds in (("live", live, live_times), ("replay", replay, times))
+    ]
+    (live_rays, live_left), (rays, replay_left) = sides
+    before = get_link(store, recording_id, link_id)
+    pairs = [(one.live, one.replay) for one in before.instants]
+    given = instant_seconds(row, pairs, live_times, times)
+    found = map_of_ball(live_rays, rays, given)
+    reason = None if found.pieces else found.reason
+    if reason is None:
+        made = described(found, replay, times, "ball")
+        at, misses = ray_misses(live_rays, rays, found)
+        frames = replay.first + np.searchsorted(times, at)
+        each = zip(frames.tolist(), misses.tolist(), strict=True)
+        made = replace(made, misses=tuple(RayMiss(*one) for one in each))
+    elif before.map.is_usable and before.map.found_by == "instants":
+        made = replace(before.map, ball_reason=reason)
+    else:
+        made = LinkMap("unobservable", "ball", reason, miss_m=found.miss)
+    with store.write() as session:
+        present = need_link(session, recording_id, link_id)
+        if etag_of(present) != etag_of(row):
+            raise ConflictError(
+                "somebody changed this link while the ball was looked at", hint="Start it again."
+            )
+        residuals = residuals_of(made, given, live_times)
+        if save_map(session, present, pairs, made, residuals):
+            note_link(session, actor, "link found from the ball", present)
+    left = live_left + replay_left + len(report.problems)
+    return BallLink(
+        link_id, live.recording, made.outcome, reason, (len(live_rays), len(rays)), left
+    )
+
+
+def _rays(
+    store: Store,
+    shot: LinkedShot,
+    seconds: FloatArray,
+    shots: Sequence[LinkedShot],
+    upload: str | None,
+    report: Report,
+) -> tuple[BallRays, int]:
+    """The rays of the ball in a shot, and how many frames with a ball have no camera, or are of another shot."""
+    if upload is None:
+        seen = dict(_of_groups(store, shot, shots))
+    else:
+        seen = _of_file(store.settings, upload, report)
+    inside = {number: one for number, one in seen.items() if number in shot.frames}
+    tracked = cameras_at(store, get_recording(store, shot.recording), inside)
+    rays, last = [], -1.0
+    for number in sorted(inside):
+        pixel, own = inside[number]
+        frame = tracked.get(number)
+        camera = own if frame is None or frame.camera is None else frame.camera
+        time = float(seconds[number - shot.first])
+        # Frames that are shown at once have one time.
+        if camera is not None and time > last:
+            rays.append((time, pixel, camera))
+            last = time
+    if not rays:
+        where = "in its groups" if upload is None else "in the file"
+        raise InputError(
+            f"frames {shot.first} to {shot.last} of {shot.name} have "
+            f"{plural(len(inside), 'ball')} {where}, and no camera for one of them",
+            hint="Track the camera of the shot, and mark the ball in frames of it or send a ball.csv.",
+        )
+    return ball_rays(*(list(column) for column in zip(*rays, strict=True))), len(seen) - len(rays)
+
+
+def _of_file(settings: Settings, upload: str, report: Report) -> dict[int, _Seen]:
+    """Where a ``ball.csv`` says that the ball is, by frame of its recording."""
+    rows = read_ball(upload_path(settings, upload), get_upload(settings, upload).name, report)
+    return {frame: (pixel, None) for frame, _, pixel in rows}
+
+
+def _of_groups(
+    store: Store, shot: LinkedShot, shots: Sequence[LinkedShot]
+) -> Iterator[tuple[int, _Seen]]:
+    """Where groups that were taken from either shot have the ball in frames of one, with given cameras."""
+    sha256 = get_recording(store, shot.recording).require_readable()
+    ids: set[int] = set()
+    for number in {one.recording for one in shots}:
+        ids |= set(groups_taken(store, get_recording(store, number)).values())
+    wanted = sorted(ids)
+    for start in range(0, len(wanted), _BATCH):
+        with store.read() as session:
+            stored = read_groups(session, wanted[start : start + _BATCH])
+        for group in stored.values():
+            for view in group.group.views:
+                told: Any = (view.extras.metadata or {}).get("recording")
+                if not isinstance(told, dict) or told.get("sha256") != sha256:
+                    continue
+                centers = [ball.center for ball in view.balls if not ball.inferred]
+                if centers and centers[0] is not None:
+                    yield told["frame"], ((centers[0].x, centers[0].y), view.station.given)

@@ -1,0 +1,159 @@
+"""Links found from the ball, which files say or groups have, with cameras over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.db.store import Store
+from app.features.recordings.cameras import Tracked, save_cameras
+from app.features.recordings.link_ball import _of_groups
+from app.features.recordings.links import get_link
+from app.features.recordings.service import get_recording
+from app.geometry.arrays import FloatArray
+from tests.bench.link import Filmed, at_times, film, made_ball
+from tests.tracked_frames import frame
+from tests.videos import write_video
+
+Finished = Callable[[Any], Any]
+FPS, SPEED, BEGIN = 25.0, 0.5, 1.5
+LIVE, FRAMES = 150, 300
+"""Six seconds live, and six of a replay that is half as fast and begins one and a half seconds later."""
+REST = np.column_stack([np.arange(0, 8, 0.02), np.full((400, 2), 3.0), np.full(400, -0.1)])
+
+
+def both(ball: FloatArray) -> tuple[Filmed, Filmed]:
+    """A ball as the live camera and that of the replay see it, with half a pixel of noise."""
+    generator = np.random.default_rng(4)
+    live = np.arange(LIVE) / FPS
+    replay = np.arange(FRAMES - LIVE) / FPS
+    views = (
+        film(at_times(ball, live), live, (0.0, 62.0, -16.0), 1900.0),
+        film(at_times(ball, BEGIN + SPEED * replay), replay, (18.0, -60.0, -12.0), 2000.0, lag=40),
+    )
+    for view in views:
+        view.pixels[:] += generator.normal(0, 0.5, view.pixels.shape)
+    return views
+
+
+@pytest.fixture
+def store(app: Any) -> Store:
+    found: Store = app.state.services.store
+    return found
+
+
+@pytest.fixture
+def link(api: Any, film: Path, finished: Finished) -> str:
+    """The address of a link without instants."""
+    write_video(film, "mp4v", FRAMES)
+    body = {"dataset": "cup", "source": {"folder": "films/final.mp4"}}
+    recording = finished(api.post("/api/v1/recordings", json=body)).result["recording"]
+    both = {
+        "live": {"first": 0, "last": LIVE - 1},
+        "replay": {"recording": recording, "first": LIVE, "last": FRAMES - 1},
+    }
+    made = api.post(f"/api/v1/recordings/{recording}/links", json=both)
+    return str(made.headers["location"])
+
+
+def tracked(store: Store, views: tuple[Filmed, Filmed]) -> None:
+    """Let both shots have the cameras of views."""
+    recording = get_recording(store, 1)
+    for first, view in zip((0, LIVE), views, strict=True):
+        frames = [
+            replace(frame(first + at, "tracked"), camera=camera)
+            for at, camera in enumerate(view.cameras)
+        ]
+        stretch = (first, first + len(frames) - 1)
+        save_cameras(store, recording, stretch, Tracked(frames, ()), [], "ann")
+
+
+def uploads(api: Any, views: tuple[Filmed, Filmed]) -> dict[str, str]:
+    """The uploads of what a detector says of both views."""
+    sent = {}
+    for name, first, view in zip(("live", "replay"), (0, LIVE), views, strict=True):
+        rows = [f"{first + at},{at / FPS},{x},{y}" for at, (x, y) in enumerate(view.pixels)]
+        # Of another shot, and no number.
+        text = "\n".join(["frame,time_s,x,y", *rows, "900,36,1,2", "7.5,0,1,2"])
+        kind = {"content-type": "application/octet-stream"}
+        answer = api.post("/api/v1/uploads?name=ball.csv", content=text.encode(), headers=kind)
+        sent[f"{name}_upload"] = answer.json()["id"]
+    return sent
+
+
+class TestLinkByBall:
+    def test_planted_times_are_found_with_the_misses_of_the_rays(
+        self, api: Any, store: Store, link: str, finished: Finished
+    ) -> None:
+        views = both(made_ball(8.0, seed=3))
+        tracked(store, views)
+        job = finished(api.post(f"{link}/ball", json=uploads(api, views)))
+        assert (job.state, job.result["reason"]) == ("done", None)
+        assert job.result["left_out"] >= 4
+        found = api.get(link).json()["map"]
+        assert (found["outcome"], found["found_by"], found["pieces"]) == ("linked", "ball", [])
+        assert found["speed"] == pytest.approx(SPEED, rel=0.01)
+        assert found["offset_s"] == pytest.approx(BEGIN, abs=0.1 / FPS)
+        assert 0 < found["sigma_s"] < 0.1 / FPS
+        misses = [one["miss_m"] for one in found["misses"]]
+        assert len(misses) > 120
+        assert np.median(misses) == pytest.approx(found["miss_m"], rel=0.05)
+        frames = api.get(f"{link}/frames").json()
+        assert frames["replay"][50] == LIVE + round((50 / FPS - BEGIN) / SPEED * FPS)
+
+    def test_a_resting_ball_is_refused_and_a_map_of_instants_stays(
+        self, api: Any, store: Store, link: str, finished: Finished
+    ) -> None:
+        views = both(REST)
+        tracked(store, views)
+        sent = uploads(api, views)
+        assert "hardly moves" in finished(api.post(f"{link}/ball", json=sent)).result["reason"]
+        found = api.get(link).json()
+        assert (found["map"]["outcome"], found["map"]["speed"]) == ("unobservable", None)
+        assert "hardly moves" in found["map"]["reason"]
+        pairs = {"instants": [{"live": 40, "replay": 155}, {"live": 100, "replay": 275}]}
+        tag = {"If-Match": found["etag"]}
+        linked = api.put(f"{link}/instants", json=pairs, headers=tag).json()["map"]
+        assert linked["ball_reason"] is None
+        finished(api.post(f"{link}/ball", json=sent))
+        after = api.get(link).json()
+        assert after["map"] == {**linked, "ball_reason": after["map"]["ball_reason"]}
+        assert "hardly moves" in after["map"]["ball_reason"]
+        assert len(after["instants"]) == 2
+
+    def test_without_cameras_it_says_what_to_do(
+        self, api: Any, link: str, finished: Finished
+    ) -> None:
+        sent = uploads(api, both(REST))
+        job = finished(api.post(f"{link}/ball", json=sent))
+        assert job.state == "failed"
+        assert "150 balls in the file, and no camera for one of them" in job.problem["detail"]
+        assert "Track the camera of the shot" in job.problem["hint"]
+        assert api.post(f"{link}/ball", json={"live_upload": "0" * 32}).status_code == 404
+
+
+class TestOfGroups:
+    def test_balls_of_groups_of_both_shots_are_found_by_their_frame(
+        self, api: Any, store: Store, link: str, finished: Finished
+    ) -> None:
+        at = link.partition("/links")[0]
+        finished(api.post(f"{at}/groups", json={"frames": [10, 20, 160], "propose": False}))
+        for row in api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"][:2]:
+            group = api.get(f"/api/v1/groups/{row['id']}")
+            (view,) = group.json()["views"]
+            ball = {"point": [63, 44]}
+            tag = {"If-Match": group.headers["etag"]}
+            path = f"/api/v1/views/{view['id']}/ball"
+            answer = api.patch(path, json=ball, headers=tag)
+            assert answer.status_code == 200, answer.text
+        found = get_link(store, 1, 1)
+        sides = (found.live, found.replay)
+        assert dict(_of_groups(store, found.live, sides)) == {
+            10: ((63.0, 44.0), None),
+            20: ((63.0, 44.0), None),
+        }
