@@ -16,7 +16,7 @@ from touchline.dataset import Dataset
 from touchline.errors import TouchlineError
 from touchline.opening import open_version as open  # noqa: A004  `touchline.open` is its name
 from touchline.pitch import markings
-from touchline.recordings import Recording, Shot
+from touchline.recordings import Link, Recording, Shot
 from touchline.samples import Samples
 from touchline.view import Group, View
 
@@ -28,6 +28,7 @@ __all__ = [
     "Dataset",
     "Group",
     "ImageBall",
+    "Link",
     "Recording",
     "Samples",
     "Shot",

@@ -21,7 +21,15 @@ from touchline.errors import (
     error_of,
 )
 from touchline.packages import package
-from touchline.recordings import Recording, SendProgress, Shot, read, require_same, send_in_parts
+from touchline.recordings import (
+    Link,
+    Recording,
+    SendProgress,
+    Shot,
+    read,
+    require_same,
+    send_in_parts,
+)
 
 API = "/api/v1/"
 ADDRESS = "http://127.0.0.1:8000"
@@ -215,6 +223,11 @@ class Client:
         """The shots of a recording, or of that of an id, in their order."""
         number = recording if isinstance(recording, int) else recording.id
         return [read(Shot, one) for one in self.pages(f"recordings/{number}/shots")]
+
+    def links(self, recording: Recording | int) -> list[Link]:
+        """The links of a recording's replays to live shots, by the frames of their live shots."""
+        number = recording if isinstance(recording, int) else recording.id
+        return [Link.of(one) for one in self.pages(f"recordings/{number}/links")]
 
     def upload_recording(
         self,

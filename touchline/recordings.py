@@ -84,6 +84,38 @@ class Shot:
     end_s: float
 
 
+@dataclass(frozen=True)
+class Link:
+    """A replay and the live shot that it shows again.
+
+    Attributes:
+        live, replay: Names of the recordings, and the first and last frames of the shots.
+        outcome: ``linked``: offset and speed are known; ``offset``: the speed is assumed; ``none``,
+            ``unobservable``: nothing is.
+        found_by: ``instants`` of people, or the ``ball``.
+        offset_s, speed: ``live = offset + speed * replay``, seconds after the first frames of the shots;
+            None where they are not known, or the speed changes.
+        offset_sigma_s, speed_sigma: Their standard deviations.
+    """
+
+    id: int
+    live: tuple[str, int, int]
+    replay: tuple[str, int, int]
+    outcome: str
+    found_by: str | None
+    offset_s: float | None
+    speed: float | None
+    offset_sigma_s: float | None
+    speed_sigma: float | None
+
+    @staticmethod
+    def of(document: Mapping[str, Any]) -> Link:
+        """The link of a document."""
+        shots = (document["live"], document["replay"])
+        live, replay = ((one["name"], one["first"], one["last"]) for one in shots)
+        return read(Link, {**document, **document["map"], "live": live, "replay": replay})
+
+
 def read(kind: type[_Read], document: Mapping[str, Any]) -> _Read:
     """A value from its document; what a newer server says besides is left aside."""
     values = {field.name: document[field.name] for field in fields(kind)}  # type: ignore[arg-type]
@@ -153,5 +185,5 @@ def require_same(path: Path, recording: Recording) -> None:
     if recording.sha256 != digest.hexdigest():
         raise HashError(
             f"the server has another file than {path.name}",
-            "Delete the recording there, and send it again.",
+            "Delete the recording and its upload there, and send it again.",
         )

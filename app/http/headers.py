@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
+from urllib.parse import quote
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -91,3 +92,10 @@ def bearer_of(scope: Scope) -> str | None:
     if not tokens:
         return None
     return tokens[0] if len(tokens) == 1 else ""
+
+
+def saved_as(name: str, how: str = "attachment") -> str:
+    """The header Content-Disposition of a file, whatever letters its name has (RFC 6266)."""
+    plain = re.sub(r'[^\x20-\x7e]|["\\%]', "_", name)
+    exact = "" if plain == name else f"; filename*=UTF-8''{quote(name, safe='')}"
+    return f'{how}; filename="{plain}"{exact}'

@@ -133,6 +133,8 @@ PAGES = (
     "/datasets/{dataset}/versions",
     "/datasets/{dataset}/agreement",
     "/datasets/{dataset}/evaluation",
+    "/datasets/{dataset}/tracks",
+    "/tracks/{track}",
     "/exports",
     "/findings",
     "/help",

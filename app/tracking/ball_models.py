@@ -26,7 +26,7 @@ TOUCHED, TOUCHED_SIGMA = 0.9, 0.9
 """Height at which a ball in the air is touched: by feet mostly, by heads at twice that, metres."""
 REACH = 2.7
 """Height above which nobody but a keeper touches a ball, metres."""
-GRASS_SIGMA = 0.1
+GRASS_SIGMA = 0.12
 """Height of a rolling ball above and below rest: blades, ruts, hops and what the pitch is off, metres."""
 GRASS_S = 2.0
 """How long a rolling ball keeps such a height, seconds."""

@@ -53,10 +53,10 @@ def summed(px: FloatArray, of_frame: IntArray, frames: IntArray) -> LeftOut:
     """
     by_frame = np.full(len(frames), np.nan)
     told = np.isfinite(px)
-    for row, frame in enumerate(frames):
-        here = px[told & (of_frame == frame)]
-        if len(here):
-            by_frame[row] = np.median(here)
+    order = np.flatnonzero(told)[np.argsort(of_frame[told], kind="stable")]
+    first, last = (np.searchsorted(of_frame[order], frames, side) for side in ("left", "right"))
+    for row in np.flatnonzero(last > first):
+        by_frame[row] = np.median(px[order[first[row] : last[row]]])
     if not told.any():
         return LeftOut(px, by_frame, None, None, 0)
     median, most = np.percentile(px[told], (50, 95))

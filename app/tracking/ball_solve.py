@@ -328,6 +328,7 @@ def _joined(
     against: list[Contradiction] = []
     px = np.full(len(measurements), np.nan)
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.04
+    half = np.array([-step / 2 - 1e-9, step / 2 + 1e-9])
     for run in runs:
         knots, fitted, history = run.knots, run.fitted, run.history
         assert knots is not None and fitted is not None and history is not None
@@ -336,13 +337,12 @@ def _joined(
         seen = np.flatnonzero(np.bincount(knots.at[run.used], minlength=len(knots.times)) > 0)
         sigma = np.sqrt(np.maximum(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1], 0.0))
         known = sigma <= options.most_sigma_m
+        at_times = knots.times[knots.at]
         for row, knot in _rows_of(knots, times):
             if not known[knot]:
                 continue
-            close = np.abs(knots.times[knots.at] - times[row]) <= step / 2 + 1e-9
-            names = {
-                measurements.views[knots.rows[ray]] for ray in np.flatnonzero(close & run.used)
-            }
+            rays = np.arange(*np.searchsorted(at_times, times[row] + half))
+            names = {measurements.views[knots.rows[ray]] for ray in rays[run.used[rays]]}
             position[row] = fitted.state[knot, :3]
             velocity[row] = fitted.state[knot, 3:6]
             covariance[row] = spread[knot]

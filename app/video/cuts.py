@@ -41,7 +41,7 @@ def hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
     Returns:
         Numbers of frames, ascending; shape (N,).
     """
-    change, cells = change_of(rows), rows["cells"].astype(np.int16)
+    change, cells = change_of(rows), rows["cells"]
     reach = max(round(FLASH_SECONDS / step), 2)
     flashed = np.zeros(len(rows), np.bool_)
     found = []
@@ -65,7 +65,8 @@ def hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
 
 def _apart(cells: Any, one: Any, others: Any) -> FloatArray:
     """Mean difference of the cells of a frame from those of others, grey levels."""
-    return np.asarray(np.abs(cells[others] - cells[one]).mean(axis=(1, 2, 3)))
+    # Of a few frames at a time: those of a whole match would take 120 MB.
+    return np.asarray(np.abs(cells[others].astype(np.int16) - cells[one]).mean(axis=(1, 2, 3)))
 
 
 def _returns(cells: Any, number: int, reach: int) -> int | None:

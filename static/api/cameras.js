@@ -39,6 +39,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {number} last
  * @property {[number, number]} size of a frame, pixels
  * @property {[number, number] | null} principal_point
+ * @property {[number, number]} pitch length and width of the pitch of the match, metres
  * @property {string} outcome a letter a frame: T, B, L
  * @property {number[]} time
  * @property {(number | null)[]} supported

@@ -13,16 +13,16 @@ function here() {
 /** Where the person is. */
 export const place = signal(here());
 
-/** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation' | 'agreement'} DatasetPage */
+/** @typedef {'yield' | 'policy' | 'statistics' | 'versions' | 'evaluation' | 'agreement' | 'tracks'} DatasetPage */
 /** @typedef {'queue' | 'datasets' | 'import' | 'jobs' | 'work' | 'exports' | 'recordings' | 'account' | 'people' | 'audit' | 'join' | 'login' | 'unknown'} PlainPage */
-/** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration' | 'history', group: number} | {page: 'compare', group: number, other: number} | {page: 'adjudicate', group: number} | {page: 'recording', recording: number} | {page: 'link', recording: number, link: number} | {page: DatasetPage, dataset: string}} Page */
+/** @typedef {{page: PlainPage} | {page: 'help', tab: string} | {page: 'review', group: number | null} | {page: 'calibration' | 'history', group: number} | {page: 'compare', group: number, other: number} | {page: 'adjudicate', group: number} | {page: 'recording', recording: number} | {page: 'link', recording: number, link: number} | {page: 'track', track: number} | {page: DatasetPage, dataset: string}} Page */
 
 const PLAIN = /** @type {{[path: string]: PlainPage}} */ ({
 	'/': 'queue', '/groups': 'queue', '/datasets': 'datasets', '/import': 'import', '/jobs': 'jobs', '/work': 'work', '/exports': 'exports', '/recordings': 'recordings',
 	'/account': 'account', '/people': 'people', '/audit': 'audit', '/join': 'join', '/login': 'login',
 });
 /** A dataset without a page is its yield, which says most about it. */
-const OF_DATASET = /^\/datasets\/([^/]+)(?:\/(yield|policy|statistics|versions|evaluation|agreement))?\/?$/;
+const OF_DATASET = /^\/datasets\/([^/]+)(?:\/(yield|policy|statistics|versions|evaluation|agreement|tracks))?\/?$/;
 
 /** Which page that is. */
 export const page = computed(/** @returns {Page} */ () => {
@@ -40,6 +40,8 @@ export const page = computed(/** @returns {Page} */ () => {
 	if (film) return { page: 'recording', recording: Number(film[1]) };
 	const linked = /^\/recordings\/(\d+)\/links\/(\d+)\/?$/.exec(path);
 	if (linked) return { page: 'link', recording: Number(linked[1]), link: Number(linked[2]) };
+	const tracked = /^\/tracks\/(\d+)\/?$/.exec(path);
+	if (tracked) return { page: 'track', track: Number(tracked[1]) };
 	const past = /^\/review\/(\d+)\/history\/?$/.exec(path);
 	if (past) return { page: 'history', group: Number(past[1]) };
 	const help = /^\/help(?:\/(keys|legend|words|guide|practice))?\/?$/.exec(path);

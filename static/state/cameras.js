@@ -46,13 +46,23 @@ export function worstFrame({ error_px: errors, first }) {
 	return worst < 0 ? null : first + worst;
 }
 
-/** Every marking in places a metre apart, on the pitch of the laws of the game. */
-const MARKINGS = [...pitchMarkings(105, 68).values()].map((line) => line.flatMap((end, index) => {
+/** Every marking in places a metre apart. @param {number} length @param {number} width metres */
+const markingsOf = (length, width) => [...pitchMarkings(length, width).values()].map((line) => line.flatMap((end, index) => {
 	if (index === 0) return [end];
 	const start = line[index - 1];
 	const steps = Math.max(1, Math.ceil(Math.hypot(...end.map((value, axis) => value - start[axis])) / STEP));
 	return Array.from({ length: steps }, (_, step) => /** @type {PitchPoint} */ (end.map((value, axis) => start[axis] + ((value - start[axis]) * (step + 1)) / steps)));
 }));
+
+/** @type {WeakMap<FrameCamerasJson, PitchPoint[][]>} */
+const drawn = new WeakMap();
+
+/** Those of the pitch of its match. @param {FrameCamerasJson} cameras */
+function markingsIn(cameras) {
+	const known = drawn.get(cameras) ?? markingsOf(cameras.pitch[0], cameras.pitch[1]);
+	drawn.set(cameras, known);
+	return known;
+}
 
 /** The camera of a frame; null where it has none. @param {FrameCamerasJson} cameras @param {number} frame */
 export function cameraAt({ first, camera, principal_point: principal }, frame) {
@@ -71,7 +81,7 @@ export function markingsPath(cameras, frame) {
 	if (!camera) return '';
 	const [width, height] = cameras.size;
 	const parts = [];
-	for (const line of MARKINGS) {
+	for (const line of markingsIn(cameras)) {
 		let pen = false;
 		for (const place of line) {
 			const pixel = project(camera, place);

@@ -17,7 +17,8 @@ import { chartOptions } from './chart_options.js';
  * @property {(number | null)[]} values one for each x
  * @property {ChartColour} colour
  * @property {number[]} [dash]
- * @property {boolean} [points] points without a line between them
+ * @property {boolean | number} [points] points without a line between them; a number is their size in pixels
+ * @property {boolean} [gaps] no line where values are missing
  * @property {(number | null)[]} [low] lower end of the interval of each value
  * @property {(number | null)[]} [high]
  */

@@ -10,10 +10,10 @@ const FONT = '12px Inter, system-ui, "DejaVu Sans", sans-serif';
 /** @typedef {{current: ChartProps}} Props */
 
 /** @param {Curve} curve @param {Record<ChartColour, string>} colours @returns {uPlot.Series} */
-function seriesOf({ label, colour, dash, points }, colours) {
+function seriesOf({ label, colour, dash, points, gaps }, colours) {
 	const stroke = colours[colour];
-	if (points) return { label, stroke, paths: () => null, points: { show: true, size: 7, fill: stroke, stroke } };
-	return { label, stroke, width: 2, dash, spanGaps: true, points: { show: false } };
+	if (points) return { label, stroke, paths: () => null, points: { show: true, size: points === true ? 7 : points, fill: stroke, stroke } };
+	return { label, stroke, width: 2, dash, spanGaps: !gaps, points: { show: false } };
 }
 
 /** @param {number} place */

@@ -17,6 +17,7 @@ export const DATASET_PAGES = [
 	{ name: 'yield', label: 'Yield' },
 	{ name: 'policy', label: 'Policy' },
 	{ name: 'statistics', label: 'Statistics' },
+	{ name: 'tracks', label: 'Tracks' },
 	{ name: 'versions', label: 'Versions' },
 	{ name: 'agreement', label: 'Agreement' },
 	{ name: 'evaluation', label: 'Evaluation' },

@@ -77,6 +77,15 @@ class TestUploadRecording:
             assert client.recordings("cup") == client.recordings() == [recording]
             (shot,) = client.shots(recording)
             assert (shot.first, shot.last, shot.entered_by) == (0, 39, "start")
+            shots = [{"first": a, "last": b, "kind": "main"} for a, b in ((0, 9), (10, 39))]
+            path = f"recordings/{recording.id}"
+            etag = client.get(f"{path}/shots")["etag"]
+            client.put(f"{path}/shots", {"shots": shots}, if_match=etag)
+            replay = {"recording": recording.id, "first": 10, "last": 39}
+            client.post(f"{path}/links", {"live": {"first": 0, "last": 9}, "replay": replay})
+            (link,) = client.links(recording)
+            assert (link.live, link.replay) == (("final", 0, 9), ("final", 10, 39))
+            assert (link.outcome, link.speed) == ("none", None)
             # Sent already: nothing is sent.
             told.clear()
             assert client.upload_recording("cup", film, sent=kill_once).id == recording.id

@@ -7,7 +7,7 @@ import { cameraAt, markingsPath, nextUntracked, runsOf, worstFrame } from '../..
 
 const ROW = [0, 60, -15, 0, 75, 0, 1500, 1500, 0];
 const cameras = (outcome, more = {}) => ({
-	first: 10, last: 9 + outcome.length, size: [1280, 720], principal_point: [639.5, 359.5], outcome,
+	first: 10, last: 9 + outcome.length, size: [1280, 720], principal_point: [639.5, 359.5], pitch: [105, 68], outcome,
 	camera: [...outcome].map((letter) => (letter === 'L' ? null : ROW)),
 	error_px: [...outcome].map((letter, place) => (letter === 'T' ? place / 10 : null)), ...more,
 });

@@ -23,6 +23,7 @@ from app.features.imports.edits_export import export_edits
 from app.features.imports.unassigned import unassigned_persons
 from app.features.tracks.export import TrackSource
 from app.features.tracks.service import track_source
+from app.features.versions.frozen_queries import json_of, read_frozen
 from app.features.versions.service import find_version
 from app.formats.export_formats import (
     CONTENT,
@@ -333,7 +334,7 @@ class _SampleSource:
         self.dataset, self.version, self.licence = source.dataset, source.version, source.licence
         self.count, self.date = min(source.count, TRIED), source.date
         self.settings, self.stamp, self.policy = source.settings, source.stamp, source.policy
-        self.dataset_id = source.dataset_id
+        self.dataset_id, self.tracks = source.dataset_id, source.tracks
 
     @property
     def is_all(self) -> bool:
@@ -375,9 +376,13 @@ def _tracks(
     """What makes the tracks of an export; None where its format holds none."""
     if options.format not in TRACKS:
         return None
-    live = source.version is None
-    found = track_source(session, source.dataset_id, source.dataset, source.policy, live=live)
-    return replace(found, everything=options.everything or not live, try_only=try_only)
+    frozen = None
+    if source.tracks is not None:
+        bodies = read_frozen(session, source.dataset_id, source.tracks.values())
+        frozen = {key: json_of(bodies[name]) for key, name in source.tracks.items()}
+    found = track_source(session, source.dataset_id, source.dataset, source.policy, frozen)
+    everything = options.everything or frozen is not None
+    return replace(found, everything=everything, try_only=try_only)
 
 
 class _Run:

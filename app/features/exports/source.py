@@ -82,6 +82,7 @@ class LiveSource:
 
     version = None
     licence = None
+    tracks: Mapping[str, str] | None = None
 
     def __init__(
         self,
@@ -138,6 +139,7 @@ class VersionSource:
         self._session, self._version = session, version
         self.dataset, self.version = version.dataset, version.name
         self.dataset_id, self.policy = version.dataset_id, version.policy
+        self.tracks = version.tracks
         self.date, self.licence = version.created, version.licence or None
         self.count = int(version.counts["groups"])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Annotated, Any, TypeVar
 
@@ -167,13 +167,19 @@ async def upload_file(
 ) -> UploadDocument:
     """Take a file, to import it or its predictions; the same file again is the same upload.
 
-    With `size` it comes in parts, and the answer's `bytes` says how many are here already.
+    With `size` and `mark` it comes in parts, and the answer's `bytes` says how many are here already.
     """
     settings = services.settings
     if size is None:
         begin = partial(begin_upload, settings, name, _declared(request), actor)
         upload = await _receive(request, services, begin, finish_upload)
     else:
+        if not mark:
+            raise InputError(
+                f"{name} comes in parts, and nothing tells it from another file of its name and size",
+                hint="Say in mark when it was changed, or its digest.",
+                pointer="/mark",
+            )
         upload = await _on_disk(partial(begin_in_parts, settings, name, size, mark, by=actor))
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
     return UploadDocument.model_validate(upload)
@@ -238,17 +244,34 @@ def _declared(request: Request) -> int:
 
 async def _write(request: Request, writer: UploadWriter | PartWriter, at_once: int) -> None:
     waiting = bytearray()
+
+    async def put() -> None:
+        if waiting:
+            part = bytes(waiting)
+            # Before the wait: what a thread writes is not sent a second time when the request ends.
+            waiting.clear()
+            await _finished(_on_disk(writer.write, part))
+
     try:
         async for chunk in request.stream():
             waiting += chunk
             if len(waiting) >= at_once:
-                await _on_disk(writer.write, bytes(waiting))
-                waiting.clear()
+                await put()
     except (ClientDisconnect, asyncio.CancelledError):
         # Of a part that is cut off, what has come is kept.
-        await _on_disk(writer.write, bytes(waiting))
+        await put()
         raise
-    await _on_disk(writer.write, bytes(waiting))
+    await put()
+
+
+async def _finished(work: Coroutine[Any, Any, T]) -> T:
+    """What some work comes to; cancelled, it is waited for all the same, since its thread goes on."""
+    task = asyncio.ensure_future(work)
+    try:
+        return await asyncio.shield(task)
+    except asyncio.CancelledError:
+        await asyncio.wait({task})
+        raise
 
 
 async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:

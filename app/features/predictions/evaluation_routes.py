@@ -27,6 +27,7 @@ from app.features.versions.service import find_version_id
 from app.finite import MAX_ID
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.headers import saved_as
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
@@ -146,7 +147,7 @@ def get_figure(
         return document(found)
     if ending == "csv":
         return _csv(figure_csv(found), name)
-    shown = {"Content-Disposition": f'inline; filename="{name}"'}
+    shown = {"Content-Disposition": saved_as(name, "inline")}
     return Response(figure_png(found), media_type=PNG_FILE, headers=shown)
 
 
@@ -227,5 +228,5 @@ def compare_evaluations(
 
 
 def _csv(text: str, name: str) -> Response:
-    saved = {"Content-Disposition": f'attachment; filename="{name}"'}
+    saved = {"Content-Disposition": saved_as(name)}
     return Response(text, media_type=f"{CSV_FILE}; charset=utf-8", headers=saved)

@@ -17,10 +17,11 @@ from app.features.recordings.camera_schemas import (
     CamerasRequest,
     FrameCamerasDocument,
 )
-from app.features.recordings.cameras import get_cameras, list_cameras, read_cameras
+from app.features.recordings.cameras import get_cameras, list_cameras, pitch_of, read_cameras
 from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, etag_matches
+from app.http.headers import saved_as
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
@@ -88,11 +89,13 @@ def get_stretch(
     digest = found.digest_before if before else found.digest
     if digest is None:
         raise NotFoundError("these are the first cameras of this stretch")
-    headers = {"ETag": f'"{digest}"', "Cache-Control": "private, no-cache"}
-    if etag_matches(request, headers["ETag"]):
+    pitch = pitch_of(store, recording)
+    tag = f'"{digest}-{pitch.length:g}-{pitch.width:g}"'
+    headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
+    if etag_matches(request, tag):
         return Response(status_code=304, headers=headers)
     frames = read_cameras(store.settings, digest)
-    return document(FrameCamerasDocument.of(frames), 200, headers)
+    return document(FrameCamerasDocument.of(frames, pitch), 200, headers)
 
 
 @router.get(
@@ -119,7 +122,7 @@ def get_file(
     found = get_cameras(store, recording, frame)
     name, content = camera_output(store, found, form)
     headers = {
-        "Content-Disposition": f'attachment; filename="{name}"',
+        "Content-Disposition": saved_as(name),
         "Cache-Control": "private, no-cache",
     }
     return Response(content, media_type=MEDIA_TYPES[form], headers=headers)

@@ -12,6 +12,7 @@ from app.features.file_tools.track import frame_row
 from app.features.recordings.cameras import CameraSummary
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
+from app.soccer.pitch import Pitch
 from app.tracking.track import FrameCamera
 
 Frame = Annotated[int, Field(ge=0, le=MAX_ID)]
@@ -73,6 +74,7 @@ class FrameCamerasDocument(Document):
     last: int = Field(description="Number of the last frame.")
     size: list[int] = Field(description="Width and height of a frame, pixels.")
     principal_point: list[float] | None = Field(description="Of every camera, pixels.")
+    pitch: list[float] = Field(description="Length and width of the pitch of the match, metres.")
     outcome: str = Field(description="A letter a frame: `T` tracked, `B` bridged, `L` lost.")
     time: list[float] = Field(description="When each is shown, seconds after the first frame.")
     supported: list[float | None] = Field(description="Share of the visible markings with paint.")
@@ -88,7 +90,7 @@ class FrameCamerasDocument(Document):
     )
 
     @staticmethod
-    def of(frames: list[FrameCamera]) -> FrameCamerasDocument:
+    def of(frames: list[FrameCamera], pitch: Pitch) -> FrameCamerasDocument:
         """The document of cameras."""
         rows = [frame_row(frame) for frame in frames]
         first = next((frame.camera for frame in frames if frame.camera is not None), None)
@@ -102,6 +104,7 @@ class FrameCamerasDocument(Document):
             last=frames[-1].number,
             size=[size.width, size.height],
             principal_point=None if first is None else [*first.principal_point],
+            pitch=[pitch.length, pitch.width],
             outcome="".join(frame.outcome[0].upper() for frame in frames),
             time=[frame.time for frame in frames],
             **columns,

@@ -145,6 +145,13 @@ def get_cameras(store: Store, recording_id: int, frame: int) -> ShotCameras:
     raise NotFoundError(f"recording {recording_id} has no cameras at frame {frame}")
 
 
+def pitch_of(store: Store, recording_id: int) -> Pitch:
+    """The pitch of the match that a recording is of: as a person gave it, or as the Laws plan it."""
+    with store.read() as session:
+        row = need_recording(session, recording_id)
+        return edited_pitches(session, row.dataset_id, [row.name]).get(row.name) or Pitch()
+
+
 def read_cameras(settings: Settings, digest: str) -> list[FrameCamera]:
     """The cameras of a file.
 
@@ -198,7 +205,8 @@ def track_now(
 ) -> tuple[ShotCameras, int]:
     """Track a stretch of a recording in a worker process, and keep its cameras.
 
-    They take the place of all that share a frame with them. Groups that were taken from the stretch get them
+    They take the place of those that the same frames had; other frames of the stretches that these are of
+    keep theirs. Groups that were taken from the stretch get them
     as given cameras, where nobody has given them another one and no lines say otherwise.
 
     Args:
@@ -221,12 +229,13 @@ def track_now(
     sha256 = recording.require_readable()
     policy = get_dataset_head(store, recording.dataset_id).policy.calibration
     lines: dict[int, Lines] = {}
-    for number, stored, key in _views_of(store, recording, first, last, with_lines=True):
+    with store.read() as session:
+        drawn = _views_of(session, recording, first, last, with_lines=True)
+        pitch = edited_pitches(session, recording.dataset_id, [recording.name])
+    for number, stored, key in drawn:
         station = stored.stations[key].station
         if not (station.flipped or station.picture):
             lines.setdefault(number, station.lines)
-    with store.read() as session:
-        pitch = edited_pitches(session, recording.dataset_id, [recording.name])
     known = (store.settings, sha256, first, last, lines, pitch.get(recording.name), policy)
     tracked: Tracked = in_worker(
         recording.path, track_stretch, *known, progress=progress, stop=stop, limits=LIMITS
@@ -270,19 +279,18 @@ def save_cameras(
 ) -> tuple[ShotCameras, int]:
     """Keep what was found of a stretch (first and last frame): ``track_now`` without the tracking."""
     first, last = stretch
-    content = frames_to_bytes(tracked.frames)
-    digest = digest_of(content)
-    try:
-        store.settings.recordings.mkdir(mode=0o700, parents=True, exist_ok=True)
-        replace_file(camera_place(store.settings, digest), content)
-    except OSError as error:
-        raise StorageError(
-            f"the cameras of {recording.name} cannot be kept ({error.strerror})",
-            hint="Free some space, and track the shot again.",
-        ) from error
-    views = _views_of(store, recording, first, last)
-    tracked_before = cameras_at(store, recording, {number for number, _, _ in views})
-    summary = _summary(tracked, annotated)
+    made = _keep(store.settings, recording, tracked, annotated)
+    rests = [
+        (rest, _keep(store.settings, recording, rest, one.summary.annotated))
+        for one in list_cameras(store, recording.id)
+        for rest in _outside(store.settings, one, first, last)
+    ]
+    tracked_before = cameras_at(store, recording, range(first, last + 1))
+    common = {
+        "dataset_id": recording.dataset_id,
+        "recording_id": recording.id,
+        "sha256": recording.sha256,
+    }
     with store.write() as session:
         row = need_recording(session, recording.id)
         if row.sha256 != recording.sha256:
@@ -294,18 +302,20 @@ def save_cameras(
         same = next((old for old in replaced if (old.first, old.last) == stretch), None)
         insert_cameras(
             session,
-            dataset_id=recording.dataset_id,
-            recording_id=recording.id,
-            first=first,
-            last=last,
-            sha256=recording.sha256,
-            digest=digest,
-            summary=canonical(vars(summary)),
+            **common,
+            **made,
             before=same and same.digest,
             before_summary=same and same.summary,
             revision=1 + max((old.revision for old in replaced), default=0),
             actor=actor,
         )
+        for old in replaced:
+            for rest, values in rests:
+                if old.first <= rest.frames[0].number <= old.last:
+                    insert_cameras(
+                        session, **common, **values, revision=old.revision, actor=old.actor
+                    )
+        views = _views_of(session, recording, first, last)
         changed = _give(session, recording, tracked.frames, views, tracked_before, actor)
         add_audit_event(
             session,
@@ -323,6 +333,54 @@ def save_cameras(
             with suppress(OSError):
                 camera_place(store.settings, name).unlink(missing_ok=True)
     return get_cameras(store, recording.id, first), changed
+
+
+def _keep(
+    settings: Settings, recording: Recording, tracked: Tracked, annotated: Sequence[int]
+) -> dict[str, Any]:
+    """Write the file of some cameras; returns what their row says of them."""
+    content = frames_to_bytes(tracked.frames)
+    digest = digest_of(content)
+    try:
+        settings.recordings.mkdir(mode=0o700, parents=True, exist_ok=True)
+        replace_file(camera_place(settings, digest), content)
+    except OSError as error:
+        raise StorageError(
+            f"the cameras of {recording.name} cannot be kept ({error.strerror})",
+            hint="Free some space, and track the shot again.",
+        ) from error
+    numbers = [frame.number for frame in tracked.frames]
+    inside = tuple(number for number in annotated if numbers[0] <= number <= numbers[-1])
+    summary = _summary(tracked, inside)
+    return {
+        "first": numbers[0],
+        "last": numbers[-1],
+        "digest": digest,
+        "summary": canonical(vars(summary)),
+    }
+
+
+def _outside(settings: Settings, old: ShotCameras, first: int, last: int) -> list[Tracked]:
+    """The parts of cameras before and behind a stretch that overlaps them; those of another video, or
+    that cannot be read, are none."""
+    if old.last < first or last < old.first or old.stale:
+        return []
+    try:
+        frames = read_cameras(settings, old.digest)
+    except ConflictError:
+        return []
+    parts = (
+        [frame for frame in frames if frame.number < first],
+        [frame for frame in frames if frame.number > last],
+    )
+    return [
+        Tracked(
+            part,
+            tuple(one for one in old.summary.unusable if part[0].number <= one <= part[-1].number),
+        )
+        for part in parts
+        if part
+    ]
 
 
 def _summary(tracked: Tracked, annotated: Sequence[int]) -> CameraSummary:
@@ -357,18 +415,15 @@ def _of_row(row: Any, sha256: str | None, drawn: Sequence[int]) -> ShotCameras:
 
 
 def _views_of(
-    store: Store, recording: Recording, first: int, last: int, *, with_lines: bool = False
+    session: Session, recording: Recording, first: int, last: int, *, with_lines: bool = False
 ) -> list[tuple[int, StoredGroup, str]]:
     """The views that show a frame of a stretch, with its number, their group and their key."""
-    sha256 = recording.require_readable()
-    with store.read() as session:
-        shown = views_of_video(session, recording.dataset_id, sha256)
+    shown = views_of_video(session, recording.dataset_id, recording.require_readable())
     wanted = [one for one in shown if first <= one.number <= last]
     wanted = [one for one in wanted if one.has_lines or not with_lines]
     ids, groups = sorted({one.group for one in wanted}), dict[int, StoredGroup]()
     for start in range(0, len(ids), _BATCH):
-        with store.read() as session:
-            groups |= read_groups(session, ids[start : start + _BATCH])
+        groups |= read_groups(session, ids[start : start + _BATCH])
     return [(one.number, groups[one.group], one.key) for one in wanted if one.group in groups]
 
 

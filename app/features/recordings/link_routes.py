@@ -17,8 +17,9 @@ from app.features.recordings.link_schemas import (
     LiveSuggestions,
     NewLink,
 )
-from app.features.recordings.link_values import ShotLink
+from app.features.recordings.link_values import ShotLink, links_csv
 from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
+from app.features.recordings.routes import CSV_FILE
 from app.finite import MAX_ID
 from app.http.conflicts import current_state
 from app.http.cursor import paged
@@ -55,6 +56,23 @@ def get_links(recording: Id, store: AppStore) -> LinkList:
     return LinkList(
         items=[LinkDocument.model_validate(one) for one in list_links(store, recording)]
     )
+
+
+@router.get(
+    "/links.csv",
+    operation_id="getLinksFile",
+    response_class=Response,
+    responses={
+        **responses(404),
+        200: {"content": {CSV_FILE: {}}, "description": "A row for each link, or piece of one."},
+    },
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+def get_links_file(recording: Id, store: AppStore) -> Response:
+    """The same as CSV: a row for each, or for each piece of one whose speed changes."""
+    headers = {"Content-Disposition": 'attachment; filename="touchline-links.csv"'}
+    text = links_csv(list_links(store, recording))
+    return Response(text, headers=headers, media_type=CSV_FILE)
 
 
 @router.post(

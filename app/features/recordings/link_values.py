@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from app.canonical import digest_of
 from app.db.json_columns import parse
+from app.formats.csv_text import csv_line
 from app.geometry.arrays import FloatArray
 from app.soccer.choices import LinkOutcome, LinkSource
 from app.tracking.time_map import TimeMap
@@ -149,6 +151,27 @@ class ShotLink:
     actor: str
     created: str
     etag: str
+
+
+def links_csv(found: Iterable[ShotLink]) -> str:
+    """Links as CSV: a row for each, or for each piece of one whose speed changes."""
+    columns = (
+        *("link", "live", "live_first", "live_last", "replay", "replay_first", "replay_last"),
+        *("outcome", "found_by", "first", "last", "offset_s", "speed", "offset_sigma_s"),
+        *("speed_sigma", "instants"),
+    )
+    lines = [csv_line(columns)]
+    for one in found:
+        live, replay, how = one.live, one.replay, one.map
+        head = (one.id, live.name, live.first, live.last, replay.name, replay.first, replay.last)
+        pieces: list[tuple[int | float | None, ...]] = [
+            (piece.first, piece.last, piece.offset_s, piece.speed, None, piece.speed_sigma)
+            for piece in how.pieces
+        ]
+        whole = (replay.first, replay.last, how.offset_s, how.speed)
+        for piece in pieces or [(*whole, how.offset_sigma_s, how.speed_sigma)]:
+            lines.append(csv_line((*head, how.outcome, how.found_by, *piece, len(one.instants))))
+    return "".join(lines)
 
 
 def described(

@@ -12,7 +12,7 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from app.canonical import canonical, digest_of
-from app.db.json_columns import Json, as_written
+from app.db.json_columns import Json, as_written, parse
 from app.features.groups.codecs import camera_from_json, camera_to_json
 from app.features.tracks.stretches import Stretch
 from app.geometry.arrays import FloatArray, IntArray
@@ -105,6 +105,21 @@ def corrected(track: BallTrack, corrections: Sequence[Correction]) -> BallTrack:
             time = float(track.times[row])
             events.append(BallEvent(item.frame, time, item.kind, track.position[row], 0.0))
     return replace(track, events=tuple(sorted(events, key=lambda event: event.time_s)))
+
+
+def frozen_track(inputs: TrackInputs, track: BallTrack) -> Json:
+    """A track with all that it was computed from, as versions keep it.
+
+    Args:
+        inputs: With corrections.
+        track: The same with its corrections.
+    """
+    return {"inputs": inputs_to_json(inputs), "track": track_to_json(track)}
+
+
+def track_again(frozen: Mapping[str, Any]) -> Json:
+    """The track of a frozen one's inputs, computed anew, as ``track_to_json`` has it."""
+    return parse(canonical(track_to_json(make_track(inputs_from_json(frozen["inputs"])))))
 
 
 def inputs_to_json(inputs: TrackInputs) -> Json:

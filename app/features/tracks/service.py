@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -24,6 +24,7 @@ from app.features.tracks.codec import (
     corrected,
     corrections_from_json,
     corrections_to_json,
+    frozen_track,
     inputs_digest,
     inputs_from_json,
     inputs_to_json,
@@ -300,8 +301,28 @@ def make_tracks(
     return made
 
 
+def accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
+    """The tracks of a dataset that people accepted as its groups are now, by stretch, each with all that it
+    was computed from (``codec.frozen_track``)."""
+    rows = [row for row in list_rows(session, dataset.id) if row.verdict == "accepted"]
+    groups = match_groups(session, dataset.id, {row.match for row in rows}) if rows else {}
+    found = {}
+    for row in rows:
+        track = _track(row, dataset.policy, groups.get(row.match, ()))
+        if track.stale:
+            continue
+        inputs, body = (unpack(part) for part in read_bodies(session, [row.id])[row.id])
+        whole = replace(inputs_from_json(inputs), corrections=track.corrections)
+        found[row.key] = frozen_track(whole, corrected(track_from_json(body), track.corrections))
+    return found
+
+
 def track_source(
-    session: Session, dataset_id: int, dataset: str, policy: Policy, *, live: bool
+    session: Session,
+    dataset_id: int,
+    dataset: str,
+    policy: Policy,
+    frozen: Mapping[str, Json] | None = None,
 ) -> TrackSource:
     """What makes the tracks of an export.
 
@@ -310,9 +331,14 @@ def track_source(
         dataset_id: Of the dataset.
         dataset: Its name.
         policy: Says how noisy clicks and cameras are.
-        live: Whether it is the dataset as it is, and not a frozen version.
+        frozen: The tracks of a frozen version by stretch (``codec.frozen_track``); None: the dataset
+            is exported as it is.
     """
-    rows = list_rows(session, dataset_id) if live else ()
+    shots = recording_shots(session, dataset_id)
+    if frozen is not None:
+        tracks = {key: track_from_json(value["track"]) for key, value in frozen.items()}
+        return TrackSource(dataset, policy, shots, frozen=tracks)
+    rows = list_rows(session, dataset_id)
     bodies = read_bodies(session, [row.id for row in rows if row.verdict == "accepted"])
     known = {}
     for row in rows:
@@ -320,7 +346,7 @@ def track_source(
         body = bodies.get(row.id)
         track = body and corrected(track_from_json(unpack(body[1])), corrections)
         known[row.key] = KnownTrack(row.digest, track or None, row.verdict, corrections)
-    return TrackSource(dataset, policy, recording_shots(session, dataset_id), known)
+    return TrackSource(dataset, policy, shots, known)
 
 
 def _records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:

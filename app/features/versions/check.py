@@ -100,13 +100,17 @@ def _wrong(session: Session, row: Any) -> str | None:
             counts, policy = parse(row.counts), policy_from_json(parse(row.policy))
             members = sum(item["member"] for item in rows)
             left_out = sum(counts["left_out"].values())
-            found = version_hash(policy, row.solver_version, rows)
+            tracks = parse(row.tracks) if row.tracks else {}
+            found = version_hash(policy, row.solver_version, rows, tracks)
     except StorageError:
         return "it cannot be read"
     if (members, len(rows) - members) != (counts["groups"], left_out):
         return f"{len(rows):,} groups of {counts['groups'] + left_out:,} are there"
     if found != row.hash or policy.hash != row.policy_hash:
         return "its hash does not follow from its groups"
+    lost = set(tracks.values()) - known_frozen(session, row.dataset_id, tracks.values())
+    if lost:
+        return f"{len(lost):,} of its tracks are missing"
     without = members_without_content(session, row.id)
     return f"frozen content is missing, of {without[0]} first" if without else None
 

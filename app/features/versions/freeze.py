@@ -27,9 +27,11 @@ from app.features.solutions.queries import (
     present_bodies,
     read_calibration_bodies,
 )
+from app.features.tracks.service import accepted_tracks
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     SOLUTION,
+    TRACK,
     body_of,
     frames_of,
     freeze_annotations,
@@ -172,6 +174,7 @@ def freeze(
         _require_some(found, candidates, request.groups)
         run = _Run(store, session, found, request, candidates, progress)
         rows = run.rows()
+        run.freeze_tracks()
     values = run.values(rows, actor)
     with store.write() as session:
         _require_free(session, found, request.name)
@@ -197,6 +200,7 @@ class _Run:
         self._views: dict[str, int] = {}
         self._balls: dict[str, int] = {}
         self._cameras: set[str] = set()
+        self._tracks: dict[str, str] = {}
 
     def rows(self) -> list[dict[str, Any]]:
         """The rows of all groups, in their order; content is frozen on the way."""
@@ -213,6 +217,14 @@ class _Run:
         self._require_cameras()
         return rows
 
+    def freeze_tracks(self) -> None:
+        """Freeze the tracks that people accepted and whose groups have not changed since, each with all
+        that it was computed from."""
+        found = accepted_tracks(self._session, self._dataset)
+        texts = {stretch: canonical(value) for stretch, value in found.items()}
+        self._tracks = {key: TRACK + digest_of(text.encode()) for key, text in texts.items()}
+        self._freeze_new({self._tracks[key]: text for key, text in texts.items()}, {}, set())
+
     def values(self, rows: Sequence[Mapping[str, Any]], actor: str) -> dict[str, Any]:
         """Columns of the version itself."""
         request, dataset = self._request, self._dataset
@@ -222,7 +234,8 @@ class _Run:
             "licence": request.licence.strip() or licence_text(self._matches(rows)),
             "created": now(),
             "actor": actor,
-            "hash": version_hash(dataset.policy, SOLVER_VERSION, rows),
+            "hash": version_hash(dataset.policy, SOLVER_VERSION, rows, self._tracks),
+            "tracks": canonical(self._tracks) if self._tracks else None,
             "groups": request.groups,
             "policy": canonical(policy_to_json(dataset.policy)),
             "policy_hash": dataset.policy.hash,
@@ -333,6 +346,7 @@ class _Run:
             "overrides": sum(bool(item.overrides) for item in self._candidates),
             "splits": splits,
             "left_out": _reasons(self._candidates),
+            **({"tracks": len(self._tracks)} if self._tracks else {}),
         }
 
 

@@ -31,7 +31,7 @@ from app.soccer.paint_evidence import reading_from_json
 from app.soccer.pitch import Pitch
 
 SAID, STATION, SOLUTION, CALIBRATION = "said:", "station:", "solution:", "calibration:"
-PAINT = "paint:"
+PAINT, TRACK = "paint:", "track:"
 
 _FROZEN = cast(Table, FrozenModel.__table__)
 Frames = Mapping[str, Mapping[str, Any]]

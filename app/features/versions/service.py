@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
@@ -57,6 +57,7 @@ class Version:
         groups: Which groups entered: ``accepted`` or ``passing``.
         counts: Groups, views and balls; the same by split; why groups are not in it.
         previous: Id of the version frozen before, or None.
+        tracks: Keys of the frozen tracks of the ball, by stretch.
     """
 
     id: int
@@ -75,6 +76,7 @@ class Version:
     split: Split
     counts: Mapping[str, Any]
     previous: int | None
+    tracks: Mapping[str, str] = field(default_factory=dict)
     verified: Verification | None = None
     """What came of verifying it the last time; None: nobody has."""
 
@@ -273,6 +275,7 @@ def _version(row: Any) -> Version:
             "policy": policy_from_json(parse(row.policy)),
             "split": Split.of(parse(row.split)),
             "counts": parse(row.counts),
+            "tracks": parse(row.tracks) if row.tracks else {},
         }
     )
 
@@ -281,16 +284,22 @@ HASH_FORMAT = 1
 """Of what the hash covers; part of it."""
 
 
-def version_hash(policy: Policy, solver_version: str, rows: Iterable[Mapping[str, Any]]) -> str:
+def version_hash(
+    policy: Policy,
+    solver_version: str,
+    rows: Iterable[Mapping[str, Any]],
+    tracks: Mapping[str, str] | None = None,
+) -> str:
     """The hash of a version: SHA-256 over what it says, in an order that the keys give.
 
-    Covers annotations, verdicts, splits, every value of the policy but its name, and the solver
-    version; not media, ids, times, people or machines.
+    Covers annotations, verdicts, splits, tracks, every value of the policy but its name, and the
+    solver version; not media, ids, times, people or machines.
 
     Args:
         policy: What judges the dataset.
         solver_version: What computed it.
         rows: In order of ``position``, as the table has them.
+        tracks: Keys of frozen tracks by stretch; a version without any has the hash that it always had.
     """
     values = digested_values(policy)
     digest = hashlib.sha256()
@@ -301,6 +310,8 @@ def version_hash(policy: Policy, solver_version: str, rows: Iterable[Mapping[str
             splits = None if row["splits"] is None else json.loads(row["splits"])
             side = [row["split"], splits] if row["member"] else None
             _add(digest, [row["key"], row["said"], side, verdict])
+    if tracks:
+        _add(digest, ["tracks", dict(tracks)])
     return digest.hexdigest()
 
 

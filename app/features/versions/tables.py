@@ -15,6 +15,8 @@ from app.db.base import Base
 class VersionModel(Base):
     """A frozen version; ``policy``, ``split`` and ``counts`` are canonical JSON.
 
+    ``tracks`` (the same) has the keys of frozen tracks by their stretches; None: it has no tracks.
+
     ``hash`` covers annotations, verdicts, splits, policy and solver version, and nothing else:
     the same on every machine. ``previous`` is the id of the version frozen before.
     """
@@ -38,6 +40,7 @@ class VersionModel(Base):
     split: Mapped[str]
     counts: Mapped[str]
     previous: Mapped[int | None]
+    tracks: Mapped[str | None]
 
 
 class VersionGroupModel(Base):
@@ -95,7 +98,7 @@ class VersionCheckModel(Base):
 class FrozenModel(Base):
     """Content under a key that follows from it; versions of one dataset share it.
 
-    ``said:``, ``station:`` and ``solution:`` with the digest of the content, ``calibration:``
+    ``said:``, ``station:``, ``track:`` and ``solution:`` with the digest of the content, ``calibration:``
     with the key that the solver gives it. The body of a calibration, most of what there is, stays
     NULL while the calibration is where the solver keeps it; a trigger saves it from deletion.
     """

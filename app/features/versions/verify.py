@@ -10,11 +10,13 @@ from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
+from app.canonical import canonical, digest_of
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
 from app.features.solutions.queries import decode_calibration, encode_calibration, encode_solution
+from app.features.tracks.codec import track_again
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     fitting_key,
@@ -104,6 +106,8 @@ class VerifyReport:
                 f"; the version was computed by solver {self.solver_version}, "
                 f"this is solver {self.solver_version_now}"
             )
+        if self.equal == self.groups:
+            return f"{plural(self.different, 'value')} of the version itself came out differently{why}."
         return f"{self.groups - self.equal:,} of {plural(self.groups, 'group')} came out differently{why}."
 
     def add(self, found: Sequence[VersionDifference]) -> None:
@@ -152,6 +156,7 @@ def verify(
             version.name, version.hash, int(version.counts["groups"]), version.solver_version
         )
         report.add(list(_version_differences(session, version)))
+        frozen_tracks = read_frozen(session, version.dataset_id, version.tracks.values())
         matches = version_matches(session, version.id)
     done = 0
     for results in fan_out(verify_task, _Tasks(store, version, matches), executor):
@@ -159,6 +164,10 @@ def verify(
             report.add(found)
             report.equal += not found
         done += len(results)
+        if progress is not None:
+            progress(done, report.groups)
+    for stretch, key in version.tracks.items():
+        report.add(list(_track_differences(stretch, key, frozen_tracks.get(key))))
         if progress is not None:
             progress(done, report.groups)
     return report
@@ -209,9 +218,30 @@ def _version_differences(session: Session, version: Version) -> Iterator[Version
     rows = (
         {name: getattr(row, name) for name in names} for row in annotation_rows(session, version.id)
     )
-    found = version_hash(version.policy, version.solver_version, rows)
+    found = version_hash(version.policy, version.solver_version, rows, version.tracks)
     if found != version.hash:
         yield VersionDifference(None, "hash", version.hash, found)
+
+
+def _track_differences(stretch: str, key: str, body: bytes | None) -> Iterator[VersionDifference]:
+    """What of a track is not as it was frozen, when it is computed anew from its frozen inputs."""
+    place = f"track {stretch}"
+    if body is None:
+        yield VersionDifference(None, place, key, None)
+    elif fitting_key(key, body) != key:
+        yield VersionDifference(None, place, key, fitting_key(key, body))
+    else:
+        value = json_of(body)
+        now = track_again(value)
+        for name, frozen in value["track"].items():
+            if canonical(now[name]) != canonical(frozen):
+                yield VersionDifference(None, f"{place}.{name}", _brief(frozen), _brief(now[name]))
+
+
+def _brief(value: Json) -> Json:
+    """A value for a report: long lists are told by their length and digest."""
+    text = canonical(value)
+    return value if len(text) < 200 else f"{len(text):,} characters, {digest_of(text.encode())}"
 
 
 class _Tasks:

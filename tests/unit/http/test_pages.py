@@ -19,7 +19,7 @@ class TestPages:
     @pytest.mark.parametrize("path", PAGES)
     def test_every_page_is_the_same_document(self, pages_client, static_folder, path: str) -> None:
         named = {"group": 12, "other": 30, "dataset": "sample", "tab": "legend", "recording": 1}
-        named["link"] = 1
+        named |= {"link": 1, "track": 1}
         answer = pages_client.get(path.format(**named))
         assert answer.status_code == 200
         assert answer.headers["content-type"] == "text/html; charset=utf-8"

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
+import time
 import zipfile
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+
+from app.features.imports import routes
+from app.features.imports.upload_parts import PartWriter
 
 API = "/api/v1/uploads"
 BYTES = {"Content-Type": "application/octet-stream"}
@@ -137,6 +141,35 @@ class TestSendPart:
         assert last.json()["bytes"] == 10000
         folder = app.state.services.settings.uploads / last.json()["id"]
         assert (folder / "content" / "final.mp4").read_bytes() == self.FILM
+
+    def test_a_server_that_stops_while_a_part_is_written_writes_it_once(
+        self, app, api, monkeypatch
+    ) -> None:
+        place = self.begin(api).headers["location"]
+        services, write = app.state.services, PartWriter.write
+
+        def stopped(writer: PartWriter, chunk: bytes) -> None:
+            services.stopping.set()
+            # The request is given up while this thread goes on.
+            time.sleep(3 * routes.LOOK_SECONDS)
+            write(writer, chunk)
+
+        monkeypatch.setattr(routes, "PART_CHUNK", 1000)
+        monkeypatch.setattr(PartWriter, "write", stopped)
+        try:
+            answer = self.part(api, place, 0, self.FILM[:4000])
+        finally:
+            services.stopping.clear()
+        assert answer.status_code == 503
+        monkeypatch.undo()
+        there = api.get(place).json()
+        content = services.settings.uploads / there["id"] / "content" / "final.mp4"
+        assert (there["bytes"], content.read_bytes()) == (4000, self.FILM[:4000])
+
+    def test_what_nothing_tells_from_another_file_is_refused(self, api) -> None:
+        params = {"name": "final.mp4", "size": 10}
+        answer = api.post(API, params=params, headers=BYTES)
+        assert (answer.status_code, answer.json()["pointer"]) == (400, "/mark")
 
     def test_nothing_is_made_of_what_is_not_whole(self, api) -> None:
         upload = self.begin(api).json()["id"]

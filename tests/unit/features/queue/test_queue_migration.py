@@ -32,6 +32,7 @@ def as_before(store: Store) -> None:
     with store.write() as session:
         for trigger in ("group_new", "group_change", "group_solved"):
             session.execute(text(f"DROP TRIGGER {trigger}_is_marked"))
+        session.execute(text("ALTER TABLE version DROP COLUMN tracks"))
         session.execute(text("DROP TABLE track"))
         session.execute(text("DROP TABLE shot_cameras"))
         session.execute(text("DROP TABLE shot_link"))

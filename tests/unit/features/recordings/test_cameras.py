@@ -329,8 +329,9 @@ def test_cameras_take_the_place_of_those_that_share_a_frame_and_leave_no_file(
     track(api, recording, finished, 9, 11)
     assert stretches() == [(4, 8), (9, 11)] and files() == 3
     track(api, recording, finished, 6, 9)
-    assert stretches() == [(6, 9)] and files() == 1
-    assert sorted(cameras_at(store, found, [4, 6, 9])) == [6, 9]
+    # Frames beside it keep their cameras.
+    assert stretches() == [(4, 5), (6, 9), (10, 11)] and files() == 3
+    assert sorted(cameras_at(store, found, [4, 6, 9, 11])) == [4, 6, 9, 11]
     with store.read() as session:
         assert not [name for name in unused_frames(session, store.settings) if "cameras" in name]
     assert api.delete(recording).status_code == 204

@@ -49,6 +49,17 @@ class TestAddLink:
             (event,) = [e for e in read_log(session) if e.body.get("did") == "replay linked"]
         assert (event.actor, event.body["replay_first"]) == ("local", 20)
 
+    def test_links_are_a_table_too(self, api: Any, link: str) -> None:
+        at = link.rpartition("/")[0]
+        instants(api, link, (2, 25), (12, 45))
+        columns, row = api.get(f"{at}.csv").text.splitlines()
+        found = dict(zip(columns.split(","), row.split(","), strict=True))
+        shown = api.get(link).json()["map"]
+        assert (found["live"], found["replay"], found["instants"]) == ("final", "final", "2")
+        assert (found["replay_first"], found["outcome"], found["first"]) == ("20", "linked", "20")
+        assert float(found["speed"]) == shown["speed"] == pytest.approx(0.5)
+        assert float(found["offset_s"]) == shown["offset_s"]
+
     @pytest.mark.parametrize(
         ("live", "replay", "pointer"),
         [

@@ -1,0 +1,125 @@
+"""Tracks of the ball in the browser: made, looked at by key, corrected and judged."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.formats.issia_writer import write_issia
+from tests.e2e.service import delete_dataset
+from tests.e2e.test_access import (
+    BEYOND_ITS_FRAME,
+    NESTED_SCROLLERS,
+    SIZES,
+    resize,
+    serious_in_both,
+    soon,
+)
+from tests.e2e.test_pages import TOO_WIDE
+from tests.flights import FIRST, KICK, flight_groups
+
+OpenPage = Callable[..., Page]
+COUNT = 70
+
+
+def ended(client: httpx.Client, answer: httpx.Response) -> dict[str, Any]:
+    """The job that an answer started, once it is over."""
+    job: dict[str, Any] = answer.json()
+    while job["state"] not in ("done", "failed"):
+        job = client.get(f"/jobs/{job['id']}").json()
+    assert job["state"] == "done", job
+    return job
+
+
+@pytest.fixture
+def flight(server: str, tmp_path: Path) -> Iterator[str]:
+    """A dataset of a ball in flight, solved; ask before the page."""
+    (tmp_path / "flight").mkdir()
+    groups = [replace(group, match="issia") for group in flight_groups(COUNT)]
+    write_issia(tmp_path / "flight", groups)
+    packed = Path(shutil.make_archive(str(tmp_path / "flight"), "zip", tmp_path / "flight"))
+    with httpx.Client(base_url=f"{server}/api/v1") as client:
+        kind = {"Content-Type": "application/octet-stream"}
+        address = "/uploads?name=flight.zip"
+        sent = client.post(address, content=packed.read_bytes(), headers=kind).json()
+        options = {"options": {"size": [1280, 720]}}
+        body = {"dataset": "flight", "format": "issia", "source": {"upload": sent["id"]}, **options}
+        ended(client, client.post("/imports", json=body))
+        ended(client, client.post("/datasets/flight/solve"))
+    yield "flight"
+    delete_dataset(server, "flight")
+
+
+def shows(page: Page, frame: int) -> None:
+    """Wait until a frame is the one at hand."""
+    page.wait_for_selector(f'.track__rail [data-frame="{frame}"]')
+
+
+@pytest.fixture
+def track(flight: str, open_page: OpenPage) -> Page:
+    """The page of its track, which was made in the browser."""
+    page = open_page(f"/datasets/{flight}/tracks")
+    page.get_by_role("button", name="Track the ball").click()
+    page.get_by_role("link", name="issia", exact=True).click()
+    page.wait_for_selector(".track__band")
+    return page
+
+
+class TestTracks:
+    def test_are_looked_at_corrected_and_judged_by_key(self, track: Page) -> None:
+        page = track
+        expect(page.get_by_text("not judged")).to_be_visible()
+        page.keyboard.press("w")
+        worst = page.locator(".track__rail [data-frame]").get_attribute("data-frame")
+        page.keyboard.press("Shift+ArrowLeft")
+        before_it = max(int(worst or 0) - 25, FIRST)
+        shows(page, before_it)
+        page.keyboard.press("ArrowRight")
+        shows(page, before_it + 1)
+
+        events = page.get_by_role("list", name="List of events").get_by_role("button")
+        kick = events.filter(has_text="kick").first
+        kick.click()
+        frame = int(kick.inner_text().split()[0])
+        assert abs(frame - FIRST - KICK) <= 2
+        before = events.count()
+        page.keyboard.press("d")
+        expect(events).to_have_count(before - 1)
+        page.keyboard.press("k")
+        expect(events).to_have_count(before)
+
+        page.keyboard.press("a")
+        accept = page.get_by_role("button", name="Accept")
+        expect(accept).to_have_attribute("aria-pressed", "true")
+        page.reload()
+        expect(accept).to_have_attribute("aria-pressed", "true")
+        page.keyboard.press("x")
+        expect(page.get_by_role("button", name="Reject")).to_have_attribute("aria-pressed", "true")
+        page.keyboard.press("u")
+        expect(page.get_by_text("not judged")).to_be_visible()
+
+    def test_a_frame_leads_to_its_group(self, track: Page) -> None:
+        track.keyboard.press("ArrowRight")
+        frame = track.locator(".track__rail [data-frame]").get_attribute("data-frame")
+        track.keyboard.press("Enter")
+        track.wait_for_url("**/review/*")
+        expect(track.get_by_role("banner")).to_contain_text(str(frame))
+
+    def test_its_pages_are_accessible_in_every_size(self, track: Page) -> None:
+        for selector in (".track__band", ".table"):
+            if selector == ".table":
+                track.goto("/datasets/flight/tracks")
+            track.wait_for_selector(selector)
+            found: dict[str, list[str]] = {"axe": serious_in_both(track)}
+            for width, height in SIZES:
+                resize(track, width, height)
+                for faults in (TOO_WIDE, BEYOND_ITS_FRAME, NESTED_SCROLLERS):
+                    found.setdefault(f"{width}", []).extend(soon(track, faults))
+            assert not any(found.values()), found

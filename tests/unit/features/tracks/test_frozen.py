@@ -1,0 +1,122 @@
+"""Tracks in frozen versions: kept with what they were computed from, verified, exported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+from app.canonical import canonical
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import InputError
+from app.features.exports.service import export
+from app.features.tracks.codec import Correction
+from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
+from app.features.versions.check import examine_versions
+from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.frozen_queries import body_of, json_of, read_frozen
+from app.features.versions.service import Version
+from app.features.versions.verify import verify
+from tests.databases import said_for_sqlite
+from tests.flights import FIRST
+from tests.unit.features.tracks.test_service import move
+
+
+@pytest.fixture
+def accepted(store: Store, flight: list[int]) -> list[int]:
+    """The flight with a track that a person corrected and accepted."""
+    make_tracks(store, "demo", None, "ann", lambda *_: None)
+    said = TrackChange(corrections=(Correction(FIRST + 40, "out", True),))
+    for change in (said, TrackChange("accepted")):
+        (track,) = list_tracks(store, "demo")
+        change_track(store, track.id, change, track.etag, actor="ben")
+    return flight
+
+
+def frozen(store: Store, name: str = "v1") -> Version:
+    return freeze(store, "demo", FreezeRequest(name, groups="passing"), actor="ann")
+
+
+def unseal(session: Session) -> None:
+    """Let frozen content be changed, as damage would."""
+    for what in ("update", "delete"):
+        session.execute(text(f"DROP TRIGGER frozen_refuses_{what}"))
+
+
+class TestFreeze:
+    def test_accepted_tracks_are_in_it_and_in_its_hash(self, store, accepted) -> None:
+        version = frozen(store)
+        assert [*version.tracks] == ["rig"]
+        assert version.counts["tracks"] == 1
+        (track,) = list_tracks(store, "demo")
+        change_track(store, track.id, TrackChange("none"), track.etag, actor="ben")
+        without = frozen(store, "v2")
+        assert (without.tracks, "tracks" in without.counts) == ({}, False)
+        assert without.hash != version.hash
+
+    def test_a_track_whose_groups_have_changed_is_not(self, store, accepted) -> None:
+        move(store, accepted[4], 2.0)
+        assert frozen(store).tracks == {}
+
+
+class TestVerify:
+    def test_a_track_comes_out_bit_for_bit(self, store, accepted) -> None:
+        version = frozen(store)
+        report = verify(store, version.id)
+        assert report.ok, report.values()
+
+    def test_a_number_that_was_changed_is_found(self, store, accepted) -> None:
+        version = frozen(store)
+        key = version.tracks["rig"]
+        with store.write() as session, said_for_sqlite(session):
+            value = json_of(read_frozen(session, version.dataset_id, [key])[key])
+            value["track"]["times"][3] += 1e-12
+            unseal(session)
+            session.execute(
+                text("UPDATE frozen SET body = :body WHERE key = :key"),
+                {"body": body_of(canonical(value)), "key": key},
+            )
+        report = verify(store, version.id)
+        assert (report.ok, report.different) == (False, 1)
+        assert report.differences[0].place == "track rig"
+        assert "1 value of the version itself came out differently" in report.sentence
+
+
+class TestExport:
+    def test_a_version_has_its_track_whatever_happens_later(
+        self, store, accepted, tmp_path: Path
+    ) -> None:
+        frozen(store)
+        for name in ("a", "b"):
+            report = export(store, "demo", "tracks", tmp_path / f"{name}.zip", version="v1")
+            assert report.counts["tracks"] == 1
+            move(store, accepted[7], 4.0)
+        assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+        export(store, "demo", "tracks", tmp_path / "out", version="v1")
+        assert f"\n{FIRST + 40},5.6,out," in (tmp_path / "out/events.csv").read_text()
+
+    def test_an_accepted_track_goes_out_with_its_corrections_and_a_rejected_one_does_not(
+        self, store, accepted, tmp_path: Path
+    ) -> None:
+        export(store, "demo", "tracks", tmp_path / "out")
+        assert f"\n{FIRST + 40},5.6,out," in (tmp_path / "out/events.csv").read_text()
+        (track,) = list_tracks(store, "demo")
+        change_track(store, track.id, TrackChange("rejected"), track.etag, actor="ben")
+        with pytest.raises(InputError, match="rig: its track was rejected"):
+            export(store, "demo", "tracks", tmp_path / "none")
+        assert (
+            export(store, "demo", "tracks", tmp_path / "all", everything=True).counts["tracks"] == 1
+        )
+
+
+class TestCheck:
+    def test_a_version_with_tracks_is_sound_until_one_is_gone(self, store, accepted) -> None:
+        version = frozen(store)
+        assert all(item.ok for item in examine_versions(store))
+        with store.write() as session, said_for_sqlite(session):
+            unseal(session)
+            session.execute(text("DELETE FROM frozen WHERE key LIKE 'track:%'"))
+        (wrong,) = [item for item in examine_versions(store) if not item.ok]
+        assert (version.name in wrong.sentence, "1 of its tracks" in wrong.sentence) == (True, True)
