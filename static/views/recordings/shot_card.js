@@ -63,6 +63,7 @@ export function ShotCard({ one, shots, at, change, remember }) {
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${merge !== ''} title=${merge} onClick=${() => change(mergedWithNext(shots, at), 'Merged with the next shot.')}>Merge <kbd>M</kbd></button>
 			</div>
 			<${FindAgain} one=${one} label="Find all shots again" before=${remember} />
+			<p class="buttons">${/** @type {const} */ (['shots', 'links']).map((what) => html`<a key=${what} class="link" href=${`/api/v1/recordings/${one.id}/${what}.csv`} download>All ${what} as CSV</a>`)}</p>
 		</section>
 	`;
 }
