@@ -13,11 +13,14 @@ from app.sample.scene import Scene
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from app.solving.warm import warm_up
+from app.tracking.ball_solve import track_ball
+from tests.bench.ball_track import frame_times, main
+from tests.bench.link import made_ball
 from tests.scenes import make_scenes
 
 
 def compile_all() -> None:
-    """Solve a group, draw one of its pictures and read it; what was compiled before is loaded.
+    """Solve a group, draw one of its pictures and read it, track a ball; what was compiled is loaded.
 
     Another process solves meanwhile: it is not the half of it, and reading comes to it last.
     """
@@ -36,6 +39,11 @@ def compile_all() -> None:
 def _solve(scene: Scene) -> None:
     warm_up()
     assert solve(scene.group, PAPER).views[0].calibration
+    ball = made_ball(2.0)
+    times = frame_times(ball)
+    assert not track_ball(
+        main(ball, 0), np.arange(len(times)), times, pitch=scene.group.pitch
+    ).reason
 
 
 if __name__ == "__main__":

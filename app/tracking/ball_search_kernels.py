@@ -123,6 +123,14 @@ def _pin(m, P, e, value, variance):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _copy(to_m, to_P, m, P):
+    for i in range(6):
+        to_m[i] = m[i]
+        for j in range(6):
+            to_P[i, j] = P[i, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _forget(P, first, last):
     for i in range(first, last):
         for j in range(6):
@@ -226,15 +234,14 @@ def _bounce(m, P, mode, dt):
 def _see(m, P, first, last, centres, across, along, noise, scale, far, far_sigma):
     """Take the measurements of a knot, in place; their log likelihood and those left out, as bits."""
     total, left = 0.0, 0
-    kept_m, kept_P = m.copy(), P.copy()
+    kept_m, kept_P = np.zeros(6), np.zeros((6, 6))
     for row in range(first, last):
         reach = 0.0
         for i in range(3):
             reach += along[row, i] * (m[i] - centres[row, i])
         reach = min(max(reach, 3.0), 200.0)
         likely = 0.0
-        kept_m[:] = m
-        kept_P[:] = P
+        _copy(kept_m, kept_P, m, P)
         for which in range(2):
             e = across[row, which]
             value = e[0] * centres[row, 0] + e[1] * centres[row, 1] + e[2] * centres[row, 2]
@@ -248,8 +255,7 @@ def _see(m, P, first, last, centres, across, along, noise, scale, far, far_sigma
             square, spread = _pin(m, P, e, value + far[row], far_sigma[row] ** 2)
             likely += max(-square / 2, -4.0) - np.log(np.sqrt(spread) / far_sigma[row])
         if likely < _OUTLIER:
-            m[:] = kept_m
-            P[:] = kept_P
+            _copy(m, P, kept_m, kept_P)
             likely = _OUTLIER
             left |= 1 << (row - first)
         total += likely
@@ -290,6 +296,7 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
     cs, cp = np.zeros(size), np.zeros(size, np.int64)
     cmode, cevent = np.zeros(size, np.int64), np.zeros(size, np.int64)
     csince, cleft = np.zeros(size, np.int64), np.zeros(size, np.int64)
+    order = np.zeros(size, np.int64)
     for k in range(K):
         made = 0
         if k == 0:
@@ -300,7 +307,7 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
                 P[2, 2] = GRASS_SIGMA**2 if mode == ROLL else 4.0**2
                 P[3, 3] = P[4, 4] = 10.0**2
                 P[5, 5] = 0.01 if mode == ROLL else 5.0**2
-                cm[made], cC[made] = m, P
+                _copy(cm[made], cC[made], m, P)
                 cs[made] = -0.7 if mode < 2 else -4.0
                 cmode[made], cevent[made], cp[made], csince[made] = mode, NOTHING, 0, 0
                 made += 1
@@ -310,8 +317,7 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
                 mode = modes[k - 1, h]
                 for way in range(_PER_KNOT):
                     m, P = cm[made], cC[made]
-                    m[:] = M[h]
-                    P[:] = C[h]
+                    _copy(m, P, M[h], C[h])
                     after, event, cost = mode, NOTHING, 0.0
                     if way == 0:
                         _move(m, P, mode, dt)
@@ -333,8 +339,7 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
                         cost = _bounce(m, P, FLIGHT, dt)
                         if cost > -np.inf and m[5] > -1.2:
                             # Too low a hop to be seen as one.
-                            m[:] = M[h]
-                            P[:] = C[h]
+                            _copy(m, P, M[h], C[h])
                             after = ROLL
                             cost = _bounce(m, P, ROLL, dt)
                     if cost == -np.inf:
@@ -361,9 +366,16 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
                 if off > 0:
                     cs[c] -= min(off / 0.2, 8.0) ** 2 / 2
             best = max(best, cs[c])
-        order = np.argsort(-cs[:made])
+        # numba takes seconds to compile a sort of its own.
+        for c in range(made):
+            at = c
+            while at > 0 and cs[order[at - 1]] < cs[c]:
+                order[at] = order[at - 1]
+                at -= 1
+            order[at] = c
         kept = 0
-        for c in order:
+        for rank in range(made):
+            c = order[rank]
             if kept == width or cs[c] < best - _WORST:
                 break
             again = False
@@ -374,8 +386,9 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
                         break
             if again:
                 continue
-            M[kept], C[kept] = cm[c], cC[c]
-            states[k, kept] = cm[c]
+            _copy(M[kept], C[kept], cm[c], cC[c])
+            for i in range(6):
+                states[k, kept, i] = cm[c, i]
             score[kept] = cs[c]
             parent[k, kept], modes[k, kept], events[k, kept] = cp[c], cmode[c], cevent[c]
             lefts[k, kept] = cleft[c]
@@ -389,5 +402,7 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
     found_left, found_state = np.zeros(K, np.int64), np.zeros((K, 6))
     for k in range(K):
         found_mode[k], found_event[k] = modes[k, path[k]], events[k, path[k]]
-        found_left[k], found_state[k] = lefts[k, path[k]], states[k, path[k]]
+        found_left[k] = lefts[k, path[k]]
+        for i in range(6):
+            found_state[k, i] = states[k, path[k], i]
     return found_mode, found_event, found_left, found_state, score[0]

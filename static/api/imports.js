@@ -23,6 +23,7 @@ import { idempotencyKey, queryText, request, upload } from './client.js';
  * @property {{[name: string]: number}} [counts]
  * @property {number} [more_skipped]
  * @property {any[]} [remarks]
+ * @property {number | null} [rig_job] proposes how static cameras fit each other
  * @property {number | null} [paint_job] reads the paint of what is new
  * @property {number | null} [proposals_job] proposes cameras for pictures alone
  */

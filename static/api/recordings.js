@@ -24,7 +24,9 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  * @property {number} groups
  * @property {string | null} problem
  * @property {string} created
+ * @property {MatchClock[]} clocks by frame
  */
+/** @typedef {{frame: number, half: number, seconds: number}} MatchClock   what the clock of the match shows in a frame */
 
 /** @typedef {'main' | 'replay' | 'closeup' | 'other'} ShotKind */
 /** @typedef {'start' | 'cut' | 'dissolve' | 'wipe' | 'fade'} ShotStart */
@@ -44,6 +46,11 @@ export function getRecording(id, signal) {
 /** @param {{dataset: string, source: ImportSource}} body @returns {Promise<JobJson>} */
 export function postRecording(body) {
 	return request('/recordings', { method: 'POST', body, key: idempotencyKey() });
+}
+
+/** @param {number} id @param {{clocks: MatchClock[]}} body @returns {Promise<RecordingJson>} */
+export function patchRecording(id, body) {
+	return request(`/recordings/${id}`, { method: 'PATCH', body, key: idempotencyKey() });
 }
 
 /** @param {number} id */

@@ -1,7 +1,7 @@
 // @ts-check
 /** Shots of a recording as values: what splits, joins and names them. Frames are numbers from 0. */
 
-/** @import {Shot, ShotKind} from '../api/recordings.js' */
+/** @import {MatchClock, Shot, ShotKind} from '../api/recordings.js' */
 
 /** @type {{kind: ShotKind, letter: string, label: string}[]} */
 export const SHOT_KINDS = [
@@ -65,4 +65,25 @@ export function timecode(seconds, fps) {
 export function lengthText(seconds) {
 	if (seconds < 59.95) return `${seconds.toFixed(1)} s`;
 	return `${Math.floor(Math.round(seconds) / 60)}:${String(Math.round(seconds) % 60).padStart(2, '0')}`;
+}
+
+export const HALVES = ['1st half', '2nd half', '1st extra', '2nd extra'];
+
+/** Seconds of what a clock shows: 12:40; null: it is none. @param {string} text */
+export function clockSeconds(text) {
+	const found = /^(\d{1,3}):([0-5]\d)$/.exec(text.trim());
+	return found ? 60 * Number(found[1]) + Number(found[2]) : null;
+}
+
+/** Time of the match in words: 1st half 12:40. @param {number} half from 1 @param {number} seconds */
+export function clockText(half, seconds) {
+	const whole = Math.floor(Math.abs(seconds) + 1e-6);
+	const sign = seconds < -1e-6 && whole ? '−' : '';
+	return `${HALVES[half - 1]} ${sign}${String(Math.floor(whole / 60)).padStart(2, '0')}:${String(whole % 60).padStart(2, '0')}`;
+}
+
+/** Time of the match in a frame, in words, or "" where nobody has read the clock. @param {MatchClock[]} clocks by frame @param {(frame: number) => number} secondsOf @param {number} frame */
+export function matchTime(clocks, secondsOf, frame) {
+	const clock = clocks.findLast((one) => one.frame <= frame) ?? clocks[0];
+	return clock ? clockText(clock.half, clock.seconds + secondsOf(frame) - secondsOf(clock.frame)) : '';
 }

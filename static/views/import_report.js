@@ -68,6 +68,8 @@ export function ImportReport({ report, dry, dataset }) {
 				<p>Cameras are found from the lines first. Then <a href=${pageAddress(dataset, 'statistics')}>the paint of the pictures</a> is read, which places them more exactly.</p>` : null}
 			${report.proposals_job ? html`
 				<p>Now <a href=${pageAddress(dataset, 'statistics')}>cameras are proposed</a> from the paint of the pictures. Open a group to accept its camera, draw its lines and its ball.</p>` : null}
+			${report.rig_job ? html`
+				<p>Given cameras of a rig often contradict each other by some pixels. An adjustment to lines and balls is <a href="/jobs">being proposed</a>; ${html`<code>touchline rig --dataset ${dataset} --accept cameras</code>`} accepts it. Nothing changes before that.</p>` : null}
 			${(report.remarks ?? []).map((remark) => html`<p key=${String(remark)} class="note">${String(remark)}</p>`)}
 			<${Skipped} report=${report} />
 		</section>

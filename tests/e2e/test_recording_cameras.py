@@ -108,7 +108,8 @@ def test_a_shot_is_tracked_and_lines_follow_its_frames(recording: int, open_page
     shows(page, SPOILED[0])
     expect(lines).to_have_count(0)
     card = page.get_by_role("region", name="Cameras", exact=True)
-    expect(card).to_contain_text("Frame 3 is lost")
+    curves = page.get_by_role("region", name="Cameras over time")
+    expect(curves).to_contain_text("Frame 3 is lost")
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     shows(page, 5)
@@ -148,12 +149,13 @@ def test_lines_of_a_frame_mend_the_shot(recording: int, open_page: OpenPage, tri
     expect(card.get_by_role("columnheader", name="before")).to_be_visible(timeout=120_000)
     assert count(page, "lost")[0] == "2" and int(count(page, "lost")[1]) < 2
     expect(card).not_to_contain_text("has lines since")
-    expect(card).to_contain_text("Key frame")
+    curves = page.get_by_role("region", name="Cameras over time")
+    expect(curves).to_contain_text("Key frame")
     page.keyboard.press("b")
     expect(page.get_by_text("These are the cameras before the last run.")).to_be_visible()
-    expect(card).to_contain_text("Frame 3 is lost")
+    expect(curves).to_contain_text("Frame 3 is lost")
     page.keyboard.press("b")
-    expect(card).not_to_contain_text("Frame 3 is lost")
+    expect(curves).not_to_contain_text("Frame 3 is lost")
 
 
 def test_groups_have_the_cameras_of_their_frames(recording: int, open_page: OpenPage) -> None:

@@ -237,6 +237,24 @@ class TestWatching:
         page.keyboard.press("Space")
         expect(page.get_by_role("button", name="Play Space")).to_be_visible()
 
+    def test_the_time_of_the_match_stands_beside_the_timecode(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, recording)
+        page.keyboard.press("Shift+ArrowRight")
+        shows(page, 25)
+        card = page.get_by_role("region", name="Time of the match")
+        card.get_by_label("What the clock shows in this frame").fill("12:40")
+        card.get_by_role("button", name="Set here").click()
+        expect(page.locator("[data-match-time]")).to_have_text("1st half 12:40")
+        page.locator("body").press("Shift+ArrowRight")
+        shows(page, 50)
+        expect(page.locator("[data-match-time]")).to_have_text("1st half 12:41")
+        found = page.request.get(f"/api/v1/recordings/{recording}").json()["clocks"]
+        assert found == [{"frame": 25, "half": 1, "seconds": 760.0}]
+        card.get_by_role("button", name="Remove the clock of frame 25").click()
+        expect(page.locator("[data-match-time]")).to_have_count(0)
+
     def test_the_strip_leads_to_its_shots(self, recording: int, open_page: OpenPage) -> None:
         page = opened(open_page, recording)
         strip = page.get_by_role("region", name="Shots")
@@ -531,6 +549,14 @@ class TestPages:
                 found[f"scrolls twice at {width}"] = soon(page, NESTED_SCROLLERS)
                 found[f"cut off at {width}"] = soon(page, BEYOND_ITS_FRAME)
             assert {name: what for name, what in found.items() if what} == {}, path
+
+    def test_its_shots_are_fetched_as_a_table(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        with page.expect_download() as fetched:
+            page.get_by_role("link", name="All shots as CSV").click()
+        assert fetched.value.suggested_filename == "touchline-shots.csv"
+        rows = fetched.value.path().read_text().splitlines()
+        assert (len(rows), rows[1].split(",")[:4]) == (4, ["cup final", "1", "0", "39"])
 
     def test_their_keys_stand_in_the_help(self, recording: int, open_page: OpenPage) -> None:
         page = opened(open_page, recording)

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { changedAt, everyOf, lengthText, mergedWithNext, shotAt, splitAt, timecode } from '../../static/state/shots.js';
+import { changedAt, clockSeconds, clockText, everyOf, lengthText, matchTime, mergedWithNext, shotAt, splitAt, timecode } from '../../static/state/shots.js';
 
 const shot = (first, last, more = {}) => ({ first, last, kind: 'main', entered_by: 'cut', kept: null, ...more });
 const SHOTS = [shot(0, 9, { entered_by: 'start' }), shot(14, 39, { kind: 'replay', entered_by: 'wipe', kept: true }), shot(40, 59)];
@@ -62,5 +62,16 @@ describe('timecode', () => {
 describe('lengthText', () => {
 	it('says seconds, and minutes of what is longer', () => {
 		assert.deepEqual([0.6, 12.34, 59.9, 59.96, 119.7, 3599].map(lengthText), ['0.6 s', '12.3 s', '59.9 s', '1:00', '2:00', '59:59']);
+	});
+});
+
+describe('matchTime', () => {
+	it('goes on from the last frame whose clock was read', () => {
+		assert.deepEqual(['12:40', ' 97:05 ', '12:60', '1240', '-1:00'].map(clockSeconds), [760, 5825, null, null, null]);
+		assert.deepEqual([clockText(1, 760), clockText(2, 2700.9), clockText(1, -3)], ['1st half 12:40', '2nd half 45:00', '1st half −00:03']);
+		const clocks = [{ frame: 10, half: 1, seconds: 760 }, { frame: 40, half: 2, seconds: 2700 }];
+		const seconds = (/** @type {number} */ frame) => frame / 10;
+		assert.deepEqual([0, 10, 39, 40, 55].map((frame) => matchTime(clocks, seconds, frame)), ['1st half 12:39', '1st half 12:40', '1st half 12:42', '2nd half 45:00', '2nd half 45:01']);
+		assert.equal(matchTime([], seconds, 3), '');
 	});
 });

@@ -28,7 +28,7 @@ PLAIN_WORDS = """
     3d accept access account action actions actors address adjudicate adjust adjustments admission adopt advice
     after ahead anchor annotate app arrays arrival ask attempt axis backup bar bars batches before best binned block
     blocks bodies body boxes browser bulk bundle button buttons cache calibrate candidate canonical canvas caption
-    card cards categories cell changes chart chip choice chooser class cli client clip cluster codec codecs colours
+    card cards categories cell changes chart chip choice chooser class cli client clip clock cluster codec codecs colours
     command comment comments compare comparison completion config confirm connections contact copy copying corner
     counts cross css csv cursor curve cuts damped database datasets day delete deps descriptions details detect
     devices diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor

@@ -179,6 +179,10 @@ def import_(
     if not imported.imported_anything:
         print_error(*imported.nothing_read_error())
         raise typer.Exit(1)
+    if format_ in ("issia", "issia-3d") and not dry_run and not json_:
+        say(
+            f"Given cameras may contradict each other: touchline rig --dataset {dataset} says how far."
+        )
     if format_ == "frames" and propose and not dry_run:
         _propose(dataset, settings, silent=json_)
 

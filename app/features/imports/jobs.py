@@ -11,8 +11,8 @@ from app.config import Settings
 from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
-from app.errors import InputError, TooLargeError
-from app.features.datasets.queries import find_dataset
+from app.errors import ConflictError, InputError, TooLargeError
+from app.features.datasets.queries import find_dataset, has_more_groups
 from app.features.datasets.service import get_dataset_head, require_name
 from app.features.imports.folders import resolve_folder
 from app.features.imports.sources import FORMATS, Source, import_source
@@ -20,6 +20,7 @@ from app.features.imports.upload_queries import get_upload, keep_upload, upload_
 from app.features.jobs.queries import Job
 from app.features.jobs.run import FailedWithReportError, JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
+from app.features.match_estimates.jobs import RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.paint.service import has_pictures
 from app.features.solve.jobs import request_solve
@@ -32,6 +33,8 @@ from app.worker_process import WorkerEnded, WorkerLimits
 
 KIND = "import"
 SHOWN = 500
+RIG_FRAMES = 100
+"""Groups of static cameras beyond which they can tell how they fit each other."""
 """Left-out records that a job's result names; all are counted."""
 LIMITS_HINT = (
     "Import it in parts, or have the operator raise TOUCHLINE_IMPORT_MEMORY or "
@@ -225,7 +228,23 @@ def _following(
         return {"solve_job": solve.id, "proposals_job": proposals.id}
     if found.policy.calibration.source == "paint" and has_pictures(store, found.id):
         paint = PAINT.request(jobs, store, found.id, None, actor=actor).id
-    return {"solve_job": solve.id, "paint_job": paint}
+    rig = None
+    if request.format in ("issia", "issia-3d"):
+        rig = _adjustment(jobs, store, found.id, actor)
+    return {"solve_job": solve.id, "paint_job": paint, "rig_job": rig}
+
+
+def _adjustment(jobs: Jobs, store: Store, dataset_id: int, actor: str) -> int | None:
+    """Id of the job that proposes how the static cameras fit each other; None where few frames, or one
+    camera, can tell nothing of it, and where they were adjusted already."""
+    with store.read() as session:
+        if not has_more_groups(session, dataset_id, RIG_FRAMES):
+            return None
+    try:
+        nothing = {"what": None, "inputs": None}
+        return RIG.request(jobs, store, dataset_id, actor=actor, **nothing).id
+    except (InputError, ConflictError):
+        return None
 
 
 def _step(progress: JobProgress, sentence: str) -> ReportProgress:
@@ -243,9 +262,10 @@ def _result(
     solve_job: int | None = None,
     paint_job: int | None = None,
     proposals_job: int | None = None,
+    rig_job: int | None = None,
 ) -> Json:
-    """The report; with the jobs that solve what is new, read its paint and propose its cameras,
-    where there are any."""
+    """The report; with the jobs that solve what is new, read its paint, propose its cameras, and adjust
+    those that stand still, where there are any."""
     values = outcome.values
     hidden = max(len(values["skipped"]) - SHOWN, 0)
     return {
@@ -255,6 +275,7 @@ def _result(
         "solve_job": solve_job,
         "paint_job": paint_job,
         "proposals_job": proposals_job,
+        "rig_job": rig_job,
         "skipped": values["skipped"][:SHOWN],
         "more_skipped": values["more_skipped"] + hidden,
     }

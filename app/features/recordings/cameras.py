@@ -128,9 +128,10 @@ def list_cameras(store: Store, recording_id: int) -> list[ShotCameras]:
     with store.read() as session:
         recording = need_recording(session, recording_id)
         rows = list_cameras_rows(session, recording_id)
-        views = views_of_video(session, recording.dataset_id, recording.sha256) if rows else []
+        sha256 = recording.sha256
+        views = views_of_video(session, recording.dataset_id, sha256) if rows and sha256 else []
     drawn = sorted({view.number for view in views if view.has_lines})
-    return [_of_row(row, recording.sha256, drawn) for row in rows]
+    return [_of_row(row, sha256, drawn) for row in rows]
 
 
 def get_cameras(store: Store, recording_id: int, frame: int) -> ShotCameras:

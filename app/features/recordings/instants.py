@@ -23,6 +23,7 @@ from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batc
 from app.features.recordings.cameras import SOURCE, cameras_at
 from app.features.recordings.link_frames import linked_frames
 from app.features.recordings.links import list_links
+from app.features.recordings.match_clock import match_time
 from app.features.recordings.service import (
     Recording,
     get_recording,
@@ -254,9 +255,12 @@ def _view(settings: Settings, shown: _Shown, name: str, key: str) -> View:
 
 
 def _provenance(recording: Recording, index: RecordingIndex, number: int) -> dict[str, Any]:
-    """Which frame of what a group shows: time stamp in ticks of its time base, and seconds."""
+    """Which frame of what a group shows: time stamp in ticks of its time base, seconds, and time of the match."""
     over, under = index.facts.time_base
+    half, time = match_time(recording.clocks, index.seconds, number) or (None, None)
+    shown = {} if half is None else {"match_half": half, "match_seconds": time}
     return {
+        **shown,
         "name": recording.name,
         "sha256": index.facts.sha256,
         "frame": number,

@@ -15,7 +15,7 @@ from app.features.recordings.link_schemas import (
     LinkDocument,
     LinkList,
     LiveSuggestions,
-    NewLink,
+    NewShotLink,
 )
 from app.features.recordings.link_values import ShotLink, links_csv
 from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
@@ -94,7 +94,7 @@ def get_links_file(recording: Id, store: AppStore) -> Response:
     body={"replay/recording": OwnedKind.RECORDING},
 )
 @responds(_made)
-def add_one(recording: Id, wanted: NewLink, store: AppStore, actor: Actor) -> ShotLink:
+def add_one(recording: Id, wanted: NewShotLink, store: AppStore, actor: Actor) -> ShotLink:
     """Link a replay to the live shot of this recording that it shows again, without an instant yet."""
     live, replay = wanted.live, wanted.replay
     return add_link(

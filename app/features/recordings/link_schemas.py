@@ -32,7 +32,7 @@ class LinkedReplay(LinkedLive):
     )
 
 
-class NewLink(BaseModel):
+class NewShotLink(BaseModel):
     """A replay and the live shot that it shows again."""
 
     model_config = ConfigDict(

@@ -37,6 +37,7 @@ from app.features.recordings.link_values import (
     link_of,
     shots_of_link,
 )
+from app.features.recordings.queries import RecordingRow
 from app.features.recordings.service import frame_seconds, need_recording
 from app.geometry.arrays import FloatArray
 from app.plural import plural
@@ -145,7 +146,9 @@ def _sides(row: Any) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
     )
 
 
-def _require_shot(session: Session, recording: int, first: int, last: int, pointer: str) -> Any:
+def _require_shot(
+    session: Session, recording: int, first: int, last: int, pointer: str
+) -> RecordingRow:
     row = need_recording(session, recording)
     if row.facts is None:
         raise ConflictError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol, cast
 
 from sqlalchemy import Select, delete, func, insert, select, update
 
@@ -12,6 +12,25 @@ from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.alias_queries import shown_actor
 from app.features.recordings.tables import RecordingModel
+
+
+class RecordingRow(Protocol):
+    """A row of a recording, with the name of its dataset and how many groups were taken from it."""
+
+    id: int
+    dataset_id: int
+    dataset: str
+    name: str
+    path: str
+    stamp: str | None
+    sha256: str | None
+    facts: str | None
+    shots: str
+    revision: int
+    actor: str
+    created: str
+    clocks: str | None
+    groups: int
 
 
 def _rows() -> Select[Any]:
@@ -33,17 +52,18 @@ def _rows() -> Select[Any]:
     ).join_from(RecordingModel, DatasetModel, DatasetModel.id == RecordingModel.dataset_id)
 
 
-def list_rows(session: Session, dataset_id: int | None = None) -> Sequence[Any]:
+def list_rows(session: Session, dataset_id: int | None = None) -> Sequence[RecordingRow]:
     """The recordings of a dataset, or of all, the newest first."""
     statement = _rows().order_by(RecordingModel.id.desc())
     if dataset_id is not None:
         statement = statement.where(RecordingModel.dataset_id == dataset_id)
-    return session.execute(statement).all()
+    return cast(Sequence[RecordingRow], session.execute(statement).all())
 
 
-def find_recording(session: Session, recording_id: int) -> Any | None:
+def find_recording(session: Session, recording_id: int) -> RecordingRow | None:
     """A recording by its id."""
-    return session.execute(_rows().where(RecordingModel.id == recording_id)).one_or_none()
+    found = session.execute(_rows().where(RecordingModel.id == recording_id)).one_or_none()
+    return cast(RecordingRow | None, found)
 
 
 def names_and_paths(session: Session, dataset_id: int) -> Sequence[Any]:
@@ -71,6 +91,7 @@ def insert_recording(session: Session, dataset_id: int, name: str, path: str, *,
     identity = next_id(session, RecordingModel)
     values = {"id": identity, "dataset_id": dataset_id, "name": name, "path": path}
     empty = {"stamp": None, "sha256": None, "facts": None, "shots": "[]", "revision": 0}
+    empty |= {"clocks": None}
     session.execute(insert(RecordingModel), [{**values, **empty, "actor": actor, "created": now()}])
     return identity
 

@@ -20,6 +20,7 @@ from app.features.recordings.jobs import (
 from app.features.recordings.schemas import (
     InstantsRequest,
     NewRecording,
+    RecordingChange,
     RecordingDocument,
     RecordingList,
     ShotList,
@@ -33,6 +34,7 @@ from app.features.recordings.service import (
     list_recordings,
     put_shots,
     remove_recording,
+    set_clocks,
     shots_csv,
 )
 from app.finite import MAX_ID
@@ -43,7 +45,7 @@ from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import IMAGES, limit
-from app.http.respond import document, no_content, responds
+from app.http.respond import as_document, document, no_content, responds
 from app.http.route import Route
 from app.media.images import JPEG
 
@@ -106,6 +108,22 @@ def add_recording(wanted: NewRecording, services: AppServices, actor: Actor) -> 
 def get_one(recording: Id, store: AppStore) -> Recording:
     """One recording: how long it is, how many shots it has, whether it can be read."""
     return get_recording(store, recording)
+
+
+@router.patch(
+    "/{recording}",
+    operation_id="changeRecording",
+    response_model=RecordingDocument,
+    responses=responses(404, 413, 415),
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@responds(as_document(RecordingDocument.model_validate))
+def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: Actor) -> Recording:
+    """Say what the clock of the match shows in frames of a recording; others follow from them.
+
+    Groups that are taken afterwards have `match_half` and `match_seconds` in `metadata.recording`.
+    """
+    return set_clocks(store, recording, wanted.values(), actor=actor)
 
 
 @router.delete(

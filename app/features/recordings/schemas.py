@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.imports.schemas import ImportPlace
 from app.features.recordings.instants import MOST_AT_ONCE
+from app.features.recordings.match_clock import MAX_CLOCKS, Half, MatchClock
 from app.features.recordings.service import MAX_SHOTS, RecordingShots, Shot
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
@@ -56,12 +57,44 @@ class RecordingDocument(Document):
     shots: int = Field(description="How many shots it has.")
     groups: int = Field(description="How many groups were taken from it.")
     problem: str | None = Field(description="Why its frames cannot be read now.")
+    clocks: list[MatchClock] = Field(
+        description="What the clock of the match shows in frames of it, by frame."
+    )
     created: datetime
     by: str = Field(validation_alias="actor")
 
 
 class RecordingList(ListDocument[RecordingDocument]):
     """Recordings, the newest first."""
+
+
+class ClockEdit(BaseModel):
+    """What the clock of the match shows in one frame."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    frame: Frame = Field(description="Number of the frame.")
+    half: Half = Field(description="1 or 2; 3 and 4 are those of extra time.")
+    seconds: Annotated[float, Field(ge=0, le=10_800)] = Field(
+        description="What the clock shows, seconds; the second half begins at 2,700."
+    )
+
+
+class RecordingChange(BaseModel):
+    """What is changed of a recording."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"clocks": [{"frame": 1200, "half": 1, "seconds": 760}]}]},
+    )
+
+    clocks: Annotated[list[ClockEdit], Field(max_length=MAX_CLOCKS)] = Field(
+        description="All readings of the clock of the match."
+    )
+
+    def values(self) -> list[MatchClock]:
+        """The readings."""
+        return [MatchClock(**clock.model_dump()) for clock in self.clocks]
 
 
 class ShotEdit(BaseModel):

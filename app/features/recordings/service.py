@@ -27,7 +27,9 @@ from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset, require_name
 from app.features.groups.state import require_etag
 from app.features.recordings.link_queries import delete_links
+from app.features.recordings.match_clock import MatchClock, require_clocks
 from app.features.recordings.queries import (
+    RecordingRow,
     delete_recording,
     find_recording,
     insert_recording,
@@ -57,6 +59,8 @@ Send = Callable[[tuple[int, int | None, str]], object]
 KINDS: tuple[str, ...] = get_args(ShotKind)
 STARTS: tuple[str, ...] = get_args(ShotStart)
 Found = TypeVar("Found")
+_Details = dict[str, str | int | None]
+"""What an event of the log says of a recording."""
 _UNSAFE = re.compile(r"[^\w .()-]+")
 
 
@@ -96,6 +100,7 @@ class Recording:
         shots: How many it has.
         groups: How many groups were taken from it.
         problem: Why its frames cannot be read now, in a sentence; None: they can.
+        clocks: What the clock of the match shows in frames of it.
     """
 
     id: int
@@ -120,6 +125,7 @@ class Recording:
     problem: str | None
     actor: str
     created: str
+    clocks: tuple[MatchClock, ...] = ()
 
     def require_readable(self) -> str:
         """The sha256 of the file.
@@ -161,7 +167,7 @@ def get_recording(store: Store, recording_id: int) -> Recording:
         return _recording(need_recording(session, recording_id))
 
 
-def need_recording(session: Session, recording_id: int) -> Any:
+def need_recording(session: Session, recording_id: int) -> RecordingRow:
     """The row of a recording; raises NotFoundError when there is none."""
     row = find_recording(session, recording_id)
     if row is None:
@@ -205,9 +211,31 @@ def remove_recording(store: Store, recording_id: int, *, actor: str) -> None:
     with store.write() as session:
         row = need_recording(session, recording_id)
         delete_recording(session, recording_id)
-        what = {"recording": recording_id, "name": row.name}
+        what: _Details = {"recording": recording_id, "name": row.name}
         add_audit_event(session, actor, "recording removed", row.dataset_id, **what)
         session.respond(None)
+
+
+def set_clocks(
+    store: Store, recording_id: int, clocks: Sequence[MatchClock], *, actor: str
+) -> Recording:
+    """Replace the readings of the clock of the match; groups that are taken later tell its time.
+
+    Raises:
+        InputError: As ``require_clocks``.
+        NotFoundError: There is no such recording.
+    """
+    with store.write() as session:
+        row = need_recording(session, recording_id)
+        found = require_clocks(clocks, parse(row.facts)["frames"] if row.facts else 0)
+        text = canonical([asdict(clock) for clock in found]) if found else None
+        if text != row.clocks:
+            update_recording(session, recording_id, clocks=text)
+            what: _Details = {"recording": recording_id, "name": row.name, "clocks": len(found)}
+            add_audit_event(session, actor, "match clock set", row.dataset_id, **what)
+        recording = _recording(need_recording(session, recording_id))
+        session.respond(recording)
+    return recording
 
 
 def require_video(path: Path) -> Path:
@@ -261,7 +289,7 @@ def index_now(
             found |= {"shots": canonical(shots), "revision": row.revision + 1}
         if row.sha256 != facts["sha256"] and (gone := delete_links(session, recording_id)):
             # Their frames are those of another film.
-            what = {"recording": recording_id, "name": row.name, "links": gone}
+            what: _Details = {"recording": recording_id, "name": row.name, "links": gone}
             add_audit_event(session, row.actor, "links removed", row.dataset_id, **what)
         update_recording(session, recording_id, **found)
         return _recording(need_recording(session, recording_id))
@@ -426,7 +454,7 @@ def put_shots(
         text = canonical([asdict(shot) for shot in shots])
         if text != row.shots:
             update_recording(session, recording_id, shots=text, revision=row.revision + 1)
-            what = {"recording": recording_id, "name": row.name, "shots": len(shots)}
+            what: _Details = {"recording": recording_id, "name": row.name, "shots": len(shots)}
             add_audit_event(session, actor, "shots changed", row.dataset_id, **what)
         found = _shots(store.settings, need_recording(session, recording_id))
         session.respond(found)
@@ -472,7 +500,7 @@ def frames_of_keys(keys: Iterable[str]) -> dict[int, str]:
     return found
 
 
-def _shots(settings: Settings, row: Any) -> RecordingShots:
+def _shots(settings: Settings, row: RecordingRow) -> RecordingShots:
     recording = _recording(row)
     items = tuple(Shot(**shot) for shot in parse(row.shots))
     times: tuple[tuple[float, float], ...] = ()
@@ -501,11 +529,11 @@ def frame_seconds(settings: Settings, sha256: str) -> FloatArray:
     return _seconds(index_place(settings, sha256))
 
 
-def _etag(row: Any) -> str:
+def _etag(row: RecordingRow) -> str:
     return f'"{row.revision}-{digest_of(row.shots.encode())[:12]}"'
 
 
-def _recording(row: Any) -> Recording:
+def _recording(row: RecordingRow) -> Recording:
     path = Path(row.path)
     facts: Mapping[str, Any] = {} if row.facts is None else parse(row.facts)
     names = ("bytes", "frames", "fps", "variable", "seconds")
@@ -524,6 +552,7 @@ def _recording(row: Any) -> Recording:
         problem=None if row.stamp is None else _problem(path, row.stamp),
         actor=row.actor,
         created=row.created,
+        clocks=tuple(MatchClock(**one) for one in parse(row.clocks or "[]")),
     )
 
 

@@ -14,7 +14,7 @@ class RecordingModel(Base):
 
     The file stays where it is, at ``path``; ``stamp`` is its size and time of change when it was
     indexed. ``facts`` (JSON) and ``sha256`` are null until then. ``revision`` counts the changes of
-    ``shots``.
+    ``shots``. ``clocks`` (JSON) are readings of the clock of the match; null: nobody read it.
     """
 
     __tablename__ = "recording"
@@ -34,6 +34,7 @@ class RecordingModel(Base):
     revision: Mapped[int]
     actor: Mapped[str]
     created: Mapped[str]
+    clocks: Mapped[str | None]
 
 
 class ShotCamerasModel(Base):

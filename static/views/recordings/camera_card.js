@@ -5,8 +5,6 @@ import { html } from 'htm/preact';
 
 import { camerasFile } from '../../api/cameras.js';
 import { count, plural } from '../../lib/format.js';
-import { OUTCOMES } from '../../state/cameras.js';
-import { wanted } from '../../state/playback.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 
@@ -15,13 +13,6 @@ import { JobProgress } from '../job_progress.js';
 /** @import {Cameras} from './camera_state.js' */
 
 const FILES = [['soccernet', 'SoccerNet JSON'], ['npz', 'npz'], ['opentrackio', 'OpenTrackIO']];
-/** @type {Record<string, string>} */
-const REASONS = {
-	no_paint: 'no paint is found where its markings would be',
-	paint_disagrees: 'the paint lies beside the markings',
-	no_frame: 'its picture cannot be read',
-};
-
 /** @param {CameraSummary} summary */
 const worstOf = ({ worst_frame: frame, worst_px: error }) => (frame === null || error === null ? '–' : `${error.toFixed(2)} px at ${frame}`);
 
@@ -41,18 +32,6 @@ function Counts({ stretch: { summary, before }, old }) {
 	`;
 }
 
-/** The frame on screen, in words. @param {{cameras: Cameras}} props */
-function ThisFrame({ cameras: { frames } }) {
-	const place = frames ? wanted.value - frames.first : -1;
-	if (!frames || place < 0 || place >= frames.outcome.length) return null;
-	const { name, meaning } = OUTCOMES[frames.outcome[place]];
-	const error = frames.error_px[place];
-	const reason = frames.reason[place];
-	const key = frames.keyframe.includes(wanted.value) ? ' Key frame.' : '';
-	const more = error === null ? `${reason ? `: ${REASONS[reason] ?? reason.replaceAll('_', ' ')}` : `: ${meaning}`}.` : `, paint ${error.toFixed(2)} px from its markings.`;
-	return html`<p class="camera__frame">Frame ${wanted.value} is <strong>${name}</strong>${more}${key}</p>`;
-}
-
 /** @param {{one: RecordingJson, cameras: Cameras}} props */
 export function CameraCard({ one, cameras }) {
 	const { stretch, job, error, busy, before } = cameras;
@@ -61,7 +40,7 @@ export function CameraCard({ one, cameras }) {
 	return html`
 		<section class="card camera" aria-label="Cameras">
 			<h2>Cameras${stretch ? html`<span class="card__aside">frames ${stretch.first} to ${stretch.last}</span>` : null}</h2>
-			${stretch ? html`<${Counts} stretch=${stretch} old=${before} /><${ThisFrame} cameras=${cameras} />` : html`<p>A camera for each frame of this shot is found from its paint. Groups of its frames then need no proposal.</p>`}
+			${stretch ? html`<${Counts} stretch=${stretch} old=${before} />` : html`<p>A camera for each frame of this shot is found from its paint. Groups of its frames then need no proposal.</p>`}
 			${stretch?.stale ? html`<p class="form__error">The video is another one since: track the shot again.</p>` : null}
 			${fresh.length ? html`<p role="status">${fresh.length === 1 ? `Frame ${fresh[0]} has` : `${plural(fresh.length, 'frame')} have`} lines since. Track again, and the shot follows them.</p>` : null}
 			${useless.length ? html`<p class="form__error">Frame ${useless.join(', ')} has too few lines for a camera, and was not used.</p>` : null}
@@ -70,12 +49,6 @@ export function CameraCard({ one, cameras }) {
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens its lines'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>
 			</p>
 			${stretch ? html`
-				<p class="buttons">
-					<button class="button" type="button" onClick=${cameras.worst}>Worst <kbd>W</kbd></button>
-					<button class="button" type="button" onClick=${cameras.untracked}>Next lost <kbd>N</kbd></button>
-					<button class="button" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Lines <kbd>P</kbd></button>
-					${stretch.before ? html`<button class="button" type="button" aria-pressed=${before} onClick=${cameras.turnBefore}>Before <kbd>B</kbd></button>` : null}
-				</p>
 				<p class="camera__files">Save as ${FILES.map(([format, label], index) => html`${index ? ', ' : ''}<a key=${format} class="link" href=${camerasFile(one.id, stretch.first, format)} download>${label}</a>`)}</p>` : null}
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}

@@ -15,6 +15,13 @@ import { Chart, Numbers } from '../chart.js';
 const HEIGHT = 84;
 const [PAN, TILT, FOCAL] = [3, 4, 6];
 
+/** @type {Record<string, string>} */
+const REASONS = {
+	no_paint: 'no paint is found where its markings would be',
+	paint_disagrees: 'the paint lies beside the markings',
+	no_frame: 'its picture cannot be read',
+};
+
 /** The markings of the frame that is seen, where its camera puts them. @param {{cameras: Cameras}} props */
 export function CameraLines({ cameras: { frames, lines, before } }) {
 	const { frame } = seen.value;
@@ -56,14 +63,41 @@ const two = (value) => value.toFixed(2);
 /** @param {number} value */
 const whole = (value) => value.toFixed(0);
 
+/** The frame on screen, in words. @param {{cameras: Cameras}} props */
+function ThisFrame({ cameras: { frames } }) {
+	const place = frames ? wanted.value - frames.first : -1;
+	if (!frames || place < 0 || place >= frames.outcome.length) return null;
+	const { name, meaning } = OUTCOMES[frames.outcome[place]];
+	const error = frames.error_px[place];
+	const reason = frames.reason[place];
+	const key = frames.keyframe.includes(wanted.value) ? ' Key frame.' : '';
+	const more = error === null ? `${reason ? `: ${REASONS[reason] ?? reason.replaceAll('_', ' ')}` : `: ${meaning}`}.` : `, paint ${error.toFixed(2)} px from its markings.`;
+	return html`<p class="camera__frame">Frame ${wanted.value} is <strong>${name}</strong>${more}${key}</p>`;
+}
+
+/** What leads through the frames of the shot. @param {{cameras: Cameras}} props */
+function Tools({ cameras }) {
+	return html`
+		<div class="camera__tools">
+			<button class="button button--small" type="button" onClick=${cameras.worst}>Worst <kbd>W</kbd></button>
+			<button class="button button--small" type="button" onClick=${cameras.untracked}>Next lost <kbd>N</kbd></button>
+			<button class="button button--small" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Lines <kbd>P</kbd></button>
+			${cameras.stretch?.before ? html`<button class="button button--small" type="button" aria-pressed=${cameras.before} onClick=${cameras.turnBefore}>Before <kbd>B</kbd></button>` : null}
+			<${ThisFrame} cameras=${cameras} />
+			${cameras.before ? html`<strong>These are the cameras before the last run.</strong>` : null}
+		</div>
+	`;
+}
+
 /** @param {{cameras: Cameras}} props */
-export function CameraCurves({ cameras: { frames, before } }) {
+export function CameraCurves({ cameras }) {
+	const { frames } = cameras;
 	const charts = useMemo(() => frames && chartsOf(frames), [frames]);
 	if (!frames || !charts) return null;
 	const frame = wanted.value;
 	return html`
 		<section class="card camera__curves" aria-label="Cameras over time">
-			${before ? html`<p class="camera__was">These are the cameras before the last run.</p>` : null}
+			<${Tools} cameras=${cameras} />
 			<${Outcomes} frames=${frames} />
 			<div class="camera__charts">
 				${charts.map((chart) => html`
@@ -78,7 +112,7 @@ export function CameraCurves({ cameras: { frames, before } }) {
 function chartsOf(frames) {
 	const x = frames.time.map((_, place) => frames.first + place);
 	/** @param {string} yLabel @param {Curve[]} curves @param {(value: number) => string} format @param {[number | null, number | null]} [yRange] */
-	const one = (yLabel, curves, format, yRange) => ({ name: `${curves.map(({ label }) => label).join(' and ')} of each frame`, xLabel: 'frame', yLabel, x, curves, format, yRange });
+	const one = (yLabel, curves, format, yRange) => ({ name: `${curves.map(({ label }) => label).join(' and ')} of each frame`, xLabel: 'frame', yLabel, x, curves: curves.map((curve) => ({ ...curve, gaps: true })), format, yRange });
 	return [
 		one('share', [
 			{ label: 'supported', values: frames.supported, colour: 'chart-a' },

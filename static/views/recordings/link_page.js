@@ -14,7 +14,7 @@ import { navigate, page } from '../../lib/router.js';
 import { instantBeside, markOf, replayFrameAt, withInstant } from '../../state/links.js';
 import { announce, complain } from '../../state/notice.js';
 import { makePlayer } from '../../state/playback.js';
-import { timecode } from '../../state/shots.js';
+import { matchTime, timecode } from '../../state/shots.js';
 import { FormError } from '../form_error.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { BallCard } from './link_ball.js';
@@ -82,6 +82,7 @@ function Stage({ side, shot, player, one, focused, focus, mark }) {
 			/>
 			<p class="film__time">
 				<strong class="mono">${timecode(wanted / fps, fps)}</strong>
+				${one.clocks.length ? html`<span>${matchTime(one.clocks, (at) => at / fps, wanted)}</span>` : null}
 				<span>frame ${wanted}</span>
 				${player.speed.value ? html`<span>${player.speed.value} ×</span>` : null}
 				${mark ? html`<span class="linking__mark">${mark}</span>` : null}

@@ -13,11 +13,12 @@ import { useResource } from '../../lib/resource.js';
 import { isOver } from '../../state/jobs.js';
 import { announce, complain } from '../../state/notice.js';
 import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
-import { shotAt, timecode } from '../../state/shots.js';
+import { matchTime, shotAt, timecode } from '../../state/shots.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { CameraCard } from './camera_card.js';
 import { CameraCurves, CameraLines } from './camera_curves.js';
 import { useCameraKeys, useCameras } from './camera_state.js';
+import { ClockCard } from './clock_card.js';
 import { InstantsCard } from './instants_card.js';
 import { LinkCard } from './link_card.js';
 import { keysOfRecording } from './recording_keys.js';
@@ -116,6 +117,7 @@ function Stage({ one, seconds, cameras }) {
 			<p class="film__time">
 				<button class="button" type="button" aria-pressed=${speed.value !== 0} onClick=${toggleRunning}>${speed.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
 				<strong class="mono" data-timecode>${timecode(seconds(wanted.value), one.fps ?? 25)}</strong>
+				${one.clocks.length ? html`<span data-match-time>${matchTime(one.clocks, seconds, wanted.value)}</span>` : null}
 				<span>frame ${wanted.value} of ${(one.frames ?? 1) - 1}</span>
 				${Math.abs(speed.value) > 1 || speed.value < 0 ? html`<span>${speed.value} ×</span>` : null}
 				${playTrouble.value ? html`<span class="form__error" role="alert">${playTrouble.value}</span>` : null}
@@ -173,6 +175,7 @@ function Film({ one, reload }) {
 				<${CameraCard} one=${one} cameras=${cameras} />
 				<${LinkCard} one=${one} shots=${list.items} shot=${list.items[at]} links=${links} />
 				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} links=${links} />
+				<${ClockCard} one=${one} reload=${reload} />
 			</div>
 			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} goTo=${goTo} />
 			<${CameraCurves} cameras=${cameras} />

@@ -92,6 +92,10 @@ def no_recording(api: Any) -> Request:
     return "DELETE", recording(api), None, {}
 
 
+def match_clock(api: Any) -> Request:
+    return "PATCH", recording(api), {"clocks": [{"frame": 3, "half": 1, "seconds": 60}]}, {}
+
+
 def found_shots(api: Any) -> Request:
     return "POST", f"{recording(api)}/shots", None, {}
 

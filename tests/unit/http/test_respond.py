@@ -38,6 +38,7 @@ KEPT: dict[str, Made] = {
     "cancelJob": dataset_requests.cancelled,
     "changeBatch": dataset_requests.batch_edited,
     "changeComment": group_requests.comment_edited,
+    "changeRecording": dataset_requests.match_clock,
     "changeStation": group_requests.station_calibration,
     "changeThread": group_requests.thread_resolved,
     "changeView": group_requests.left_out,

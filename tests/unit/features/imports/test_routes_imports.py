@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import ANY
@@ -16,12 +17,15 @@ import pytest
 from app.db.log import read_log
 from app.features.datasets.service import get_dataset
 from app.features.imports.jobs import resume_imports
+from app.features.imports.queries import shared_stations
 from app.features.imports.upload_queries import get_upload
 from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.solve.jobs import resume_solving
+from app.formats.issia_writer import write_issia
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE
+from tests.rigs import groups
 from tests.waiting import SECONDS
 
 API = "/api/v1/imports"
@@ -330,3 +334,28 @@ def uploaded(app: Any, api: Any, content: bytes) -> Any:
     params = {"name": "m.zip"}
     sent = api.post("/api/v1/uploads", params=params, content=content, headers=headers).json()
     return finished(app, api.post(API, json=body(source={"upload": sent["id"]})))
+
+
+class TestRig:
+    def test_an_adjustment_of_static_cameras_is_proposed_once_and_changes_nothing(
+        self, app, api, tmp_path: Path
+    ) -> None:
+        store = app.state.services.store
+        root = tmp_path / "rig"
+        root.mkdir()
+        write_issia(root, [replace(group, match="issia") for group in groups(120)])
+        object.__setattr__(app.state.services.settings, "import_folders", [root])
+        wanted = {
+            "dataset": "fresh",
+            "format": "issia",
+            "source": {"folder": "rig"},
+            "options": {"size": [1280, 720]},
+        }
+        result = finished(app, api.post(API, json=wanted)).result
+        proposed = app.state.services.jobs.wait(result["rig_job"], SECONDS)
+        assert (proposed.state, proposed.kind) == ("done", "rig"), proposed.problem
+        assert (proposed.result["accepted"], len(proposed.result["cameras"])) == (None, 4)
+        with store.read() as session:
+            given = [item.station for item in shared_stations(session, proposed.dataset_id)]
+        assert all(station.given_covariance is None for station in given)
+        assert finished(app, api.post(API, json=wanted)).result["rig_job"] is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import zipfile
@@ -14,7 +15,7 @@ import pytest
 
 from app.db.idempotency import without_response
 from app.db.store import Store
-from app.errors import ConflictError, InputError
+from app.errors import ConflictError, InputError, JobCancelled
 from app.features.datasets.orphan_queries import unused_frames
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import replay
@@ -26,7 +27,9 @@ from app.features.recordings.cameras import (
     Tracked,
     cameras_at,
     get_cameras,
+    list_cameras,
     read_cameras,
+    track_now,
     track_stretch,
 )
 from app.features.recordings.links import add_link, set_instants
@@ -377,6 +380,44 @@ def test_a_video_that_changes_while_it_is_tracked_is_refused(
         module.save_cameras(store, other, (4, 11), tracked, [], "ann")
     with pytest.raises(InputError):
         module.require_stretch(found, 4, 12)
+
+
+def test_it_ends_when_its_job_is_cancelled_and_keeps_nothing(
+    app: Any, recording: str, found: Recording
+) -> None:
+    def cancelled() -> None:
+        raise JobCancelled
+
+    store: Store = app.state.services.store
+    asked = {"actor": "ann", "progress": lambda *_: None, "stop": cancelled}
+    with pytest.raises(JobCancelled):
+        track_now(store, found.id, FIRST, 11, **asked)
+    assert list_cameras(store, found.id) == []
+    assert list(store.settings.recordings.glob("*.cameras.npz")) == []
+
+
+def test_a_disk_that_is_full_is_one_message_and_changes_nothing(
+    app: Any,
+    api: Any,
+    recording: str,
+    found: Recording,
+    finished: Finished,
+    tracker: Tracker,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    track(api, recording, finished)
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    tracker.off = 1.0
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "replace_file", full)
+        job = finished(api.post(f"{recording}/cameras", json={"first": FIRST, "last": 11}))
+    assert job.state == "failed" and "cannot be kept" in job.problem["detail"]
+    (one,) = api.get(f"{recording}/cameras").json()["items"]
+    assert one["revision"] == 1
+    assert api.get(f"{recording}/cameras/5").status_code == 200
 
 
 def test_lines_that_make_no_camera_are_named_and_left_out(

@@ -208,6 +208,46 @@ class TestShots:
         assert told == known
 
 
+class TestMatchClock:
+    def test_readings_are_kept_by_frame_and_groups_tell_the_time(
+        self, app, api, recording: str, finished: Finished
+    ) -> None:
+        readings = [
+            {"frame": 40, "half": 2, "seconds": 2700.0},
+            {"frame": 10, "half": 1, "seconds": 760.0},
+        ]
+        changed = api.patch(recording, json={"clocks": readings})
+        assert changed.json()["clocks"] == readings[::-1] == api.get(recording).json()["clocks"]
+        finished(api.post(f"{recording}/groups", json={"frames": [5, 15, 50], "propose": False}))
+        with app.state.services.store.read() as session:
+            groups = [e.body["group"] for e in read_log(session) if e.kind == "import"][-3:]
+            (told,) = [e.body for e in read_log(session) if e.body.get("did") == "match clock set"]
+        shown = [one["views"][0]["extras"]["metadata"]["recording"] for one in groups]
+        assert [one["match_half"] for one in shown] == [1, 1, 2]
+        times = [one["match_seconds"] for one in shown]
+        assert times == pytest.approx([759.8, 760.2, 2700.4])
+        assert told["clocks"] == 2
+        assert api.patch(recording, json={"clocks": []}).json()["clocks"] == []
+
+    @pytest.mark.parametrize(
+        ("clocks", "status"),
+        [
+            ([(60, 1, 0.0)], 400),
+            ([(5, 1, 0.0), (5, 1, 1.0)], 400),
+            ([(5, 2, 0.0), (9, 1, 1.0)], 400),
+            ([(5, 5, 0.0)], 422),
+            ([(5, 1, -1.0)], 422),
+        ],
+    )
+    def test_readings_that_cannot_be_are_refused(
+        self, api, recording: str, clocks: list[tuple[int, int, float]], status: int
+    ) -> None:
+        body = {"clocks": [{"frame": a, "half": b, "seconds": c} for a, b, c in clocks]}
+        answer = api.patch(recording, json=body)
+        assert answer.status_code == status
+        assert api.get(recording).json()["clocks"] == []
+
+
 class TestTakeInstants:
     def test_frames_become_groups_that_outlive_their_recording(
         self, app, api, film: Path, recording: str, finished: Finished
