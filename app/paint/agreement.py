@@ -7,7 +7,7 @@ that does not; which side is which, paint cannot tell.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
+from app.paint.ridges import Strength
 from app.paint.ridges import line_like as find_line_like
 from app.paint.tracing import trace_places
 from app.soccer.pitch import Pitch
@@ -23,6 +24,8 @@ NEAR_PX = 2.0
 """A marking has paint, and paint has a marking, within so many pixels at 960 wide."""
 SPACING_PX = 3.0
 MOST_PLACES = 6000
+FAINT_SHARE, MARGIN_M = 0.5, 6.0
+"""Of the paint's strength, below which a ridge is no paint; and how far beyond the pitch there is none, metres."""
 REFERENCE_WIDTH = 960
 
 
@@ -62,13 +65,10 @@ def agreement(
         pitch: The pitch.
     """
     lines = find_line_like(np.asarray(paint, np.uint8), field) if paint.ndim == 3 else paint
-    height, width = field.shape
-    columns, rows = _marked(camera, field, pitch or Pitch())
-    near = max(NEAR_PX * width / REFERENCE_WIDTH, 1.5)
-    supported = _widened(lines.astype(np.uint8), near)[rows, columns] > 0
-    model = np.zeros((height, width), np.uint8)
-    model[rows, columns] = 1
-    explained = _widened(model, near + SPACING_PX / 2)[lines.astype(np.bool_)] > 0
+    width = field.shape[1]
+    (columns, rows), model = _near_model(camera, field, pitch or Pitch())
+    supported = _widened(lines.astype(np.uint8), _near_px(width))[rows, columns] > 0
+    explained = model[lines.astype(np.bool_)]
     return PaintAgreement(
         supported=float(supported.mean()) if len(supported) else 0.0,
         explained=float(explained.mean()) if len(explained) else 0.0,
@@ -76,11 +76,59 @@ def agreement(
     )
 
 
+def clear_agreement(
+    camera: Camera, field: BoolArray, strength: Strength, pitch: Pitch, paint_strength: float
+) -> PaintAgreement:
+    """As ``agreement``, with what is no paint of a pitch left out of *explained*.
+
+    Noise of a compressed picture and mowing stripes are fainter than the paint that is followed;
+    seats that are as green as grass lie beyond the pitch.
+
+    Args:
+        camera: In pixels of the picture.
+        field: The field of play, shape (H, W).
+        strength: Of ``ridges.line_strength``, shape (H, W).
+        pitch: The pitch.
+        paint_strength: Of paint (``explained_strength``); less than half of it is none.
+    """
+    strong = strength >= FAINT_SHARE * paint_strength
+    rows, columns = np.nonzero(strong & (strength > 0))
+    ground = camera.on_ground(np.column_stack([columns, rows]).astype(np.float64))[:, :2]
+    beyond = np.abs(ground) - np.array([pitch.length, pitch.width]) / 2
+    on_pitch = np.isfinite(ground).all(axis=1) & (beyond < MARGIN_M).all(axis=1)
+    clear = np.zeros(field.shape, np.bool_)
+    clear[rows[on_pitch], columns[on_pitch]] = True
+    explained = agreement(camera, field, clear, pitch).explained
+    return replace(agreement(camera, field, strength > 0, pitch), explained=explained)
+
+
+def explained_strength(camera: Camera, field: BoolArray, strength: Strength, pitch: Pitch) -> float:
+    """Median strength of the line-like paint that lies near a camera's markings; 0 without any."""
+    lines = strength > 0
+    near = _near_model(camera, field, pitch)[1] & lines
+    return float(np.median(strength[near])) if near.any() else 0.0
+
+
 def _widened(mask: npt.NDArray[np.uint8], radius: float) -> npt.NDArray[np.uint8]:
     """A mask (0 and 1) and all that lies within a radius of it, pixels."""
     size = 2 * round(radius) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     return np.asarray(cv2.dilate(mask, disc))
+
+
+def _near_px(width: int) -> float:
+    return max(NEAR_PX * width / REFERENCE_WIDTH, 1.5)
+
+
+def _near_model(
+    camera: Camera, field: BoolArray, pitch: Pitch
+) -> tuple[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]], BoolArray]:
+    """``_marked``, and which pixels lie near a marking, shape (H, W)."""
+    columns, rows = _marked(camera, field, pitch)
+    model = np.zeros(field.shape, np.uint8)
+    model[rows, columns] = 1
+    near = _widened(model, _near_px(field.shape[1]) + SPACING_PX / 2)
+    return (columns, rows), np.asarray(near > 0)
 
 
 def _marked(

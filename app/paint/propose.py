@@ -30,12 +30,17 @@ from app.geometry.resection import (
     camera_from_parameters,
     parameters_from_camera,
 )
-from app.paint.agreement import PaintAgreement, agreement
+from app.paint.agreement import (
+    PaintAgreement,
+    agreement,
+    clear_agreement,
+    explained_strength,
+)
 from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
 from app.paint.goal import goal_height
 from app.paint.grass import field_of_play, why_no_field
-from app.paint.ridges import line_like
+from app.paint.ridges import Strength, line_strength
 from app.paint.scoring import ScoredPicture
 from app.paint.search import (
     KAPPA_MEAN,
@@ -56,7 +61,7 @@ from app.solving.observations import principal_point
 
 Image = npt.NDArray[np.uint8]
 
-SEARCH_VERSION = 3
+SEARCH_VERSION = 4
 """Of the search and what decides: where nothing was proposed, a later one looks again."""
 WORK_WIDTH = 960
 ENLARGED_WIDTH, ENLARGED = 640, 2
@@ -97,6 +102,8 @@ AIM, MOST_TURNED = [PAN, TILT, ROLL, LOG_FOCAL], 0.3
 SOLE_LEAD = 0.15
 """What counts as lead where the search found no other camera."""
 LAST_WINDOWS = (5.0, 3.0, 3.0)
+CLOSER = 6
+"""Cameras of an unsure frame that are looked at once more."""
 
 
 @dataclass(frozen=True)
@@ -128,10 +135,15 @@ class SearchedFrame:
 
     image: Image
     field: BoolArray
-    paint: BoolArray
+    strength: Strength
     pieces: FloatArray
     picture: ScoredPicture
     reading: Reading
+
+    @property
+    def paint(self) -> BoolArray:
+        """What looks like paint."""
+        return np.asarray(self.strength > 0)
 
 
 @dataclass(frozen=True)
@@ -197,6 +209,10 @@ def propose(
         ranked = merged(frame, ranked, found)
         if why_unsure(ranked) is None:
             break
+    else:
+        closer = _looked_closer(image, frame, ranked, pitch)
+        if why_unsure(closer) is None:
+            return _answer(image, frame, closer, pitch)
     return _answer(image, frame, ranked, pitch)
 
 
@@ -228,15 +244,81 @@ def read_frame(image: Image) -> SearchedFrame | str:
     reason = why_no_field(image, field)
     if reason is not None:
         return reason
-    paint = line_like(image, field)
-    for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
-        paint[border] = paint[:, border] = False
-    pieces = straight_pieces(paint, MOST_PIECES)
+    strength = _strength(image, field)
+    pieces = straight_pieces(strength > 0, MOST_PIECES)
     if not len(pieces):
         return "no straight line is seen on the grass"
     center = principal_point(ImageSize(image.shape[1], image.shape[0]))
-    picture = ScoredPicture.of(paint, field, center)
-    return SearchedFrame(image, field, paint, pieces, picture, read_picture(image, field))
+    picture = ScoredPicture.of(strength > 0, field, center)
+    return SearchedFrame(image, field, strength, pieces, picture, read_picture(image, field))
+
+
+def _strength(image: Image, field: BoolArray) -> Strength:
+    strength = line_strength(image, field)
+    for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
+        strength[border] = strength[:, border] = 0.0
+    return strength
+
+
+def _looked_closer(
+    image: Image, frame: SearchedFrame, ranked: Sequence[RankedCamera], pitch: Pitch
+) -> list[RankedCamera]:
+    """The best cameras of a frame once more, in the picture's own size and by clear paint alone.
+
+    Far lines are there that were too thin before, and cameras that only looked different end in
+    one. Pictures that were not made smaller are not drawn again. A camera that is contradicted stays so.
+    """
+    if not ranked or ranked[0].is_contradicted:
+        return []
+    height, width = image.shape[:2]
+    factor = width / frame.field.shape[1]
+    looked, again = frame, [*ranked[:CLOSER]]
+    if factor > 1:
+        field = _field_at(frame, width, height)
+        looked = replace(
+            frame,
+            image=image,
+            field=field,
+            strength=_strength(image, field),
+            reading=read_picture(image, field),
+        )
+        drawn = threads().map(lambda item: _closer(looked, item, factor, pitch), again)
+        again = [item for item in drawn if item is not None]
+    if not again:
+        return []
+    best = max(again, key=lambda item: item.score).snapped.camera
+    paint = explained_strength(best, looked.field, looked.strength, pitch)
+    seen = threads().map(
+        lambda item: clear_agreement(
+            item.snapped.camera, looked.field, looked.strength, pitch, paint
+        ),
+        again,
+    )
+    clear = [replace(item, agreement=one) for item, one in zip(again, seen, strict=True)]
+    return merged(frame, [], clear)
+
+
+def _closer(
+    looked: SearchedFrame, item: RankedCamera, factor: float, pitch: Pitch
+) -> RankedCamera | None:
+    """A camera drawn onto the paint of the picture in its own size, from near and from afar; the
+    better of both."""
+    height, width = looked.field.shape
+    start = scaled(item.snapped, height, width).camera
+    found = []
+    for windows in (LAST_WINDOWS, WINDOWS):
+        snapped = _snap(looked.reading, start, pitch, windows, item.policy, item.known)
+        if snapped.reason is None:
+            seen = agreement(snapped.camera, looked.field, looked.paint, pitch)
+            weakest = weakest_marking(looked.reading, snapped, pitch, VISIBLE_PX * factor)
+            found.append(replace(item, snapped=snapped, agreement=seen, weakest=weakest))
+    return max(found, key=lambda item: item.score, default=None)
+
+
+def _field_at(frame: SearchedFrame, width: int, height: int) -> BoolArray:
+    """The field of play in the picture as it is."""
+    size, small = (width, height), frame.field.astype(np.uint8)
+    return cv2.resize(small, size, interpolation=cv2.INTER_NEAREST).astype(np.bool_)
 
 
 def rank(
@@ -350,7 +432,9 @@ def _snap(
     )  # fmt: skip
 
 
-def weakest_marking(reading: Reading, snapped: SnappedCamera, pitch: Pitch) -> float:
+def weakest_marking(
+    reading: Reading, snapped: SnappedCamera, pitch: Pitch, visible_px: float = VISIBLE_PX
+) -> float:
     """The lowest share of a marking's places that have paint; short markings do not count.
 
     A camera that lays some markings on paint that is there by chance shows others where none is.
@@ -358,9 +442,9 @@ def weakest_marking(reading: Reading, snapped: SnappedCamera, pitch: Pitch) -> f
     """
     traced, paint = trace(reading, snapped.camera, pitch), snapped.evidence.traced
     usable = shows_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
-    usable &= traced.widths > VISIBLE_PX
+    usable &= traced.widths > visible_px
     shown = np.bincount(traced.marking[usable], minlength=len(MARKINGS))
-    seen = np.bincount(paint.marking[paint.widths > VISIBLE_PX], minlength=len(MARKINGS))
+    seen = np.bincount(paint.marking[paint.widths > visible_px], minlength=len(MARKINGS))
     seen = np.minimum(seen, shown)
     long = shown >= MARKING_PLACES
     return float((seen[long] / shown[long]).min()) if long.any() else 1.0
@@ -373,7 +457,11 @@ def merged(
     kept: list[RankedCamera] = []
     shown: list[VisiblePaint] = []
     for item in sorted([*one, *other], key=lambda item: -item.score):
+        height, width = item.snapped.size
+        rows, columns = frame.field.shape
         camera = item.snapped.camera
+        if (height, width) != (rows, columns):
+            camera = camera.scaled(columns / width, rows / height)
         if not any(shows_the_same(old, camera, frame.picture) for old in shown):
             kept.append(item)
             shown.append(shown_by(camera, frame.picture))
@@ -445,11 +533,15 @@ def _answer(
         return FrameProposal("unsure", reason)
     best, lead = ranked[0], runner_up(ranked)
     snapped = best.snapped
-    reason = reason or why_not_square(frame.image, snapped.camera, pitch)
     height, width = image.shape[:2]
+    rows, columns = frame.field.shape
+    small = snapped.camera
+    if snapped.size != (rows, columns):
+        small = small.scaled(columns / width, rows / height)
+    reason = reason or why_not_square(frame.image, small, pitch)
     if width < ENLARGED_WIDTH:
         snapped = scaled(snapped, height, width)
-    elif (height, width) != frame.field.shape:
+    elif (height, width) != snapped.size:
         snapped = _at_full_size(image, frame, best, pitch)
     return FrameProposal(
         "unsure" if reason else "proposed",
@@ -468,9 +560,7 @@ def _at_full_size(
     """A camera drawn once more onto the paint of the picture as it is; where that says otherwise,
     as it was found in the small one."""
     height, width = image.shape[:2]
-    size = (width, height)
-    grass = cv2.resize(frame.field.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
-    reading = read_picture(image, grass.astype(np.bool_))
+    reading = read_picture(image, _field_at(frame, width, height))
     found = scaled(best.snapped, height, width)
     last = _snap(reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known)
     return last if last.reason is None else found

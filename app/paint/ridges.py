@@ -17,6 +17,7 @@ from app.paint.grass_colour import grass_colour
 from app.paint.ridge_kernels import ridge_strength, thin_ridges
 
 Image = npt.NDArray[np.uint8]
+Strength = npt.NDArray[np.float32]
 
 WORK_WIDTH = 960
 """Pixels: wider pictures are looked at in this width, where a line is a few pixels broad."""
@@ -43,16 +44,22 @@ def line_like(image: Image, field: BoolArray) -> BoolArray:
         Shape (H, W). In a picture wider than ``WORK_WIDTH`` the pixels do not touch: there is
         one for each pixel of the smaller picture.
     """
+    return np.asarray(line_strength(image, field) > 0)
+
+
+def line_strength(image: Image, field: BoolArray) -> Strength:
+    """The same with the strength of each pixel, grey levels per square pixel; 0 elsewhere."""
     height, width = field.shape
+    full = np.zeros((height, width), np.float32)
     if not field.any():
-        return np.zeros((height, width), np.bool_)
+        return full
     small, inside = _work_size(image, field)
     thin = _thin_lines(small, inside, small.shape[1] / WORK_WIDTH)
     if small.shape[:2] == (height, width):
         return thin
     rows, columns = np.nonzero(thin)
-    full = np.zeros((height, width), np.bool_)
-    full[_scaled(rows, height, len(small)), _scaled(columns, width, small.shape[1])] = True
+    to = _scaled(rows, height, len(small)), _scaled(columns, width, small.shape[1])
+    full[to] = thin[rows, columns]
     return full
 
 
@@ -72,8 +79,8 @@ def _scaled(places: npt.NDArray[np.int64], size: int, small: int) -> npt.NDArray
     return np.asarray(((places + 0.5) * size / small).astype(np.int64))
 
 
-def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> BoolArray:
-    """As ``line_like``, for a picture in which lengths are ``unit`` times those above."""
+def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Strength:
+    """As ``line_strength``, for a picture in which lengths are ``unit`` times those above."""
     grass = np.empty(inside.shape, np.uint8)
     grass_colour(image, grass)
     # Paint is bright in all channels; shirts and boards rarely are.
@@ -92,8 +99,7 @@ def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Boo
     line = lengths >= LEAST_LENGTH_PX * unit
     line &= stats[:, cv2.CC_STAT_AREA] <= np.maximum(BROADEST_PX * unit, 3.5) * lengths
     line[0] = False
-    found: BoolArray = line[labels] & (thin > 0)
-    return found
+    return np.where(line[labels] & (thin > 0), strength, np.float32(0.0))
 
 
 def _percentile(strength: npt.NDArray[np.float32], inside: npt.NDArray[np.uint8]) -> float:

@@ -153,6 +153,7 @@ def write_recording(
     seconds: float = RECORDING_SECONDS,
     seed: int = SEED,
     parts: Sequence[Part] | None = None,
+    since: float = 0.0,
     progress: ReportProgress | None = None,
 ) -> RecordingReport:
     """Write a recording, and ``<stem>.json`` with its truth beside it.
@@ -164,6 +165,7 @@ def write_recording(
         seconds: How long it is, ``SHORTEST_RECORDING`` or more.
         seed: Whole number from 0; another one gives another play.
         parts: What it shows instead; a replay needs a live shot before it that is as long as what it shows.
+        since: How long play has gone on when it begins, seconds.
         progress: Called with (frames done, frames in all).
 
     Raises:
@@ -171,7 +173,7 @@ def write_recording(
     """
     if out.suffix.lower() not in (".mp4", ".avi", ".mkv"):
         raise InputError(f"{out.name} has no ending of a video", hint="Name it like film.mp4.")
-    play, shots = _planned(list(parts) if parts else parts_of(seconds), seed)
+    play, shots = _planned(list(parts) if parts else parts_of(seconds), seed, since)
     total = shots[-1].last + 1
     out.parent.mkdir(parents=True, exist_ok=True)
     part, truth = out.with_name(f".{out.stem}{PARTIAL}{out.suffix}"), out.with_suffix(".json")
@@ -184,7 +186,7 @@ def write_recording(
             if progress is not None:
                 progress(number + 1, total)
         video.release()
-        text = json_text(_truth(play, shots), compact=True)
+        text = json_text(_truth(play, shots, since), compact=True)
         truth.write_text(text + "\n", encoding="utf-8")
         part.replace(out)
     finally:
@@ -192,12 +194,12 @@ def write_recording(
     return RecordingReport(str(out), str(truth), total, total / FPS, len(shots))
 
 
-def _planned(parts: list[Part], seed: int) -> tuple[Play, list[_Taken]]:
+def _planned(parts: list[Part], seed: int, since: float) -> tuple[Play, list[_Taken]]:
     """The play of a recording, and the shots that show it."""
     bounds = [round(FPS * end) for end in accumulate((p.seconds for p in parts), initial=0.0)]
     soft = [*(SOFT.get(part.entered_by, 0) for part in parts), 0]
     numbers = shirt_numbers(np.random.default_rng([seed, MATCH, 0x21]))
-    play = make_play(bounds[-1] / FPS, seed, numbers)
+    play = make_play(since + bounds[-1] / FPS, seed, numbers)
     live: tuple[int, float, float] | None = None
     shots = []
     for number, (part, (begin, end)) in enumerate(zip(parts, pairwise(bounds), strict=True)):
@@ -205,14 +207,14 @@ def _planned(parts: list[Part], seed: int) -> tuple[Play, list[_Taken]]:
         if last < first:
             raise InputError(f"shot {number + 1} is no longer than the transitions beside it")
         is_replay = part.kind == "replay"
-        rate, start, source = REPLAY_FPS if is_replay else FPS, begin / FPS, None
+        rate, start, source = REPLAY_FPS if is_replay else FPS, since + begin / FPS, None
         if is_replay:
             if live is None:
                 raise InputError(f"shot {number + 1} replays, and no live shot is before it")
             source = live[0]
             start = _liveliest(play, *live[1:], part.seconds * part.speed)
         elif part.kind == "main":
-            live = number, first / FPS, last / FPS
+            live = number, since + first / FPS, since + last / FPS
         low, high = begin - soft[number] // 2, end + soft[number + 1] // 2
         lowest, highest = (
             math.floor((frame - begin) * part.speed * rate / FPS) for frame in (low, high)
@@ -382,14 +384,14 @@ def draw_logo(picture: Image, share: float, turn: int = 0) -> Image:
     return picture
 
 
-def _truth(play: Play, shots: list[_Taken]) -> dict[str, Any]:
+def _truth(play: Play, shots: list[_Taken], since: float) -> dict[str, Any]:
     """What is true of a recording, as JSON; times are seconds after its first frame."""
     frames, links = [], []
     for shot in shots:
         part = shot.part
         frames += [_frame_truth(play, shot, frame) for frame in range(shot.first, shot.last + 1)]
         if shot.source is not None:
-            offset = shot.start - part.speed * shot.begin / FPS
+            offset = shot.start - since - part.speed * shot.begin / FPS
             link = {"live": shot.source, "replay": shot.number}
             links.append({**link, "offset_s": offset, "speed": part.speed})
     return {

@@ -43,6 +43,8 @@ MOST_OFF, MOST_UNREST, LEAST_DISTANCE = 0.55, 0.72, 14.0
 distance; that distance, grey levels."""
 
 
+ALIKE = 30.0
+"""Of pictures before and after that may be of one restless shot, grey levels."""
 MOST_UNEVEN, MOST_OFF_MIXED = 0.25, 0.7
 """Of a dissolve: how far cells are from the mix of the whole, and what is no mix at all."""
 WORST_SCORE, MOST_LIT = 0.72, 0.25
@@ -276,8 +278,20 @@ class _Scene:
         unrest /= 2 * max(distance, 1.0)
         if distance < LEAST_DISTANCE or off > MOST_OFF or unrest > MOST_UNREST:
             return None
+        if kind == "wipe" and distance < ALIKE and not self._tears_more(frames, low, high):
+            return None
         score = self._score(frames.start, frames.stop - 1, off, low, high)
         return Transition(frames.start, frames.stop - 1, kind, score)
+
+    def _tears_more(self, frames: slice, low: int, high: int) -> bool:
+        """Whether more cells are torn than on either side: a camera that runs along with somebody tears some all the time."""
+        torn = self._rows["torn"].astype(np.int64)
+        most = float(np.percentile(torn[frames], 80))
+        sides = (
+            self._usual(torn, frames.start - self._lags[1], frames.start, low),
+            self._usual(torn, frames.stop + 1, frames.stop + self._lags[1], high),
+        )
+        return most > max(sides)
 
     def _score(self, first: int, last: int, off: float, low: int, high: int) -> float:
         """How badly an interval parts two shots: it is no mix of them, they change beside it, it is long."""

@@ -551,6 +551,14 @@ class TestPages:
                 found[f"cut off at {width}"] = soon(page, BEYOND_ITS_FRAME)
             assert {name: what for name, what in found.items() if what} == {}, path
 
+    def test_its_shots_are_fetched_as_a_table(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        with page.expect_download() as fetched:
+            page.get_by_role("link", name="All shots as CSV").click()
+        assert fetched.value.suggested_filename == "touchline-shots.csv"
+        rows = fetched.value.path().read_text().splitlines()
+        assert (len(rows), rows[1].split(",")[:4]) == (4, ["cup final", "1", "0", "39"])
+
     def test_their_keys_stand_in_the_help(self, recording: int, open_page: OpenPage) -> None:
         page = opened(open_page, recording)
         page.keyboard.press("?")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,12 @@ class TestRecordingOfTheSample:
         flown = [one.logo for one in found]
         assert flown[3] == flown[4] is not None
         assert flown.count(None) == len(flown) - 2
+
+    def test_who_runs_before_bare_grass_is_one_shot(self, tmp_path: Path) -> None:
+        """A long lens runs along with somebody, too fast to be followed, while other grass comes into view."""
+        write_recording(tmp_path / "film.mp4", parts=[Part("closeup", 5, "start")], since=27.0)
+        (shot,) = KnownRecording.open(tmp_path / "film.mp4").found_shots()
+        assert (shot.first, shot.last, shot.kind) == (0, 124, "closeup")
 
     def test_a_live_shot_is_tracked_with_the_cameras_that_took_it(
         self, known: KnownRecording

@@ -447,7 +447,10 @@ class _Run:
             media=tuple(self._images.media),
             verdicts=dict(sorted(self._verdicts.items())),
             overrides=tuple(self._overrides),
-            stamp=source.stamp(),
+            stamp={
+                **source.stamp(),
+                **({} if self.tracks is None else {"tracks": self.tracks.facts}),
+            },
         )
 
     def _records(self) -> Iterator[ExportRecord]:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from app.errors import InputError
 from app.features.tracks.codec import Correction, TrackInputs, inputs_digest, make_track
 from app.features.tracks.stretches import Shots, Stretch, gather_stretches, require_stretch
 from app.formats.export_record import ExportRecord
 from app.formats.tracks_writer import TrackRecord
+from app.geometry.arrays import FloatArray
 from app.soccer.policy import Policy
 from app.tracking.ball_track import BallTrack
 
@@ -43,6 +47,7 @@ class TrackSource:
         frozen: The tracks of a frozen version, by key: they are written as they are, and no others.
         everything: Whether rejected groups and tracks take part.
         try_only: Whether it is only asked if there are stretches.
+        facts: Gets what the manifest says of each stretch, as its track is made.
     """
 
     dataset: str
@@ -52,6 +57,7 @@ class TrackSource:
     frozen: Mapping[str, BallTrack] = field(default_factory=dict)
     everything: bool = False
     try_only: bool = False
+    facts: list[dict[str, Any]] = field(default_factory=list)
 
     def records(self, records: Iterable[ExportRecord]) -> Iterator[TrackRecord]:
         """The tracks of groups, in the order of their keys.
@@ -69,6 +75,7 @@ class TrackSource:
             found = self._record(stretch)
             if isinstance(found, str):
                 reasons.append(f"{stretch.key}: {found}")
+                self.facts.append({"stretch": stretch.key, "reason": found})
             else:
                 yield found
         if len(reasons) == len(stretches):
@@ -98,6 +105,46 @@ class TrackSource:
     def _made(self, stretch: Stretch, track: BallTrack, verdict: str) -> TrackRecord | str:
         if track.reason is not None:
             return track.reason
+        self.facts.append(_facts(stretch, track, verdict))
         return TrackRecord(
             stretch.key, track, stretch.pitch, stretch.rate, stretch.cameras, verdict
         )
+
+
+def _facts(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
+    """What a manifest says of a track."""
+    left, measured = track.left_out, stretch.measurements
+    return {
+        "stretch": stretch.key,
+        "verdict": verdict,
+        "frames": len(track.frames),
+        "states": {state: track.state.count(state) for state in sorted(set(track.state))},
+        "measurements": len(measured),
+        "contradicted": len(track.contradicted),
+        "not_measured": dict(stretch.unused),
+        "left_out_median_px": left and left.median_px,
+        "left_out_p95_px": left and left.p95_px,
+        "left_out_median_m": None if left is None else _median_metres(stretch, track, left.px),
+    }
+
+
+def _median_metres(stretch: Stretch, track: BallTrack, px: FloatArray) -> float | None:
+    """Median of left-out errors at the ball's distance, metres across the rays; None without one.
+
+    Args:
+        stretch: What was measured.
+        track: Made of all of it.
+        px: Error of each measurement, NaN where none was predicted, shape (M,).
+    """
+    measured, rows = stretch.measurements, stretch.measurements.frames - track.frames[0]
+    if len(px) != len(measured):
+        return None
+    places = track.position[rows]
+    known = np.flatnonzero(np.isfinite(px) & np.isfinite(places).all(axis=1))
+    metres = [
+        px[row]
+        * float(measured.cameras[row].pitch_to_camera(places[row][None])[0, 2])
+        / measured.cameras[row].focal_length[0]
+        for row in known.tolist()
+    ]
+    return float(np.median(metres)) if metres else None

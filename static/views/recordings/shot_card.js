@@ -15,7 +15,7 @@ import { JobProgress } from '../job_progress.js';
 /** @import {JobJson} from '../../api/jobs.js' */
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
 
-const ENTERED = { start: 'the beginning of the recording', cut: 'behind a cut', dissolve: 'behind a dissolve', wipe: 'behind a wipe', fade: 'behind a fade' };
+const ENTERED = { start: 'the beginning of the recording', cut: 'after a cut', dissolve: 'after a dissolve', wipe: 'after a wipe', fade: 'after a fade' };
 
 /** Finds all shots anew, and indexes what is not indexed as it is now. @param {{one: RecordingJson, label: string, before?: () => void, over?: () => void}} props */
 export function FindAgain({ one, label, before = () => {}, over = () => {} }) {
@@ -63,6 +63,7 @@ export function ShotCard({ one, shots, at, change, remember }) {
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${merge !== ''} title=${merge} onClick=${() => change(mergedWithNext(shots, at), 'Merged with the next shot.')}>Merge <kbd>M</kbd></button>
 			</div>
 			<${FindAgain} one=${one} label="Find all shots again" before=${remember} />
+			<p class="buttons">${/** @type {const} */ (['shots', 'links']).map((what) => html`<a key=${what} class="link" href=${`/api/v1/recordings/${one.id}/${what}.csv`} download>All ${what} as CSV</a>`)}</p>
 		</section>
 	`;
 }

@@ -71,6 +71,46 @@ class TestPropose:
         assert found.camera is not None
         assert np.linalg.norm(found.camera.position - true.position) < 2.0
 
+    def test_what_is_fainter_than_paint_makes_no_camera_unsure(
+        self, monkeypatch: pytest.MonkeyPatch
+    ):
+        picture = lawn(drawn(TRUE, 3)).astype(np.float64)
+        rng = np.random.default_rng(4)
+        for x, y in zip(rng.integers(0, 900, 200), rng.integers(100, 530, 200), strict=True):
+            picture[y : y + 2, x : x + rng.integers(30, 60)] += 30
+        blocks = np.clip(picture, 0, 255).astype(np.uint8)
+        found = propose(blocks)
+        assert found.outcome == "proposed" and found.agreement is not None
+        assert found.camera is not None and found.agreement.explained > 0.8
+        assert np.linalg.norm(found.camera.position - TRUE.position) < 0.5
+        monkeypatch.setattr("app.paint.propose.CLOSER", 0)
+        found = propose(blocks)
+        assert found.reason is not None and "looks like paint" in found.reason
+
+    def test_a_line_that_is_seen_in_the_picture_as_it_is_tells_the_position(
+        self, monkeypatch: pytest.MonkeyPatch
+    ):
+        size = ImageSize(1920, 1080)
+        true = looking((-0.9, 58.0, -14.0), (-2.0, -6.0, 0.0), 2304.0, size=size)
+        picture = np.full((size.height, size.width, 3), (48, 120, 50), np.float64)
+        for name, color, broad in (
+            ("Circle central", (225, 230, 225), 6),
+            ("Middle line", (225, 230, 225), 6),
+            ("Side line top", (140, 175, 140), 1),
+        ):
+            points = np.round(16 * project_markings(true, PITCH, size)[name]).astype(np.int32)
+            cv2.polylines(picture, [points], False, color, broad, cv2.LINE_AA, 4)
+        noise = np.random.default_rng(1).normal(0, 2, picture.shape)
+        image = (cv2.GaussianBlur(picture, (0, 0), 0.6) + noise).clip(0, 255).astype(np.uint8)
+        found = propose(image)
+        assert (found.outcome, found.reason) == ("proposed", None)
+        assert found.camera is not None and found.snapped is not None
+        assert found.snapped.size == (size.height, size.width)
+        assert np.linalg.norm(found.camera.position - true.position) < 1.0
+        monkeypatch.setattr("app.paint.propose.CLOSER", 0)
+        found = propose(image)
+        assert found.reason is not None and "where the camera stands" in found.reason
+
     def test_a_camera_stands_where_y_is_positive(self):
         found = propose(lawn(drawn(TRUE, 3)))
         assert found.outcome == "proposed"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from app.paint.ridges import line_like
+from app.paint.ridges import line_like, line_strength
 from tests.unit.paint.test_grass import CROWD, GRASS, picture
 
 
@@ -29,6 +30,18 @@ class TestLineLike:
         found = line_like(noisy(image), np.ones((300, 960), np.bool_))
         assert not found[:110].any()
         assert not found[170:210, 290:322].any()
+
+    def test_bright_paint_is_stronger_than_a_faint_stripe(self):
+        image = picture(GRASS, 300, 960)
+        image[149:152, 100:700] = 225
+        image[220:223, 100:700] += 12
+        image, field = noisy(image), np.ones((300, 960), np.bool_)
+        found = line_strength(image, field)
+        assert np.median(found[150, 110:690]) > 5 * np.max(found[221, 110:690]) > 0
+        assert ((found > 0) == line_like(image, field)).all()
+        large = np.repeat(np.repeat(image, 2, axis=0), 2, axis=1)
+        seen = line_strength(large, np.ones((600, 1920), np.bool_))
+        assert np.median(seen[seen > 0]) == pytest.approx(np.median(found[found > 0]), rel=0.2)
 
     def test_nothing_is_found_where_no_field_is(self):
         image = noisy(picture(GRASS, 90, 160))

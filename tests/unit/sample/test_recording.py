@@ -133,6 +133,17 @@ class TestWriteRecording:
         assert films[0] == films[1] != films[2]
         assert truths[0] == truths[1] != truths[2]
 
+    def test_play_that_has_gone_on_goes_on(self, tmp_path: Path) -> None:
+        parts = [Part("main", 1.2, "start"), Part("replay", 0.4, "cut", 0.5)]
+        write_recording(tmp_path / "film.mp4", parts=parts, since=30.0)
+        truth = json.loads((tmp_path / "film.json").read_text(encoding="utf-8"))
+        (link,) = truth["links"]
+        for row in truth["each"]:
+            shown = row["frame"] / FPS
+            if row["shot"] == 1:
+                shown = link["offset_s"] + link["speed"] * shown
+            assert row["play_s"] == pytest.approx(30.0 + shown, abs=1e-9)
+
     def test_a_blended_replay_mixes_its_pictures(self, tmp_path: Path) -> None:
         parts = [Part("main", 1.2, "start"), Part("replay", 0.8, "cut", 0.25, 1, "blend")]
         write_recording(tmp_path / "film.avi", parts=parts)
