@@ -12,6 +12,10 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 
+_SLOWEST, _FASTEST = 0.02, 1.4
+"""Speeds of replays that people may mean."""
+_UNSURE = 0.25
+"""Standard deviation of a speed, of the live shot's, beyond which it is unknown."""
 _CHANGE = 15.0
 """Sum of squares of residuals, in frames, that a change of the speed has to explain."""
 
@@ -84,20 +88,47 @@ def map_of_instants(
         return TimeMap("No instant is linked yet.", by_hand=True)
     rows = instants[np.argsort(instants[:, 1], kind="stable")]
     if np.ptp(rows[:, 1]) == 0:
-        speed = 1.0 if assumed_speed is None else assumed_speed
-        offset = float((rows[:, 0] - speed * rows[:, 1]).mean())
-        reason = f"Instants of one frame of the replay do not tell its speed; {speed:g} is assumed."
-        return TimeMap(reason, offset, speed, by_hand=True)
+        return _assumed(
+            rows, assumed_speed, "Instants of one frame of the replay do not tell its speed"
+        )
     pieces = _pieces(rows, frame_s)
     if any(piece.speed is None or piece.speed <= 0 for piece in pieces):
         return TimeMap(
             "The instants given run backwards: later in the replay is earlier live.", by_hand=True
         )
+    for piece in pieces:
+        speed, sigma = piece.speed or 0.0, _speed_sigma(piece)
+        if sigma > _UNSURE:
+            reason = (
+                f"The instants near {piece.first:.2f} s are too close together to tell the speed "
+                f"({speed:.2g} ± {sigma:.2g}); link one farther away"
+            )
+            if len(pieces) == 1:
+                return _assumed(rows, assumed_speed, reason)
+            reason = f"{reason}."
+        elif not _SLOWEST <= speed <= _FASTEST:
+            reason = (
+                f"The instants make the replay run at {speed:.2g} times the live speed: check them."
+            )
+        else:
+            continue
+        return TimeMap(reason, by_hand=True)
     if len(pieces) == 1:
         return pieces[0]
     changes = " and ".join(f"{piece.first:.2f} s" for piece in pieces[1:])
     reason = f"One offset and speed do not fit the whole replay: they change near {changes}."
     return TimeMap(reason, by_hand=True, pieces=tuple(pieces))
+
+
+def _assumed(rows: FloatArray, assumed_speed: float | None, why: str) -> TimeMap:
+    """The map of instants at a speed that is assumed, with the reason why."""
+    speed = 1.0 if assumed_speed is None else assumed_speed
+    offset = float((rows[:, 0] - speed * rows[:, 1]).mean())
+    return TimeMap(f"{why}; {speed:g} is assumed.", offset, speed, by_hand=True)
+
+
+def _speed_sigma(piece: TimeMap) -> float:
+    return 0.0 if piece.covariance is None else float(np.sqrt(piece.covariance[1, 1]))
 
 
 def _pieces(rows: FloatArray, frame_s: float) -> list[TimeMap]:

@@ -538,6 +538,7 @@ class TestPages:
         for path, waited in (
             (f"/recordings/{recording}", ".film__shot img"),
             ("/recordings", ".table tbody tr"),
+            (f"/recordings/{recording}?frame={LONG}", "#link-other"),
             (link, ".linking__side img"),
         ):
             page.goto(path)

@@ -183,11 +183,12 @@ def take_instants(
 
 
 def _linked_views(store: Store, recording: Recording, numbers: Sequence[int]) -> _LinkedViews:
-    """The frames of all linked replays that show what live frames show; those of usable links alone."""
+    """The frames of all linked replays that show what live frames show; of links whose speed is known, not
+    assumed."""
     found = _LinkedViews()
     for link in list_links(store, recording.id):
         asked = [number for number in numbers if number in link.live.frames]
-        if link.live.recording != recording.id or not link.map.is_usable or not asked:
+        if link.live.recording != recording.id or link.map.outcome != "linked" or not asked:
             continue
         replay = get_recording(store, link.replay.recording)
         index = read_index(store.settings, replay.require_readable())
@@ -200,6 +201,7 @@ def _linked_views(store: Store, recording: Recording, numbers: Sequence[int]) ->
                 continue
             told = {
                 "link": link.id,
+                "sigma_s": link.map.sigma_s,
                 "live_frame": number,
                 "off_s": same.off_s[number - same.first],
                 "repeated": frame in same.repeated,

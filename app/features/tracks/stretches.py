@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -94,8 +95,7 @@ def frame_of(key: str) -> int | None:
 def instant_of(group: Group) -> tuple[Instant, bool] | None:
     """When a group was, and whether a recording says so; None where nothing does."""
     for view in group.views:
-        found = view.extras.metadata.get("recording")
-        if isinstance(found, Mapping):
+        if (found := _taken_from(view)) and "link" not in found:
             try:
                 frame, seconds = int(found["frame"]), float(found["seconds"])
             except (KeyError, TypeError, ValueError):
@@ -109,20 +109,24 @@ def instant_of(group: Group) -> tuple[Instant, bool] | None:
 
 @dataclass
 class _Row:
-    """What one group gives."""
+    """What one group gives.
+
+    Attributes:
+        observations: Name of a view, its time, and what it measures.
+    """
 
     instant: Instant
     pitch: Pitch
-    observations: list[tuple[str, BallObservation]]
+    observations: list[tuple[str, float, BallObservation]]
     point: tuple[float, float, float] | None
     cameras: dict[str, Camera]
+    unused: Counter[str]
 
 
 @dataclass
 class _Match:
     recorded: bool
     rows: list[_Row] = field(default_factory=list)
-    unused: Counter[str] = field(default_factory=Counter)
 
 
 def gather_stretches(
@@ -143,7 +147,7 @@ def gather_stretches(
             continue
         instant, recorded = found
         match = matches.setdefault(record.group.match, _Match(recorded))
-        match.rows.append(_row(record, instant, match.unused, known))
+        match.rows.append(_row(record, instant, known))
     stretches = []
     for name, match in sorted(matches.items()):
         match.rows.sort(key=lambda row: row.instant.frame)
@@ -165,10 +169,8 @@ def require_stretch(dataset: str, stretches: Sequence[Stretch]) -> None:
         )
 
 
-def _row(
-    record: ExportRecord, instant: Instant, unused: Counter[str], known: dict[bytes, Camera]
-) -> _Row:
-    group, solution = record.group, record.solution
+def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> _Row:
+    group, solution, unused = record.group, record.solution, Counter[str]()
     views, calibrations = [], []
     cameras = {}
     for view in group.views:
@@ -183,20 +185,38 @@ def _row(
         if not view.included:
             unused["view left out"] += ball
             continue
+        if _taken_from(view).get("repeated"):
+            unused["frame that shows the one before once more"] += ball
+            continue
         views.append(view)
         # A static camera's equal values are one object, so that a solver sees six and not thousands.
         calibrations.append(replace(solved.calibration, camera=camera))
-    names = {view.key: _name_of(view) for view in views}
-    observations = ball_observations(views, calibrations)
-    named = [(names[item.view], item) for item in observations]
-    return _Row(instant, group.pitch, named, record.point, cameras)
+    by_key = {view.key: view for view in views}
+    observations = [
+        (_name_of(by_key[item.view]), instant.time + _later(by_key[item.view]), item)
+        for item in ball_observations(views, calibrations)
+    ]
+    return _Row(instant, group.pitch, observations, record.point, cameras, unused)
+
+
+def _taken_from(view: View) -> Mapping[str, Any]:
+    """Which frame of which recording a view shows; empty where it is of none."""
+    found = view.extras.metadata.get("recording")
+    return found if isinstance(found, Mapping) else {}
 
 
 def _name_of(view: View) -> str:
-    """What a view is called through a stretch: its recording, or its camera."""
-    found = view.extras.metadata.get("recording")
-    name = found.get("name") if isinstance(found, Mapping) else None
-    return view.key if name is None else str(name)
+    """What a view is called through a stretch: its recording, of a replay with its link, or its camera."""
+    found = _taken_from(view)
+    if "name" not in found:
+        return view.key
+    return f"{found['name']} link {found['link']}" if "link" in found else str(found["name"])
+
+
+def _later(view: View) -> float:
+    """Live seconds by which a frame of a replay is later than the instant that it was taken for."""
+    off = _taken_from(view).get("off_s")
+    return float(off) if isinstance(off, (int, float)) else 0.0
 
 
 def _bytes_of(camera: Camera) -> bytes:
@@ -243,6 +263,7 @@ def _stretch(key: str, name: str, rows: Sequence[_Row], match: _Match, policy: P
     frames = np.arange(numbers[0], numbers[-1] + 1)
     span = float(seconds[-1] - seconds[0])
     cameras: dict[str, dict[int, Camera]] = {}
+    unused = sum((row.unused for row in rows), Counter[str]())
     for row in rows:
         for view, camera in row.cameras.items():
             cameras.setdefault(view, {})[row.instant.frame] = camera
@@ -257,21 +278,21 @@ def _stretch(key: str, name: str, rows: Sequence[_Row], match: _Match, policy: P
         measurements=_measurements(rows, policy),
         groups={row.instant.frame: row.instant.key for row in rows},
         cameras=cameras,
-        unused={reason: number for reason, number in match.unused.items() if number},
+        unused={reason: number for reason, number in unused.items() if number},
     )
 
 
 def _measurements(rows: Sequence[_Row], policy: Policy) -> BallMeasurements:
-    found = [(row, name, item) for row in rows for name, item in row.observations]
-    observations = [item for _, _, item in found]
-    points = np.array([_rough(item, row.point) for row, _, item in found]).reshape(-1, 3)
+    found = [(row, name, time, item) for row in rows for name, time, item in row.observations]
+    observations = [item for *_, item in found]
+    points = np.array([_rough(item, row.point) for row, _, _, item in found]).reshape(-1, 3)
     spread = ray_covariances(observations, points, policy) if found else np.zeros((0, 2, 2))
     sizes = np.array([item.diameter_px or np.nan for item in observations])
     share = np.hypot(policy.box_sigma_share * sizes, policy.click_sigma_px)
     return BallMeasurements(
-        np.array([row.instant.frame for row, _, _ in found], dtype=np.int64),
-        np.array([row.instant.time for row, _, _ in found], dtype=float),
-        tuple(name for _, name, _ in found),
+        np.array([row.instant.frame for row, *_ in found], dtype=np.int64),
+        np.array([time for _, _, time, _ in found], dtype=float),
+        tuple(name for _, name, _, _ in found),
         np.array([[*item.center] for item in observations], dtype=float).reshape(-1, 2),
         np.sqrt(np.trace(spread, axis1=1, axis2=2) / 2),
         tuple(item.camera for item in observations),

@@ -35,7 +35,7 @@ function madeText({ new: made, changed, unchanged, linked_views: views, outside 
 export function InstantsCard({ one, shot, instants, links }) {
 	const [propose, setPropose] = useState(true);
 	const [linked, setLinked] = useState(true);
-	const usable = links.filter(({ live, map }) => live.recording === one.id && ['offset', 'linked'].includes(map.outcome)).length;
+	const usable = links.filter(({ live, map }) => live.recording === one.id && map.outcome === 'linked').length;
 	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
 	const { error, attempt } = useAttempt();
 	const { chosen } = instants;

@@ -38,6 +38,19 @@ class TestMapOfInstants:
         assert made.sigma_at(0.0) == made.sigma_at(4.0) == pytest.approx(STEP)
         assert made.sigma_at(2.0) == pytest.approx(STEP / np.sqrt(2))
 
+    def test_two_that_are_close_together_tell_no_speed(self) -> None:
+        made = made_of([(2.0, 0.0), (2.12, 0.04)], 0.5)
+        assert (made.speed, made.offset) == pytest.approx((0.5, 2.05))
+        assert "too close together to tell the speed (3 ± 1.4)" in (made.reason or "")
+        assert "0.5 is assumed" in (made.reason or "")
+
+    def test_no_replay_is_much_faster_than_what_it_shows(self) -> None:
+        made = made_of([(2.0, 0.0), (14.0, 4.0)])
+        assert made.speed is None
+        assert (
+            made.reason == "The instants make the replay run at 3 times the live speed: check them."
+        )
+
     def test_more_are_fitted_and_inaccuracy_of_a_frame_is_no_change_of_speed(self) -> None:
         random = np.random.default_rng(1)
         times = np.linspace(0, 8, 9)

@@ -265,9 +265,17 @@ def test_a_person_mends_a_frame_and_shot_and_groups_follow(
 
 
 def test_views_of_linked_replays_are_frames_of_their_shot(
-    app: Any, api: Any, recording: str, found: Recording, finished: Finished, tracker: Tracker
+    app: Any,
+    api: Any,
+    recording: str,
+    found: Recording,
+    finished: Finished,
+    tracker: Tracker,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     store: Store = app.state.services.store
+    # So few frames would tell no speed.
+    monkeypatch.setattr("app.tracking.time_map._UNSURE", 1.0)
     put_shots(
         store,
         found.id,

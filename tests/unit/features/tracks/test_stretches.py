@@ -92,6 +92,32 @@ class TestGatherStretches:
         assert stretches[0].rate == pytest.approx(50)
         assert stretches[0].times[0] == 10
 
+    def test_a_linked_view_is_one_of_its_own_at_its_own_time(self) -> None:
+        group = flight_groups(1)[0]
+        told = {"name": "final", "seconds": 90.0, "link": 3, "off_s": 0.015, "repeated": False}
+        one, two, three = (
+            replace(view, key=f"{at}.png", extras=Extras(metadata={"recording": said}))
+            for at, view, said in zip(
+                (100, 4000, 4001),
+                group.views,
+                (
+                    {"name": "final", "frame": 100, "seconds": 12.0},
+                    {**told, "frame": 4000},
+                    {**told, "frame": 4001, "repeated": True},
+                ),
+                strict=False,
+            )
+        )
+        linked = replace(group, key="final/100.png", match="final", views=(one, two, three))
+        stretch = only(gather_stretches([record(linked)], PAPER))
+        assert stretch.measurements.views == ("final", "final link 3")
+        assert stretch.measurements.times.tolist() == [12.0, 12.015]
+        assert {name: list(by_frame) for name, by_frame in stretch.cameras.items()} == {
+            "final": [100],
+            "final link 3": [100],
+        }
+        assert stretch.unused == {"frame that shows the one before once more": 1}
+
     def test_a_recording_without_shots_is_cut_at_long_gaps(self) -> None:
         numbers = [0, 10, 20, 400, 410]
         groups = [recorded(item, n) for item, n in zip(flight_groups(5), numbers, strict=True)]
