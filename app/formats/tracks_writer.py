@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -141,7 +142,8 @@ def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
         (folder / BALL).write_text("".join(lines), encoding="utf-8")
         lines = [csv_line(EVENT_COLUMNS), *map(csv_line, _event_rows(record))]
         (folder / EVENTS).write_text("".join(lines), encoding="utf-8")
-        _write_parquet(folder / "ball.parquet", record)
+        if find_spec("pyarrow") is not None:
+            _write_parquet(folder / "ball.parquet", record)
         counts["tracks"] += 1
         counts["frames"] += len(track.frames)
         counts["balls"] += int(record.there.sum())
@@ -254,4 +256,5 @@ def _write_parquet(path: Path, record: TrackRecord) -> None:
             "cameras": pyarrow.array([list(names) for names in track.views], pyarrow.list_(text)),
         }
     )
+    table = table.replace_schema_metadata({"verdict": record.verdict})
     parquet.write_table(table, path, compression="zstd")

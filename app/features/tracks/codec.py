@@ -103,7 +103,9 @@ def corrected(track: BallTrack, corrections: Sequence[Correction]) -> BallTrack:
             events = [event for event in events if id(event) not in gone]
         elif not near and row is not None and np.isfinite(track.position[row]).all():
             time = float(track.times[row])
-            events.append(BallEvent(item.frame, time, item.kind, track.position[row], 0.0))
+            # People see an event in a frame, and not when between two of them.
+            half = float(np.median(np.diff(track.times))) / 2 if len(track.times) > 1 else 0.0
+            events.append(BallEvent(item.frame, time, item.kind, track.position[row], half))
     return replace(track, events=tuple(sorted(events, key=lambda event: event.time_s)))
 
 

@@ -78,6 +78,13 @@ class TestWriteTracks:
             "x_m": "1.5", "y_m": "-2.0", "z_m": "-0.11", "sigma_s": "0.01",
         }  # fmt: skip
 
+    def test_without_pyarrow_there_is_no_parquet_and_all_else(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.formats.tracks_writer.find_spec", lambda name: None)
+        assert write_tracks(tmp_path, [record()])["tracks"] == 1
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["ball.csv", "events.csv"]
+
     def test_parquet_has_covariance_velocity_and_mode(self, tmp_path: Path) -> None:
         write_tracks(tmp_path, [record()])
         found = pq.read_table(tmp_path / "ball.parquet").to_pylist()
