@@ -19,7 +19,7 @@ import { follow } from './jobs.js';
  * @property {number} size bytes
  * @property {number} bytes how many the server has
  * @property {'queued' | 'sending' | 'waiting' | 'half' | 'here' | 'refused' | 'added'} state waiting: the server is away; half: its file has to be chosen again
- * @property {string} error why it was refused
+ * @property {string} error why it was refused, or waits
  * @property {string | null} id of the upload, once the server knows it
  * @property {number | null} left seconds until all is there, where that can be told
  * @property {File | null} file
@@ -144,7 +144,7 @@ async function allOf(file, tell, over) {
 				since = { at: performance.now(), bytes: found.bytes };
 			}
 			const { id, bytes, size } = found;
-			tell({ id, bytes, state: 'sending' });
+			tell({ id, bytes, state: 'sending', error: '' });
 			if (bytes === size) return found;
 			const part = file.slice(bytes, bytes + PART);
 			found = await sendPart(id, bytes, part, (share) => moved(bytes + Math.round(share * part.size)), over);
@@ -152,7 +152,8 @@ async function allOf(file, tell, over) {
 		} catch (error) {
 			if (!(error instanceof ApiError) || !PASSING.includes(error.status)) throw error;
 			await readable(file);
-			tell({ state: 'waiting' });
+			// Behind status 0 there is no answer: the server or the way to it is away.
+			tell({ state: 'waiting', error: error.status ? sentenceOf(error) : '' });
 			await rest(pause, over);
 			pause = Math.min(2 * pause, LONGEST_PAUSE);
 			found = null;

@@ -222,8 +222,13 @@ def change_track(
         NotFoundError: There is no such track.
         StaleRevisionError: Somebody changed it meanwhile, or it was made anew.
         ConflictError: It is accepted though it is stale, or though there is none.
-        InputError: A correction is outside of the stretch.
+        InputError: Nothing is changed, or a correction is outside of the stretch.
     """
+    if change.verdict is None and change.corrections is None:
+        raise InputError(
+            "this changes nothing of the track",
+            hint="Send a verdict, with a note where there is something to say, or corrections.",
+        )
     with store.write() as session:
         track, _ = _read(session, track_id)
         require_etag(track.etag, if_match, f'the track "{track.key}"')
@@ -235,9 +240,12 @@ def change_track(
         if change.verdict is not None:
             if change.verdict == "accepted":
                 _require_acceptable(track)
-            said = None if change.verdict == "none" else change.verdict
-            values |= {"verdict": said, "note": checked_note(change.note or ""), "judged_by": actor}
-            values["judged_at"] = now()
+            if change.verdict == "none":
+                values |= dict.fromkeys(("verdict", "note", "judged_by", "judged_at"))
+            else:
+                note = checked_note(change.note or "")
+                values |= {"verdict": change.verdict, "note": note, "judged_by": actor}
+                values["judged_at"] = now()
         update_track(session, track_id, **values)
         did = f"track {change.verdict}" if change.verdict else "track corrected"
         add_audit_event(session, actor, did, track.dataset_id, track=track_id, name=track.key)

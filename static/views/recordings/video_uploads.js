@@ -25,7 +25,7 @@ function sentence({ state, bytes, size, error, dataset, left }) {
 	const then = dataset ? ` Then it becomes a recording of ${dataset}.` : '';
 	if (state === 'refused') return error;
 	if (state === 'half') return `${share} are there. Choose the file again to go on; else it is deleted ${plural(uploadDays.value, 'day')} after its last part.`;
-	if (state === 'waiting') return `The server cannot be reached. ${share} are there; it goes on by itself.${then}`;
+	if (state === 'waiting') return `${error || 'The server cannot be reached.'} ${share} are there; it goes on by itself.${then}`;
 	if (state === 'sending') return `${share}${left === null ? '' : `, ${left < 90 ? 'about a minute' : `${Math.round(left / 60)} minutes`} left`}.${then}`;
 	if (state === 'queued') return `${sizeText(size)}.${then}`;
 	return `${sizeText(size)}.`;

@@ -144,7 +144,10 @@ class TestChangeTrack:
         with store.read() as session:
             deeds = [entry.body for entry in read_log(session) if entry.kind == "deed"]
         assert deeds[-1]["did"] == "track accepted"
-        assert change(store, TrackChange("none")).verdict is None
+        back = change(store, TrackChange("none"))
+        assert (back.verdict, back.note, back.judged_by, back.judged_at) == (None, None, None, None)
+        with pytest.raises(InputError, match="changes nothing"):
+            change(store, TrackChange(note="a word"))
 
     def test_a_stale_one_is_not_accepted(self, store, flight) -> None:
         make(store)
