@@ -259,6 +259,6 @@ def _of_groups(
                 told: Any = (view.extras.metadata or {}).get("recording")
                 if not isinstance(told, dict) or told.get("sha256") != sha256:
                     continue
-                centers = [ball.center for ball in view.balls if not ball.inferred]
-                if centers and centers[0] is not None:
-                    yield told["frame"], ((centers[0].x, centers[0].y), view.station.given)
+                ball = view.ball if view.included else None
+                if ball is not None and ball.center is not None and not ball.inferred:
+                    yield told["frame"], ((ball.center.x, ball.center.y), view.station.given)
