@@ -118,6 +118,9 @@ def _facts(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
         "stretch": stretch.key,
         "verdict": verdict,
         "frames": len(track.frames),
+        "frames_a_second": stretch.rate,
+        # Groups of a rig are numbered and say no time.
+        "rate": "assumed" if stretch.key == stretch.match else "of the recording",
         "states": {state: track.state.count(state) for state in sorted(set(track.state))},
         "measurements": len(measured),
         "contradicted": len(track.contradicted),
