@@ -137,7 +137,9 @@ def _issia(issia: Issia | None) -> Iterator[str]:
     yield from """
 *Comparable:* the counts. *Not comparable:* the last row, whose detector is simulated as above; it says that with a size noise of
 7 % ISSIA's far cameras are as hard as SoccerNet's. ISSIA annotates points, so there are no loose boxes to learn from, and
-no row for a detector that learnt from them.""".splitlines()
+no row for a detector that learnt from them.
+
+The paper leaves time to future work; what one track over all of ISSIA brings stands in [Ball](ball.md#tracks-of-issia).""".splitlines()
 
 
 def _sensitivity(study: Study) -> Iterator[str]:
