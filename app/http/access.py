@@ -23,7 +23,8 @@ from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins
 from app.features.people.roles import DatasetRoles, require_scope
 from app.features.people.visibility_queries import EVERYTHING, READER, Visibility
-from app.http.headers import bearer_of, cookie_of
+from app.http.cookies import read_cookie
+from app.http.headers import bearer_of
 from app.http.permissions import (
     OwnedMention,
     RequestSubject,
@@ -90,7 +91,7 @@ class Access:
             NotLoggedInError: Nobody's.
             TooManyTriesError: Nobody's, with one of many tokens that are none.
         """
-        if bearer_of(scope) is None and not cookie_of(scope, self._team.cookie):
+        if bearer_of(scope) is None and not read_cookie(scope, self._team.cookie):
             raise _not_logged_in()
         login = self._login_at_once(scope)
         if login is None:
@@ -159,14 +160,14 @@ class Access:
         if bearer_of(scope) is not None:
             return None
         with suppress(StorageError):
-            return self._team.logins.find(cookie_of(scope, self._team.cookie) or "", at_once=True)
+            return self._team.logins.find(read_cookie(scope, self._team.cookie) or "", at_once=True)
         return None
 
     def _look_up(self, scope: Scope) -> Login:
         bearer = bearer_of(scope)
         if bearer is not None:
             return self._team.login_with(bearer, Request(scope))
-        login = self._team.logins.find(cookie_of(scope, self._team.cookie) or "")
+        login = self._team.logins.find(read_cookie(scope, self._team.cookie) or "")
         if login is None:
             raise _not_logged_in()
         return login

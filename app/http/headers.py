@@ -1,10 +1,9 @@
-"""Headers of security, the session cookie, and tokens in requests."""
+"""Headers of security, and tokens in requests."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import quote
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -61,19 +60,6 @@ class SecurityHeaders:
             await send(message)
 
         await self.app(scope, receive, send_with_headers)
-
-
-def cookie_of(scope: Scope, name: str) -> str | None:
-    """The value of one cookie; None where there is none, or two that could be meant."""
-    sent = Headers(scope=scope).getlist("cookie")
-    found = re.findall(rf"(?:^|;)\s*{re.escape(name)}=([^;]*)", ";".join(sent))
-    if len(found) != 1:
-        return None
-    try:
-        morsel = SimpleCookie(f"{name}={found[0]}").get(name)
-    except CookieError:
-        return None
-    return None if morsel is None else morsel.value
 
 
 SCHEME = 'Bearer realm="Touchline", error="invalid_token"'

@@ -13,12 +13,12 @@ from fastapi.openapi.utils import get_fields_from_routes, get_openapi
 from pydantic import BaseModel
 from starlette.responses import JSONResponse
 
+from app.http.cookies import SESSION
 from app.http.event_schemas import EVENTS
 from app.http.permissions import Action, Where, may
 from app.http.problem import Problem
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
 from app.http.route import Route, routes_of
-from app.http.team import NAME
 
 Schema = Mapping[str, Any]
 _DEEP = 12
@@ -333,7 +333,7 @@ SCHEMES: dict[str, Any] = {
     "session": {
         "type": "apiKey",
         "in": "cookie",
-        "name": NAME,
+        "name": SESSION,
         "description": "The session of a person who has logged in on a server of a team, set by"
         " `POST /api/v1/session`; `__Host-` stands before its name if the server is reached by "
         "TLS. A"

@@ -21,17 +21,18 @@ from app.features.people.second_factor import SecondFactors
 from app.features.people.sign_on import LASTS as BEGUN_LASTS
 from app.features.people.sign_on import SignOn
 from app.features.people.sign_on_rules import read_rules
-from app.http.headers import cookie_of
+from app.http.cookies import (
+    DEVICE,
+    PASSKEY,
+    SESSION,
+    SIGN_ON,
+    cookie_name,
+    cookie_values,
+    read_cookie,
+)
 from app.http.tries import Tries
 from app.mail import MailServer, read_mail_server
 
-NAME = "touchline_session"
-ASKER = "touchline_passkey"
-"""The cookie that says which browser was asked to sign with a passkey."""
-BEGUN = "touchline_sign_on"
-"""The cookie that says which browser was sent to the provider of single sign-on."""
-DEVICE = "touchline_device"
-"""The cookie by which a browser is known in which somebody has logged in before."""
 LANDING = "/login"
 """The page to which the provider sends people back."""
 
@@ -95,21 +96,20 @@ class Team:
 
     @property
     def cookie(self) -> str:
-        """Name of the cookie. With the prefix browsers refuse one that was set by another name, or
-        without TLS."""
-        return self._cookie_name(NAME)
+        """Name of the cookie of a session."""
+        return self._cookie_name(SESSION)
 
     def cookie_values(self, token: str | None) -> dict[str, Any]:
         """How the cookie of a token is set; None: how it is taken back."""
-        return self._values(NAME, token or "", int(LASTS.total_seconds()) if token else 0)
+        return self._values(SESSION, token or "", int(LASTS.total_seconds()) if token else 0)
 
     def asker(self, request: Request) -> str:
         """What a browser alone knows that was asked to sign with a passkey; empty: it was not."""
-        return cookie_of(request.scope, self._cookie_name(ASKER)) or ""
+        return read_cookie(request.scope, self._cookie_name(PASSKEY)) or ""
 
     def asker_values(self, asker: str) -> dict[str, Any]:
         """How it is told that."""
-        return self._values(ASKER, asker, int(CHALLENGE_LASTS.total_seconds()))
+        return self._values(PASSKEY, asker, int(CHALLENGE_LASTS.total_seconds()))
 
     def count_try(self, request: Request, name: str | None = None) -> None:
         """Count that somebody asks whether a password is right.
@@ -118,7 +118,7 @@ class Team:
             TooManyTriesError: There were too many.
         """
         device = None
-        if name is not None and (token := cookie_of(request.scope, self._device_cookie(name))):
+        if name is not None and (token := read_cookie(request.scope, self._device_cookie(name))):
             device = self.devices.recognise(name, token)
         self.tries.count(self.address(request), name, device)
 
@@ -132,11 +132,11 @@ class Team:
 
     def begun(self, request: Request) -> str:
         """What a browser alone knows that was sent to the provider; empty: it was not."""
-        return cookie_of(request.scope, self._cookie_name(BEGUN)) or ""
+        return read_cookie(request.scope, self._cookie_name(SIGN_ON)) or ""
 
     def begun_values(self, asker: str | None) -> dict[str, Any]:
         """How it is told that; None: how it is taken back."""
-        return self._values(BEGUN, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0)
+        return self._values(SIGN_ON, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0)
 
     def landing(self, request: Request) -> str:
         """The address to which the provider sends people back."""
@@ -175,15 +175,14 @@ class Team:
         )
 
     def _cookie_name(self, name: str) -> str:
-        return f"__Host-{name}" if self.secure else name
+        return cookie_name(name, self.secure)
 
     def _values(self, name: str, value: str, age: int) -> dict[str, Any]:
-        values = {"key": self._cookie_name(name), "value": value, "path": "/", "httponly": True}
-        return {**values, "samesite": "strict", "secure": self.secure, "max_age": age}
+        return cookie_values(name, value, age, self.secure)
 
     def token(self, request: Request) -> str | None:
         """The token that a browser sent."""
-        return cookie_of(request.scope, self.cookie)
+        return read_cookie(request.scope, self.cookie)
 
     def login(self, request: Request) -> Login | None:
         """Who that is, on a route that anybody may ask."""

@@ -17,7 +17,7 @@ from starlette.types import ASGIApp
 from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import ingest
-from app.features.jobs import run as job_run
+from app.features.jobs import runner as job_run
 from app.features.solutions.service import solve_dataset
 from app.geometry.camera import Camera
 from app.http.bodies import MAX_JSON_BYTES

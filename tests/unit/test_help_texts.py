@@ -29,24 +29,24 @@ PLAIN_WORDS = """
     after ahead anchor annotate app arrays arrival ask attempt axis backup bar bars batches before best binned block
     blocks bodies body boxes browser bulk bundle button buttons cache calibrate candidate canonical canvas caption
     card cards categories cell changes chart chip choice chooser class cli client clip clock cluster codec codecs colours
-    command comment comments compare comparison completion config confirm connections contact copy copying corner
+    command comment comments compare comparison completion config confirm connections contact cookies copy copying corner
     counts cross css csv cursor curve cuts damped database datasets day delete deps descriptions details detect
     devices diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor
-    empty engine enrol ephemeral errors estimator evaluate event events executors export exports facets facts faults
+    empty endings engine enrol ephemeral errors estimator evaluate event events executors export exports facets facts faults
     fields figure figures files film finder finite first fit fixture folder folders follow form format formats frozen
     gestures give glossary gold grass grid guess guide guideline guidelines header headers heat help histograms
     history hit home hooks hosts idempotency identity if image images import imports index indexing info init insert
     insight invitation invitations invite items jaccard join json kept kernels key keys kinds known konva last
-    latest lazy lease leases least leftovers legend lens lesson lessons letter limits links list listing live local
+    latest lazy lease leases least leftovers legend lens lesson lessons letter limits links list live local
     locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me
     measures membership mentions menu merge messages metrics migrate mini model motion name names navigation needs
     neighbours notice nudge numbers object on open openapi opened opentrackio options order origin other output own
     ownership packing page pages paint palette panel parameters parquet parse parts patch path pen people
     permissions pins pitch pitches pixel place places plain play playback plural png pointer policies pool popover pose
     position postgresql preopen preview problem process processes profile progress projection proof property
-    proposal propose props provider queries query quota rail rater reader reasons record reimport remote render
+    proposal propose props provider queries query quota rail rater reader reasons record refresh reimport remote render
     repeats report requests resect resource respond responses restore result rethreshold return revert reviewers
-    rights roles rotation router routes row rows rules run runs safe save scale scene scene3d scenes schemas score
+    rights roles rotation router routes row rows rules run runner runs safe save scale scene scene3d scenes schemas score
     scoreboard scoring scroll search sender sending serve server service serving session sets shared sharing sheet
     sign singular site smallest snapshot solve solving source sources sphere spill spread sqlite squares stacks
     stage staging standpoints starts state statements statistics steps storage store stored straight stream stretches strict

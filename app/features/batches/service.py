@@ -35,7 +35,7 @@ from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify
 from app.features.people.members import list_members
 from app.features.people.roles import Action, lets
-from app.features.queue.listing_queries import Listing
+from app.features.queue.queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, announce_batch
 from app.finite import Moment

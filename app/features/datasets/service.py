@@ -33,8 +33,8 @@ from app.features.independent_annotations.queries import (
     insert_copy_dataset,
 )
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility, is_blind
-from app.features.queue.listing_queries import count_states
-from app.features.queue.queries import refresh_queue
+from app.features.queue.queries import count_states
+from app.features.queue.refresh_queries import refresh_queue
 from app.finite import quoted
 from app.formats.issia import MATCH as ISSIA
 from app.formats.manifest import LICENCES, UNKNOWN_LICENCE

@@ -189,7 +189,7 @@ def import_(
 
 def _propose(dataset: str, settings: Settings, *, silent: bool) -> None:
     """Propose cameras for pictures that were imported; Ctrl+C keeps what was found until then."""
-    from app.features.jobs.run import ending
+    from app.features.jobs.endings import ending
     from app.features.paint.proposals import propose_views
 
     with opened_store(settings) as store, show_progress("Proposing cameras") as progress:

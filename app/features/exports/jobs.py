@@ -15,7 +15,7 @@ from app.features.datasets.service import get_dataset_head
 from app.features.exports.folder import ExportFolder
 from app.features.exports.service import ExportReport, export, require_possible
 from app.features.jobs.queries import EXPORT, Job
-from app.features.jobs.run import JobProgress, counting_progress, run_job_in_worker
+from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.formats.file_tree import Root
 from app.formats.safe_path import check_name

@@ -6,7 +6,7 @@ from sqlalchemy import false, func, not_, or_, select
 
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session
-from app.features.queue.listing_queries import Listing, Order
+from app.features.queue.queries import Listing, Order
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import is_solved
 

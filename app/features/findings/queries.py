@@ -149,7 +149,7 @@ NOTHING_DISMISSED = GroupDismissals()
 def current_dismissals(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     """What people dismissed, by group id; groups in which nobody ever did are left out.
 
-    ``rows`` are those of the table, the oldest first (``features.queue.queries.read_import_findings`` reads them).
+    ``rows`` are those of the table, the oldest first (``features.queue.refresh_queries.read_import_findings`` reads them).
     """
     found: dict[int, GroupDismissals] = {}
     for row in rows:

@@ -13,7 +13,7 @@ from app.features.datasets.service import dataset_id
 from app.features.findings.queries import insert_dismissal
 from app.features.groups.state import GroupState, read_states, require_content, require_unchanged
 from app.features.groups.submit import read_solved, require_open
-from app.features.queue.listing_queries import (
+from app.features.queue.queries import (
     Condition,
     Listing,
     Order,
@@ -22,7 +22,7 @@ from app.features.queue.listing_queries import (
     either,
     lists,
 )
-from app.features.queue.queries import read_import_findings, refresh_queue
+from app.features.queue.refresh_queries import read_import_findings, refresh_queue
 from app.features.solutions.queries import is_solved
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group

@@ -11,7 +11,7 @@ from app.features.groups.edit import Edit
 from app.features.groups.edit_codec import step_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import next_revision, save_revision
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 
 _BATCH = 100
 

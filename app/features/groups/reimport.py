@@ -15,7 +15,7 @@ from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import keeps_station, refresh_inputs_hashes
 from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
 from app.features.imports.queries import shared_stations
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.soccer.group import Group, Station, View
 
 KIND = "upstream_changed"

@@ -35,7 +35,7 @@ from app.features.groups.state_snapshot import (
 from app.features.match_estimates.queries import NOISE, POSITION
 from app.features.paint.queries import PAINT
 from app.features.pitches.queries import PITCH
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 

@@ -16,7 +16,7 @@ from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.undo_stacks import UndoStacks, read_stacks
 from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
-from app.features.queue.queries import import_findings, is_fixed, read_import_findings
+from app.features.queue.refresh_queries import import_findings, is_fixed, read_import_findings
 from app.features.solutions.queries import SolutionKey, read_solutions
 from app.features.verdicts.queries import StoredVerdict, read_last_verdicts
 from app.soccer.finding import Dismissal, Finding

@@ -39,7 +39,7 @@ from app.features.independent_annotations import submission_queries as submissio
 from app.features.independent_annotations.queries import annotation_of_copy
 from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
 from app.features.people.visibility_queries import COPIES
-from app.features.queue.queries import refresh_queue, update_row
+from app.features.queue.refresh_queries import refresh_queue, update_row
 from app.features.solutions.queries import EncodedSolution, insert_solutions, read_solutions
 from app.features.solutions.service import Solve, known_calibrations, solve_encoded
 from app.soccer.group import Group

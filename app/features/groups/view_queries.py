@@ -16,7 +16,7 @@ from app.features.groups import codecs
 from app.features.groups.codecs import ball_from_json
 from app.features.groups.digest import station_digest
 from app.features.groups.insert_queries import station_values
-from app.features.queue.listing_queries import Condition
+from app.features.queue.queries import Condition
 from app.features.queue.tables import QueueModel
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines

@@ -18,7 +18,7 @@ from app.features.groups.reimport import KIND
 from app.features.groups.revision_queries import save_group
 from app.features.groups.undo_stacks import RevisionChains
 from app.features.imports.queries import known_groups
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
 from app.soccer.annotation import Lines
 from app.soccer.group import Group, View

@@ -20,7 +20,7 @@ from app.features.groups.view_queries import (
     save_station,
 )
 from app.features.imports.ingest import IngestReport, ingest_session
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
 from app.geometry.camera import Camera
 from app.soccer.camera_size import other_size

@@ -41,7 +41,7 @@ from app.features.paint.queries import insert_readings
 from app.features.pitches.queries import edited_pitches, is_pitch_edited
 from app.features.pitches.service import give_pitch
 from app.features.policies.service import first_policy
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
 from app.object_store.address import is_address
 from app.plural import plural

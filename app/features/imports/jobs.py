@@ -18,7 +18,7 @@ from app.features.imports.folders import resolve_folder
 from app.features.imports.sources import FORMATS, Source, import_source
 from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
 from app.features.jobs.queries import Job
-from app.features.jobs.run import FailedWithReportError, JobProgress, left_to_next_server
+from app.features.jobs.runner import FailedWithReportError, JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import RIG
 from app.features.paint.jobs import PAINT, PROPOSALS

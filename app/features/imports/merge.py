@@ -51,7 +51,7 @@ from app.features.imports.merge_parse import (
 )
 from app.features.imports.queries import known_groups, shared_stations
 from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.formats.file_tree import FileTree, Limits, Root
 from app.formats.report import Report
 from app.formats.trees import opened_tree

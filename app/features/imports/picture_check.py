@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.features.datasets.queries import find_dataset
 from app.features.findings.queries import replace_shape_findings
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
 from app.media.files import picture_header, video_length, video_times
 from app.media.images import SIDEWAYS, ImageHeader

@@ -36,7 +36,7 @@ from app.features.independent_annotations.queries import (
 )
 from app.features.independent_annotations.service import get_annotation, read_annotation
 from app.features.independent_annotations.submission_queries import KIND
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.features.verdicts.queries import (
     StoredVerdict,
     insert_verdicts,

@@ -32,7 +32,7 @@ from app.features.independent_annotations.queries import (
     is_copy,
 )
 from app.features.independent_annotations.service import begin
-from app.features.queue.listing_queries import Listing
+from app.features.queue.queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import Version, find_version, thaw

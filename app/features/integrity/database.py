@@ -19,7 +19,7 @@ from app.features.groups.state_snapshot import StateSnapshot, read_state_snapsho
 from app.features.guidelines.queries import GUIDELINE, all_guidelines
 from app.features.integrity.records import DELETED, examine_computed, examine_people
 from app.features.integrity.transfer import find_null_characters, named
-from app.features.queue.queries import differing_rows
+from app.features.queue.refresh_queries import differing_rows
 from app.features.solutions.service import stale_groups
 
 

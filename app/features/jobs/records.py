@@ -22,7 +22,7 @@ from app.features.jobs.queries import (
     update_job,
 )
 from app.features.jobs.queries import Job as Job
-from app.features.jobs.run import JobRun
+from app.features.jobs.runner import JobRun
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify
 from app.features.people.visibility_queries import EVERYTHING, Visibility

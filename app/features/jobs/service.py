@@ -40,7 +40,7 @@ from app.features.jobs.queries import (
     update_job,
 )
 from app.features.jobs.records import JobRecords, Then, cancelled_by, need_job
-from app.features.jobs.run import JobProgress, JobRun, RunQueue, Work
+from app.features.jobs.runner import JobProgress, JobRun, RunQueue, Work
 
 log = structlog.get_logger("touchline.jobs")
 

@@ -35,7 +35,7 @@ from app.features.jobs.queries import (
     update_job,
 )
 from app.features.jobs.records import cancelled_by, need_job
-from app.features.jobs.run import JobProgress, JobRun, Work
+from app.features.jobs.runner import JobProgress, JobRun, Work
 from app.features.jobs.service import CLOSE_SECONDS, KEPT, Jobs, Pool
 
 log = structlog.get_logger("touchline.jobs")

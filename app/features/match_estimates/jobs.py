@@ -24,7 +24,7 @@ from app.features.datasets.service import (
 from app.features.groups.codecs import picture_to_json
 from app.features.jobs.queries import Job
 from app.features.jobs.records import need_job
-from app.features.jobs.run import JobProgress, Work, counting_progress
+from app.features.jobs.runner import JobProgress, Work, counting_progress
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.pictures import estimate_pictures
 from app.features.match_estimates.positions import (

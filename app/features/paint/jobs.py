@@ -7,7 +7,7 @@ from dataclasses import asdict
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
-from app.features.jobs.run import JobProgress, counting_progress
+from app.features.jobs.runner import JobProgress, counting_progress
 from app.features.jobs.service import Jobs
 from app.features.match_estimates.jobs import MatchCall, MatchJob
 from app.features.paint.proposals import forget_proposals, propose_views

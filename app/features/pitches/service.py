@@ -34,7 +34,7 @@ from app.features.pitches.queries import (
     replace_pitch_findings,
     save_estimate,
 )
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.progress import ReportProgress
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration

@@ -19,7 +19,7 @@ from app.features.groups.state import GroupState, read_states
 from app.features.imports.queries import known_groups
 from app.features.imports.sources import Source, import_source
 from app.features.jobs.queries import Job
-from app.features.jobs.run import JobProgress, run_job_in_worker
+from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs, Pool
 from app.features.people.queries import person_by_name, set_dataset_role
 from app.features.people.roles import Role, note

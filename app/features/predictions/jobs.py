@@ -11,7 +11,7 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
 from app.features.jobs.queries import Job
-from app.features.jobs.run import JobProgress, run_job_in_worker
+from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.features.predictions.accept import AcceptReport, AcceptRequest, accept, plan_accept
 from app.features.predictions.evaluation import list_evaluations

@@ -1,363 +1,477 @@
-"""The queue's rows: one a group, brought in step whenever something it shows has changed."""
+"""The groups of a dataset that fulfil conditions: counted, read, put in order."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import fields
-from typing import Any, cast
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import (
-    BindParameter,
-    Table,
+    Column,
+    ColumnElement,
+    Label,
+    Select,
     and_,
-    bindparam,
+    case,
+    false,
     func,
-    literal,
-    null,
+    not_,
     or_,
     select,
-    union_all,
-    update,
 )
-from sqlalchemy import cast as cast_to
+from sqlalchemy.orm import InstrumentedAttribute
+from sqlalchemy.sql.visitors import iterate
 
-from app.db.dialects.statements import insert_or_replace
+from app.db.dialects.statements import numbers_in
 from app.db.session import Session
-from app.features.datasets.tables import (
-    DatasetModel,
-    GroupModel,
-    ImportFindingModel,
-    StationModel,
-    ViewModel,
-)
-from app.features.findings.queries import (
-    SHOWN,
-    GroupDismissals,
-    current_dismissals,
-    dismissed_kinds,
-)
-from app.features.findings.tables import DismissalModel
-from app.features.groups.queries import StoredGroup
-from app.features.people.alias_queries import shown_actor
-from app.features.queue.tables import QueueModel
-from app.features.solutions.queries import (
-    SolutionKey,
-    fitting_solution,
-    read_solutions,
-    read_summary,
-)
-from app.features.solutions.summary import SolutionSummary
-from app.features.solutions.tables import SolutionModel
-from app.features.verdicts.queries import StoredVerdict
-from app.features.verdicts.tables import VerdictModel
-from app.soccer.finding import Finding
+from app.features.agreement.queries import groups_that_came_to
+from app.features.batches.queries import groups_in_batches
+from app.features.comments.queries import groups_that_mention, groups_with_threads
+from app.features.independent_annotations.queries import groups_with_annotations
+from app.features.paint.proposal_queries import groups_with_open
+from app.features.people.visibility_queries import seen_anywhere, seen_in
+from app.features.policies.queries import judged_since
+from app.features.queue.tables import QUEUE_NUMBERS, QUEUE_SCANNED, QueueModel
+from app.features.solutions.queries import is_solved
+from app.soccer.solution import GATES
 
-_BATCH = 1000
-_DISMISSED = 2
-"""Where rows of ``_NOTICED`` are dismissals."""
-_QUEUE = cast(Table, QueueModel.__table__)
-_REPLACE = insert_or_replace(_QUEUE)
-_ROW = update(_QUEUE).where(_QUEUE.c.group_id == bindparam("row"))
-_NOTICE = ImportFindingModel.__table__
-_VIEW = ViewModel.__table__
-_IDS: BindParameter[Any] = bindparam("ids", expanding=True)
-_CHECKED = DismissalModel.__table__
-_UNKNOWN = [cast_to(null(), column.type).label(column.name) for column in SHOWN]
-_NOTICED = union_all(
-    select(
-        _NOTICE.c.group_id.label("group"),
-        _NOTICE.c.kind,
-        _NOTICE.c.sentence,
-        _NOTICE.c.view,
-        literal(0).label("source"),
-        _NOTICE.c.id,
-        *_UNKNOWN,
-    ).where(_NOTICE.c.group_id.in_(_IDS)),
-    select(
-        *(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, literal(1)),
-        *(_NOTICE.c.id, *_UNKNOWN),
-    )
-    .join_from(_VIEW, _NOTICE, _NOTICE.c.station_id == _VIEW.c.station_id)
-    .where(_VIEW.c.group_id.in_(_IDS)),
-    select(
-        *(_CHECKED.c.group_id, _CHECKED.c.kind, _CHECKED.c.sentence, _CHECKED.c.view, literal(2)),
-        *(_CHECKED.c.id, *SHOWN),
-    ).where(_CHECKED.c.group_id.in_(_IDS)),
-).order_by("source", "id")
-"""A group's own come before those of its static cameras; then what people have dismissed."""
-_NUMBERS = [
-    item.name for item in fields(SolutionSummary) if item.name not in ("passes", "findings")
-]
+Condition = ColumnElement[bool]
+"""Whether a group is meant; made and combined by the functions here."""
+
+_COMPARED: Mapping[str, Callable[[Any, Any], Any]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "=": operator.eq,
+}
+_NOT: Mapping[str, Callable[[Any, Any], Any]] = {
+    "<": operator.ge,
+    "<=": operator.gt,
+    ">": operator.le,
+    ">=": operator.lt,
+    "=": operator.ne,
+}
 
 
-def refresh_queue(session: Session, group_ids: Sequence[int]) -> None:
-    """Project groups, views, verdicts and solutions onto the queue's rows, anew for each group."""
-    for start in range(0, len(group_ids), _BATCH):
-        _refresh(session, group_ids[start : start + _BATCH])
+def compares(column: str, op: str, value: float | str) -> Condition:
+    """A number or text against a value, by one of < <= > >= =; nothing that is absent does."""
+    condition: Condition = _COMPARED[op](_column(column), value)
+    return condition
 
 
-def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
-    """Bring only what verdicts say in step: a fraction of the work of ``refresh_queue``."""
-    for start in range(0, len(group_ids), _BATCH):
-        ids = group_ids[start : start + _BATCH]
-        verdicts = _verdicts(session, ids)
-        edited = edited_groups(session, ids)
-        heads = session.execute(
-            select(GroupModel.id, GroupModel.inputs_hash, QueueModel.passes)
-            .join(QueueModel, QueueModel.group_id == GroupModel.id)
-            .where(GroupModel.id.in_(ids))
-        )
-        values = [
-            {"of": head.id, **_verdict_values(head, verdicts.get(head.id), edited, head.passes)}
-            for head in heads.all()
-        ]
-        if values:
-            session.execute(
-                update(QueueModel).where(QueueModel.group_id == bindparam("of")), values
-            )
+def is_absent(column: str) -> Condition:
+    """There is no such number."""
+    return _column(column).is_(None)
 
 
-def update_row(
-    session: Session,
-    stored: StoredGroup,
-    verdict: StoredVerdict | None,
-    noticed: Sequence[str],
-    summary: SolutionSummary,
-) -> None:
-    """Bring a group's row in step whose edit and solution are at hand: nothing is read.
+def is_empty(column: str) -> Condition:
+    """There is no such text."""
+    return or_(_column(column).is_(None), _column(column) == "")
 
-    Not of a group in which findings were dismissed: ``refresh_queue`` knows these.
+
+def is_text(column: str, text: str) -> Condition:
+    """A text that may be absent is this one; turned round, it is another or absent."""
+    return and_(_column(column).is_not(None), _column(column) == text)
+
+
+def is_flag(column: str, value: bool) -> Condition:
+    """A flag is set, or is known not to be."""
+    return _column(column).is_(value)
+
+
+def contains(column: str, text: str) -> Condition:
+    """A text holds another."""
+    return _column(column).contains(text, autoescape=True)
+
+
+def lists(column: str, item: str) -> Condition:
+    """A list between commas has an item."""
+    return contains(column, f",{item},")
+
+
+def has_all_pictures() -> Condition:
+    """Every view has a picture."""
+    return QueueModel.pictures >= QueueModel.views
+
+
+def is_one_of(ids: Iterable[int]) -> Condition:
+    """The group's id is one of these."""
+    return QueueModel.group_id.in_(numbers_in(ids))
+
+
+def has_open_proposal(outcome: str | None = None) -> Condition:
+    """A view without a camera was looked at; with that outcome, where one is named."""
+    return QueueModel.group_id.in_(groups_with_open(outcome))
+
+
+def is_in_batch(ids: Iterable[int]) -> Condition:
+    """The group is in one of these batches of work."""
+    return QueueModel.group_id.in_(groups_in_batches(list(ids)))
+
+
+def has_thread(state: str | None = None) -> Condition:
+    """People have said something to each other about it; in an ``open`` or ``resolved`` thread."""
+    return QueueModel.group_id.in_(groups_with_threads(state))
+
+
+def mentions(name: str | None = None) -> Condition:
+    """An open thread mentions somebody, or the person of a name."""
+    return QueueModel.group_id.in_(groups_that_mention(name))
+
+
+def has_annotations(op: str, number: float) -> Condition:
+    """So many people have handed in an annotation of their own; most groups have none."""
+    if not _COMPARED[op](0, number):
+        return QueueModel.group_id.in_(groups_with_annotations(_COMPARED[op], number))
+    # The few that are not meant are looked up, instead of the many that are.
+    return QueueModel.group_id.not_in(groups_with_annotations(_NOT[op], number))
+
+
+def has_outcome(state: str) -> Condition:
+    """Its annotations were compared, in some batch, and came to that."""
+    return QueueModel.group_id.in_(groups_that_came_to(state))
+
+
+def either(conditions: Iterable[Condition]) -> Condition:
+    """At least one of them holds."""
+    return or_(*conditions)
+
+
+def opposite(condition: Condition) -> Condition:
+    """It does not hold."""
+    return not_(condition)
+
+
+def _column(name: str) -> InstrumentedAttribute[Any]:
+    column: InstrumentedAttribute[Any] = getattr(QueueModel, name)
+    return column
+
+
+Key = int | float | str | None
+"""What a group is sorted by; None where it has no such number."""
+
+_COMPUTED: Mapping[str, ColumnElement[Any]] = {
+    "findings": func.length(QueueModel.findings)
+    - func.length(func.replace(QueueModel.findings, ",", "")),
+    "gate": case(
+        {name: place for place, name in enumerate(GATES)}, value=QueueModel.gate, else_=None
+    ),
+}
+"""Findings are sorted by how many kinds there are, gates by the order in which they are judged."""
+SORTED = frozenset(("number", "status", *QUEUE_NUMBERS))
+"""Columns by which an index sorts the groups of a dataset."""
+_PRESENT = frozenset({"number", "changed", "views", "status", "split", "label"})
+"""Columns that every row has."""
+
+
+@dataclass(frozen=True)
+class _SortKey:
+    """One column of an order; rows without it come last either way."""
+
+    column: Label[Any]
+    descending: bool
+    present: bool
+
+    def sorted(self, *, backwards: bool) -> ColumnElement[Any]:
+        """The ORDER BY of it. NULLS LAST lets an index of the plain column serve both ways."""
+        sort = self.column.desc() if self.descending != backwards else self.column.asc()
+        if self.present:
+            return sort
+        return sort.nulls_first() if backwards else sort.nulls_last()
+
+    def equals(self, value: Key) -> ColumnElement[bool]:
+        """Whether a row has this value."""
+        return self.column.element.is_(None) if value is None else self.column.element == value
+
+    def beyond(self, value: Key, *, forward: bool) -> ColumnElement[bool]:
+        """Whether a row's value comes after this one, or before it."""
+        column = self.column.element
+        if value is None:
+            return false() if forward else column.is_not(None)
+        further = column < value if self.descending == forward else column > value
+        return further if self.present or not forward else or_(further, column.is_(None))
+
+
+def _value(column: str | ColumnElement[Any]) -> Any:
+    if not isinstance(column, str):
+        return column
+    return _COMPUTED.get(column, getattr(QueueModel, column))
+
+
+class Order:
+    """A total order of groups: the number comes last, so that no two are equal.
+
+    Groups without what is sorted by come last either way.
 
     Args:
-        session: A write session.
-        stored: The group as it is now.
-        verdict: The newest one.
-        noticed: Kinds of what imports noticed.
-        summary: Of the group's solution.
+        column: Name of a column of the queue, or what takes the place of one.
+        descending: The largest first.
     """
-    edited = {stored.id} if stored.edited else set[int]()
-    values = {
-        "changed": stored.changed,
-        **_verdict_values(stored, verdict, edited, summary.passes),
-        **_computed(summary, noticed),
-    }
-    session.execute(_ROW, {"row": stored.id, **values})
 
-
-def update_verdict(
-    session: Session, stored: StoredGroup, verdict: StoredVerdict, passes: bool | None
-) -> None:
-    """Show a new verdict in a group's row; the rest of it is in step."""
-    edited = {stored.id} if stored.edited else set[int]()
-    session.execute(_ROW, {"row": stored.id, **_verdict_values(stored, verdict, edited, passes)})
-
-
-def differing_rows(session: Session) -> tuple[int, list[int]]:
-    """How many groups there are, and ids of those whose row ``refresh_queue`` would write otherwise.
-
-    Raises:
-        DamagedError: A solution's summary is not what was written.
-    """
-    ids = session.scalars(select(GroupModel.id).order_by(GroupModel.id)).all()
-    apart: list[int] = []
-    for start in range(0, len(ids), _BATCH):
-        some = ids[start : start + _BATCH]
-        present = session.execute(select(_QUEUE).where(_QUEUE.c.group_id.in_(some)))
-        found = {row.group_id: dict(row._mapping) for row in present}
-        apart += [
-            row["group_id"] for row in _rows(session, some) if row != found.get(row["group_id"])
+    def __init__(self, column: str | ColumnElement[Any], descending: bool = False):
+        name = column if isinstance(column, str) else ""
+        keys = [(_value(column), descending, name in _PRESENT)]
+        if name != "number":
+            keys.append((QueueModel.number, False, True))
+        self._keys = [
+            _SortKey(key.label(f"key{place}"), down, present)
+            for place, (key, down, present) in enumerate(keys)
         ]
-    return len(ids), apart
+
+        self.index = f"queue_{name}" if name in SORTED else None
+        """Name of the index that has this order; None: there is none."""
+
+    @property
+    def keys(self) -> list[Label[Any]]:
+        """The keys as columns."""
+        return [key.column for key in self._keys]
+
+    @property
+    def ascending(self) -> list[ColumnElement[Any]]:
+        """ORDER BY of the order."""
+        return [key.sorted(backwards=False) for key in self._keys]
+
+    @property
+    def backwards(self) -> list[ColumnElement[Any]]:
+        """ORDER BY of the reverse."""
+        return [key.sorted(backwards=True) for key in self._keys]
+
+    def keys_of(self, row: Any) -> list[Key]:
+        """The keys of a row that was read with them."""
+        return [getattr(row, key.name) for key in self.keys]
+
+    def after(self, values: Sequence[Key]) -> ColumnElement[bool]:
+        """Whether a row comes after the one with these keys."""
+        return self._beyond(values, forward=True)
+
+    def before(self, values: Sequence[Key]) -> ColumnElement[bool]:
+        """Whether a row comes before the one with these keys."""
+        return self._beyond(values, forward=False)
+
+    def _beyond(self, values: Sequence[Key], forward: bool) -> ColumnElement[bool]:
+        alternatives = []
+        for place, (key, value) in enumerate(zip(self._keys, values, strict=True)):
+            pairs = zip(self._keys[:place], values, strict=False)
+            equal = [before.equals(other) for before, other in pairs]
+            alternatives.append(and_(*equal, key.beyond(value, forward=forward)))
+        return or_(*alternatives)
 
 
-def _refresh(session: Session, ids: Sequence[int]) -> None:
-    rows = _rows(session, ids)
-    if rows:
-        session.execute(_REPLACE, rows)
+_TABLE = QueueModel.__table__
+_FILE_ORDER = "queue_number"
+"""Groups lie in the file as they are numbered."""
+_SCAN = "queue_scanned"
+"""Most columns of every group in the same order, without the rest of their rows."""
+_FEW = 10
+"""Of so many groups that match, one page is looked for in order; of less, in all of them."""
 
 
-def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
-    """Rows of groups as they follow from everything else."""
-    views, verdicts = _views(session, ids), _verdicts(session, ids)
-    (findings, dismissals), edited = read_import_findings(session, ids), edited_groups(session, ids)
-    checked = _checked(session, dismissals, findings)
-    rows = []
-    for head, summary in _heads(session, ids):
-        passes = None if summary is None else summary.passes
-        judged = _verdict_values(head, verdicts.get(head.id), edited, passes)
-        row = {**_head_values(head, views[head.id]), **judged}
-        row.update(_computed(summary, [item.kind for item in findings[head.id]]))
-        rows.append(row | checked.get(head.id, {}))
-    return rows
+@dataclass(frozen=True)
+class Listing:
+    """The groups of a dataset that fulfil all conditions, as a session sees them; those that are
+    hidden from whoever asks are none of them.
+
+    What an index sorts by is read from there. What no index holds is read in the order in which
+    the rows lie in the file: to fetch them one by one as an index has them takes ten times as long.
+    """
+
+    session: Session
+    dataset_id: int
+    conditions: Sequence[Condition] = ()
+
+    def count(self) -> int:
+        """How many groups there are."""
+        found: int | None = self.session.scalar(self._over_all_groups(select(func.count())))
+        return found or 0
+
+    def place(self, order: Order, keys: Sequence[Key], group_id: int) -> tuple[int | None, int]:
+        """How many groups come before some keys, None where the group is not here; and how many
+        there are."""
+        here = func.sum(case((QueueModel.group_id == group_id, 1), else_=0))
+        before = func.sum(case((order.before(keys), 1), else_=0))
+        statement = self._over_all_groups(select(func.count(), here, before), order)
+        total, found, index = self.session.execute(statement).one()
+        return (index if found else None), total
+
+    def columns(self, names: Iterable[str], *, by_number: bool = False) -> Sequence[Any]:
+        """Some columns of each group."""
+        names = list(names)
+        needed = _names(self.conditions) | set(names)
+        statement = _with_index(_index_for(needed), _columns(names).where(*self._where))
+        if by_number:
+            statement = statement.order_by(QueueModel.number)
+        return self.session.execute(statement).all()
+
+    def rows_after(self, order: Order, keys: Sequence[Key] | None, limit: int) -> Sequence[Any]:
+        """Rows in order with their keys, from the one after these keys on, or from the first."""
+        after = [] if keys is None else [order.after(keys)]
+        statement = _rows(order).where(*self._where, *after).limit(limit)
+        return self.session.execute(statement).all()
+
+    def ids(self, order: Order, limit: int | None = None) -> list[int]:
+        """Ids in order, of all or of the first."""
+        return self._scalars(self._ids.order_by(*order.ascending).limit(limit))
+
+    def ids_from(self, order: Order, start: int, limit: int, total: int) -> list[int]:
+        """Ids from a position on, in order, out of ``total``.
+
+        SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as
+        much: hence ids alone, and behind the middle from the end.
+        """
+        count = min(limit, total - start)
+        if count <= 0:
+            return []
+        behind = total - start - count
+        ids = self._page(order, min(start, behind) + count, total)
+        if start <= behind:
+            return self._scalars(ids.order_by(*order.ascending).offset(start).limit(count))
+        backwards = ids.order_by(*order.backwards).offset(behind).limit(count)
+        return self._scalars(backwards)[::-1]
+
+    def ids_around(
+        self, order: Order, keys: Sequence[Key], limit: int, total: int
+    ) -> tuple[list[int], list[int]]:
+        """Ids just before some keys and just after, the nearest first, out of ``total``."""
+        ids = self._page(order, limit, total)
+        before = ids.where(order.before(keys)).order_by(*order.backwards).limit(limit)
+        after = ids.where(order.after(keys)).order_by(*order.ascending).limit(limit)
+        return self._scalars(before), self._scalars(after)
+
+    @property
+    def _where(self) -> list[ColumnElement[bool]]:
+        seen = seen_in(self.dataset_id, QueueModel.group_id)
+        return [QueueModel.dataset_id == self.dataset_id, *self.conditions, *seen]
+
+    @property
+    def _ids(self) -> Select[int]:
+        return select(QueueModel.group_id).where(*self._where)
+
+    def _over_all_groups(self, statement: Any, order: Order | None = None) -> Select[Any]:
+        """The statement over all groups."""
+        filtered = statement.select_from(QueueModel).where(*self._where)
+        names = _names(self.conditions) | (set() if order is None else _names(order.keys))
+        return filtered if _is_sorted(names) else _with_index(_index_for(names), filtered)
+
+    def _page(self, order: Order, reach: int, total: int) -> Select[int]:
+        """Ids of which ``reach`` are read in order, out of ``total``."""
+        few = self.conditions and reach * _FEW > total
+        if few:
+            return _with_index(_index_for(_names(self.conditions) | _names(order.keys)), self._ids)
+        return _with_index(order.index, self._ids)
+
+    def _scalars(self, statement: Select[int]) -> list[int]:
+        return list(self.session.scalars(statement))
 
 
-def _checked(
-    session: Session,
-    dismissals: Mapping[int, GroupDismissals],
-    noticed: Mapping[int, Sequence[Any]],
-) -> dict[int, dict[str, Any]]:
-    """Which kinds of findings are open and which dismissed, of the few groups in which people have
-    dismissed any: their solutions are decoded."""
-    if not dismissals:
-        return {}
-    keys = session.execute(
+def _names(expressions: Iterable[ColumnElement[Any]]) -> set[str]:
+    """Columns of the queue that expressions read."""
+    return {
+        part.name
+        for expression in expressions
+        for part in iterate(expression)
+        if isinstance(part, Column) and part.table is _TABLE
+    }
+
+
+def _is_sorted(names: set[str]) -> bool:
+    """Whether one index holds all of these columns."""
+    return names <= SORTED and len(names - {"number"}) <= 1
+
+
+def _index_for(names: set[str]) -> str:
+    """The index through which all groups are read by their number, for these columns."""
+    return _SCAN if names <= {*QUEUE_SCANNED, "dataset_id", "group_id"} else _FILE_ORDER
+
+
+def _with_index(index: str | None, statement: Select[Any]) -> Select[Any]:
+    """The statement by an index, where there is one; SQLite would choose by what it guesses."""
+    if index is None:
+        return statement
+    return statement.with_hint(QueueModel, f"INDEXED BY {index}", "sqlite")
+
+
+def read_rows(session: Session, ids: Sequence[int], order: Order) -> Sequence[Any]:
+    """The rows of groups in order, with their keys."""
+    return session.execute(_rows(order).where(QueueModel.group_id.in_(ids))).all()
+
+
+def read_columns(
+    session: Session, ids: Sequence[int], conditions: Iterable[Condition], names: Iterable[str]
+) -> Sequence[Any]:
+    """Some columns of those among some groups of one dataset that fulfil conditions, by number."""
+    # The dataset is not asked for: SQLite would look through all of it.
+    statement = _columns(names).where(QueueModel.group_id.in_(ids), *conditions)
+    return session.execute(statement.order_by(QueueModel.number)).all()
+
+
+def columns_from(
+    session: Session, dataset_id: int, names: Iterable[str], after: int, limit: int
+) -> Sequence[Any]:
+    """Some columns of the groups of a dataset by id, from the one after an id on."""
+    mine = (QueueModel.dataset_id == dataset_id, QueueModel.group_id > after)
+    statement = _columns(names).where(*mine).order_by(QueueModel.group_id).limit(limit)
+    return session.execute(statement).all()
+
+
+def find_place(session: Session, group_id: int, order: Order) -> tuple[int, list[Key]] | None:
+    """The dataset of a group and its keys in an order; None where there is no such group."""
+    statement = select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
+    row = session.execute(statement).one_or_none()
+    return None if row is None else (row.dataset_id, order.keys_of(row))
+
+
+def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
+    """Rows (dataset_id, status, groups, solved): how many groups there are, and have a solution."""
+    statement = (
         select(
-            GroupModel.id,
-            GroupModel.inputs_hash,
-            DatasetModel.policy_hash,
-            SolutionModel.solver_version,
+            QueueModel.dataset_id,
+            QueueModel.status,
+            func.count().label("groups"),
+            func.sum(case((QueueModel.solved, 1), else_=0)).label("solved"),
         )
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .join(SolutionModel, SolutionModel.id == fitting_solution())
-        .where(GroupModel.id.in_(list(dismissals)))
+        .where(
+            QueueModel.dataset_id.in_(dataset_ids),
+            *seen_anywhere(QueueModel.dataset_id, QueueModel.group_id),
+        )
+        .group_by(QueueModel.dataset_id, QueueModel.status)
     )
-    solutions = read_solutions(session, [SolutionKey(*key) for key in keys], markings=False)
-    checked = {}
-    for group, dismissed in dismissals.items():
-        solved = solutions.get(group)
-        own = [Finding(row.kind, row.sentence, view=row.view) for row in noticed[group]]
-        found = [*(() if solved is None else solved.findings), *own]
-        opened, closed = dismissed_kinds(found, dismissed)
-        checked[group] = {"findings": _list(opened), "dismissed": _list(closed)}
-    return checked
+    return session.execute(statement).all()
 
 
-def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSummary | None]]:
-    """Groups with the summary of the newest solution of their present state, if there is one.
-
-    That of an earlier solver counts until the group is solved again: its numbers stay in the queue.
-    """
+def count_unsolved(session: Session) -> tuple[int, int, str | None]:
+    """How many groups there are, how many wait to be solved, and since when (UTC) the one that
+    waits longest does: from its last change, or from that of its dataset's policy where that came
+    later; None: none waits."""
+    total = session.scalar(select(func.count()).select_from(QueueModel)) or 0
     statement = (
-        select(*GroupModel.__table__.columns, SolutionModel.summary)
-        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, SolutionModel.id == fitting_solution())
-        .where(GroupModel.id.in_(ids))
+        select(QueueModel.dataset_id, func.count(), func.min(QueueModel.changed))
+        .where(not_(is_solved()))
+        .group_by(QueueModel.dataset_id)
     )
-    return [
-        (row, None if row.summary is None else read_summary(row.summary))
-        for row in session.execute(statement)
-    ]
+    rows = session.execute(statement).all()
+    since = [max(changed, judged_since(session, dataset) or "") for dataset, _, changed in rows]
+    return total, sum(count for _, count, _ in rows), min(since, default=None)
 
 
-def _views(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, str], int]:
+    """How many groups have a verdict that counts, by who gave it and their status."""
     statement = (
-        select(ViewModel.group_id, ViewModel.id, ViewModel.key, ViewModel.media_path)
-        .where(ViewModel.group_id.in_(ids))
-        .order_by(ViewModel.position)
+        select(QueueModel.reviewer, QueueModel.status, func.count())
+        .where(
+            QueueModel.dataset_id == dataset_id,
+            QueueModel.reviewer.is_not(None),
+            *seen_in(dataset_id, QueueModel.group_id),
+        )
+        .group_by(QueueModel.reviewer, QueueModel.status)
     )
-    views: dict[int, list[Any]] = defaultdict(list)
-    for row in session.execute(statement):
-        views[row.group_id].append(row)
-    return views
+    return {(name, status): count for name, status, count in session.execute(statement)}
 
 
-def _verdicts(session: Session, ids: Sequence[int]) -> dict[int, Any]:
-    newest = (
-        select(func.max(VerdictModel.id))
-        .where(VerdictModel.group_id.in_(ids))
-        .group_by(VerdictModel.group_id)
-    )
-    plain = [column for column in VerdictModel.__table__.columns if column.name != "actor"]
-    actor = shown_actor(VerdictModel.actor, VerdictModel.at).label("actor")
-    rows = session.execute(select(*plain, actor).where(VerdictModel.id.in_(newest)))
-    return {row.group_id: row for row in rows}
+def _columns(names: Iterable[str]) -> Select[Any]:
+    return select(*(getattr(QueueModel, name) for name in names))
 
 
-def read_import_findings(
-    session: Session, ids: Sequence[int]
-) -> tuple[dict[int, list[Any]], dict[int, GroupDismissals]]:
-    """What imports noticed about groups and about the shared stations of their views, and which
-    findings people have dismissed, in one statement.
-
-    Returns:
-        Rows (kind, sentence, view), and what was dismissed, by group id.
-    """
-    rows = session.execute(_NOTICED, {"ids": list(ids)}).all()
-    found: dict[int, list[Any]] = defaultdict(list)
-    for row in rows:
-        if row.source != _DISMISSED:
-            found[row.group].append(row)
-    return found, current_dismissals(row for row in rows if row.source == _DISMISSED)
-
-
-def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
-    """The first part of ``read_import_findings``."""
-    return read_import_findings(session, ids)[0]
-
-
-def _head_values(head: Any, views: Sequence[Any]) -> dict[str, Any]:
-    main = views[0].id if views and views[0].media_path is not None else None
-    names = ("dataset_id", "number", "key", "label", "match", "split", "changed")
-    return {
-        **{name: getattr(head, name) for name in names},
-        "group_id": head.id,
-        "views": len(views),
-        "pictures": sum(view.media_path is not None for view in views),
-        "view_keys": _list([view.key for view in views]),
-        "main_view": main,
-    }
-
-
-def edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
-    """Those of the groups that are not what their dataset brought.
-
-    A shared station is not the group's: what is drawn there counts for no group.
-    """
-    own = and_(StationModel.shared.is_(False), StationModel.digest != StationModel.source_digest)
-    statement = (
-        select(ViewModel.group_id)
-        .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(ViewModel.group_id.in_(ids), or_(ViewModel.digest != ViewModel.source_digest, own))
-        .distinct()
-    )
-    return set(session.scalars(statement))
-
-
-def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
-    """Whether a group was mended: edited, accepted as such, and not failing as it is now.
-
-    What was edited when the verdict was given may have been undone since; a group that was
-    accepted against a gate, or rejected, was not mended.
-
-    Args:
-        verdict: With ``state``, ``override`` and ``fixed`` as they were given.
-        edited: Whether the group differs from what its dataset brought, now.
-        passes: What the gates say now; None while that is not known.
-    """
-    accepted = verdict.state == "accepted" and verdict.override is None
-    return bool(verdict.fixed and accepted and edited and passes is not False)
-
-
-def _verdict_values(
-    head: Any, verdict: Any, edited: Collection[int], passes: bool | None
-) -> dict[str, Any]:
-    if verdict is None or verdict.state == "unreviewed":
-        nobody = dict.fromkeys(("reason", "reviewer", "override"))
-        return {**nobody, "status": "unreviewed", "stale": False, "fixed": False}
-    return {
-        "status": verdict.state,
-        "stale": verdict.inputs_hash != head.inputs_hash,
-        "reason": verdict.reason,
-        "reviewer": verdict.actor,
-        "override": verdict.override,
-        "fixed": is_fixed(verdict, head.id in edited, passes),
-    }
-
-
-def _computed(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[str, Any]:
-    if summary is None:
-        nothing: dict[str, Any] = {**dict.fromkeys(_NUMBERS), "dismissed": ""}
-        return {**nothing, "solved": False, "passes": None, "findings": _list(noticed)}
-    values = {name: getattr(summary, name) for name in _NUMBERS}
-    return {
-        **values,
-        "passes": summary.passes,
-        "solved": True,
-        "findings": _list([*summary.findings, *noticed]),
-        "dismissed": "",
-    }
-
-
-def _list(items: Sequence[str]) -> str:
-    return f",{','.join(dict.fromkeys(items))}," if items else ""
+def _rows(order: Order) -> Select[Any]:
+    return select(*QueueModel.__table__.columns, *order.keys).order_by(*order.ascending)

@@ -22,9 +22,9 @@ from hashlib import sha256
 
 from app.errors import InputError
 from app.features.batches.queries import place_in
-from app.features.queue import listing_queries as conditions
+from app.features.queue import queries as conditions
 from app.features.queue.fields import BY_NAME, FIELDS, ORDERS
-from app.features.queue.listing_queries import Condition, Order
+from app.features.queue.queries import Condition, Order
 from app.finite import MAX_ID
 
 MAX_LENGTH = 1000

@@ -18,7 +18,7 @@ from app.features.agreement.queries import states_of
 from app.features.comments.queries import count_open
 from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
-from app.features.queue.listing_queries import Key, Listing, find_place, read_rows
+from app.features.queue.queries import Key, Listing, find_place, read_rows
 from app.features.queue.query import NUMBERS, Query, parse_query
 from app.finite import MAX_ID, json_text
 from app.geometry.arrays import FloatArray, IntArray

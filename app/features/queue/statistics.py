@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from app.db.store import Store
 from app.features.people.visibility_queries import is_blind as is_blind
-from app.features.queue.listing_queries import Listing, compares
+from app.features.queue.queries import Listing, compares
 from app.features.queue.query import NUMBERS, parse_query
 from app.features.queue.service import ERROR_PERCENT, SIGMA_M, even_bins, places
 from app.geometry.arrays import BoolArray, FloatArray, IntArray

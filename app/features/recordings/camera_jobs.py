@@ -7,7 +7,7 @@ from functools import partial
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.jobs.queries import Job
-from app.features.jobs.run import JobProgress, left_to_next_server
+from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.recordings.cameras import require_stretch, track_now
 from app.features.recordings.service import get_recording

@@ -16,7 +16,7 @@ from app.errors import TooLargeError
 from app.features.imports.folders import resolve_folder
 from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
 from app.features.jobs.queries import Job
-from app.features.jobs.run import JobProgress, left_to_next_server
+from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.paint.jobs import PROPOSALS
 from app.features.recordings.instants import require_instants, take_instants

@@ -21,7 +21,7 @@ from app.features.file_tools.link import read_ball
 from app.features.groups.queries import read_groups
 from app.features.imports.upload_queries import get_upload, upload_path
 from app.features.jobs.queries import Job
-from app.features.jobs.run import JobProgress, left_to_next_server
+from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.recordings.cameras import cameras_at
 from app.features.recordings.link_values import (

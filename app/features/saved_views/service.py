@@ -11,7 +11,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import checked_title
 from app.features.people.visibility_queries import judges_in
 from app.features.queue.fields import reads_hidden_work
-from app.features.queue.listing_queries import Listing
+from app.features.queue.queries import Listing
 from app.features.queue.query import parse_query
 from app.features.saved_views.queries import (
     dataset_saved_views,

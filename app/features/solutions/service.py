@@ -23,7 +23,7 @@ from app.features.groups.codecs import group_from_json, group_to_json
 from app.features.groups.queries import read_groups
 from app.features.groups.view_queries import read_stations, station_pitches
 from app.features.policies.queries import policy_history
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import (
     EncodedSolution,
     SolutionKey,

@@ -16,7 +16,7 @@ from app.features.datasets.queries import dataset_name, group_ids
 from app.features.datasets.service import dataset_id, get_dataset_head, list_datasets
 from app.features.jobs.queries import Job
 from app.features.jobs.records import Then
-from app.features.jobs.run import JobProgress, counting_progress
+from app.features.jobs.runner import JobProgress, counting_progress
 from app.features.jobs.service import Jobs, Pool
 from app.features.pitches.service import (
     DatasetPitches,

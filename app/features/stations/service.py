@@ -31,7 +31,7 @@ from app.features.groups.view_queries import (
     read_stations,
     save_station,
 )
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import EncodedSolution, SolutionKey, insert_solutions
 from app.features.solutions.service import known_calibrations, solve_encoded
 from app.soccer.group import Group, Station

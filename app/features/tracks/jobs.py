@@ -9,7 +9,7 @@ from typing import Any
 from app.db.database_worker import Caller
 from app.db.json_columns import Json
 from app.db.store import Store
-from app.features.jobs.run import JobProgress, counting_progress, run_job_in_worker
+from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
 from app.features.match_estimates.jobs import MatchCall, MatchJob
 from app.features.tracks.service import make_tracks
 

@@ -30,7 +30,7 @@ from app.features.exports.folder import ExportFolder
 from app.features.imports.upload_queries import expire_uploads
 from app.features.jobs.queries import count_jobs, forget_jobs
 from app.features.jobs.service import Jobs
-from app.features.queue.listing_queries import count_unsolved
+from app.features.queue.queries import count_unsolved
 from app.features.webhooks.queries import forget_deliveries, has_old_deliveries
 
 log = structlog.get_logger("touchline.upkeep")

@@ -20,9 +20,9 @@ from app.errors import ConflictError
 from app.features.independent_annotations.queries import closed_copies
 from app.features.people.visibility_queries import COPIES, judges_in
 from app.features.queue.fields import reads_hidden_work
-from app.features.queue.listing_queries import Listing, read_columns
-from app.features.queue.queries import edited_groups, refresh_verdicts
+from app.features.queue.queries import Listing, read_columns
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
+from app.features.queue.refresh_queries import edited_groups, refresh_verdicts
 from app.features.solutions.queries import present_keys, unsolved_groups
 from app.features.verdicts.queries import (
     Spans,

@@ -10,7 +10,7 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
-from app.features.queue.listing_queries import read_columns
+from app.features.queue.queries import read_columns
 from app.features.solutions.queries import present_keys
 from app.features.verdicts.bulk import (
     ASKED,

@@ -11,8 +11,8 @@ from app.errors import InputError
 from app.features.groups.queries import StoredGroup
 from app.features.groups.state import GroupState, require_content, require_unchanged
 from app.features.groups.submit import read_solved
-from app.features.queue.listing_queries import count_reviewed
-from app.features.queue.queries import update_verdict
+from app.features.queue.queries import count_reviewed
+from app.features.queue.refresh_queries import update_verdict
 from app.features.verdicts.queries import (
     StoredVerdict,
     count_by_judge,

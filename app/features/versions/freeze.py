@@ -21,7 +21,7 @@ from app.features.datasets.service import DatasetHead, licence_text, read_datase
 from app.features.findings.queries import GroupDismissals
 from app.features.groups.codecs import policy_to_json
 from app.features.groups.queries import read_groups
-from app.features.queue.queries import read_import_findings
+from app.features.queue.refresh_queries import read_import_findings
 from app.features.solutions.queries import (
     known_calibrations,
     present_bodies,

@@ -21,7 +21,7 @@ from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.queries import dataset_names
 from app.features.groups.revision_queries import changed_ids, count_groups, newest_change
-from app.features.queue.listing_queries import columns_from, read_columns
+from app.features.queue.queries import columns_from, read_columns
 from app.features.queue.statistics import COLUMNS, Counted, Statistics, counted, statistics_of
 from app.features.verdicts.queries import judged_since, newest_verdict
 from app.features.what_if.cache import map_arrays, write_arrays

@@ -28,8 +28,8 @@ from app.features.exports.folder import ExportFolder
 from app.features.exports.jobs import export_work
 from app.features.exports.service import export
 from app.features.imports.sources import Source, import_source
-from app.features.jobs import run as job_run
-from app.features.jobs.run import JobProgress
+from app.features.jobs import runner as job_run
+from app.features.jobs.runner import JobProgress
 from app.media.frames import Frames, SentPicture, make_picture
 from app.object_store.path import find_path, target_path
 from app.object_store.store import open_store

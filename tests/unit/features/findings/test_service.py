@@ -22,7 +22,7 @@ from app.features.groups.history import history
 from app.features.groups.replay import rebuild
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
-from app.features.queue.queries import differing_rows
+from app.features.queue.refresh_queries import differing_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict

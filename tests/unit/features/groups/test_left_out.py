@@ -17,7 +17,7 @@ from app.features.groups.submit import load, submit
 from app.features.groups.undo import redo, undo
 from app.features.imports.ingest import ingest
 from app.features.imports.merge import merge_edits
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.features.queue.service import list_groups
 from app.features.verdicts.bulk import give_verdicts
 from app.features.verdicts.service import set_verdict

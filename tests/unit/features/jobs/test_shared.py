@@ -10,7 +10,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, JobCancelled
 from app.features.jobs.queries import Job, update_job
-from app.features.jobs.run import JobProgress
+from app.features.jobs.runner import JobProgress
 from app.features.jobs.shared import SharedJobs
 from tests.waiting import SECONDS
 

@@ -18,7 +18,7 @@ from app.db.migrate import KNOWN_REVISIONS, migrate, schema_revision
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.groups.submit import load
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.features.queue.tables import QUEUE_NUMBERS
 from app.features.verdicts.service import set_verdict
 

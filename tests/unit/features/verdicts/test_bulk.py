@@ -19,7 +19,7 @@ from app.features.groups.state import VerdictState
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
-from app.features.queue.queries import refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.features.queue.service import list_groups, summary
 from app.features.queue.tables import QueueModel
 from app.features.solutions.service import solve_dataset

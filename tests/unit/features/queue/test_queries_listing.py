@@ -13,7 +13,7 @@ from app.config import Settings
 from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.tables import GroupModel
-from app.features.queue.listing_queries import (
+from app.features.queue.queries import (
     Listing,
     Order,
     compares,

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from sqlalchemy import update
 
-from app.features.queue.listing_queries import (
+from app.features.queue.queries import (
     Condition,
     Listing,
     compares,

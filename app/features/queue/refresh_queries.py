@@ -1,0 +1,363 @@
+"""The queue's rows: one a group, brought in step whenever something it shows has changed."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields
+from typing import Any, cast
+
+from sqlalchemy import (
+    BindParameter,
+    Table,
+    and_,
+    bindparam,
+    func,
+    literal,
+    null,
+    or_,
+    select,
+    union_all,
+    update,
+)
+from sqlalchemy import cast as cast_to
+
+from app.db.dialects.statements import insert_or_replace
+from app.db.session import Session
+from app.features.datasets.tables import (
+    DatasetModel,
+    GroupModel,
+    ImportFindingModel,
+    StationModel,
+    ViewModel,
+)
+from app.features.findings.queries import (
+    SHOWN,
+    GroupDismissals,
+    current_dismissals,
+    dismissed_kinds,
+)
+from app.features.findings.tables import DismissalModel
+from app.features.groups.queries import StoredGroup
+from app.features.people.alias_queries import shown_actor
+from app.features.queue.tables import QueueModel
+from app.features.solutions.queries import (
+    SolutionKey,
+    fitting_solution,
+    read_solutions,
+    read_summary,
+)
+from app.features.solutions.summary import SolutionSummary
+from app.features.solutions.tables import SolutionModel
+from app.features.verdicts.queries import StoredVerdict
+from app.features.verdicts.tables import VerdictModel
+from app.soccer.finding import Finding
+
+_BATCH = 1000
+_DISMISSED = 2
+"""Where rows of ``_NOTICED`` are dismissals."""
+_QUEUE = cast(Table, QueueModel.__table__)
+_REPLACE = insert_or_replace(_QUEUE)
+_ROW = update(_QUEUE).where(_QUEUE.c.group_id == bindparam("row"))
+_NOTICE = ImportFindingModel.__table__
+_VIEW = ViewModel.__table__
+_IDS: BindParameter[Any] = bindparam("ids", expanding=True)
+_CHECKED = DismissalModel.__table__
+_UNKNOWN = [cast_to(null(), column.type).label(column.name) for column in SHOWN]
+_NOTICED = union_all(
+    select(
+        _NOTICE.c.group_id.label("group"),
+        _NOTICE.c.kind,
+        _NOTICE.c.sentence,
+        _NOTICE.c.view,
+        literal(0).label("source"),
+        _NOTICE.c.id,
+        *_UNKNOWN,
+    ).where(_NOTICE.c.group_id.in_(_IDS)),
+    select(
+        *(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, literal(1)),
+        *(_NOTICE.c.id, *_UNKNOWN),
+    )
+    .join_from(_VIEW, _NOTICE, _NOTICE.c.station_id == _VIEW.c.station_id)
+    .where(_VIEW.c.group_id.in_(_IDS)),
+    select(
+        *(_CHECKED.c.group_id, _CHECKED.c.kind, _CHECKED.c.sentence, _CHECKED.c.view, literal(2)),
+        *(_CHECKED.c.id, *SHOWN),
+    ).where(_CHECKED.c.group_id.in_(_IDS)),
+).order_by("source", "id")
+"""A group's own come before those of its static cameras; then what people have dismissed."""
+_NUMBERS = [
+    item.name for item in fields(SolutionSummary) if item.name not in ("passes", "findings")
+]
+
+
+def refresh_queue(session: Session, group_ids: Sequence[int]) -> None:
+    """Project groups, views, verdicts and solutions onto the queue's rows, anew for each group."""
+    for start in range(0, len(group_ids), _BATCH):
+        _refresh(session, group_ids[start : start + _BATCH])
+
+
+def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
+    """Bring only what verdicts say in step: a fraction of the work of ``refresh_queue``."""
+    for start in range(0, len(group_ids), _BATCH):
+        ids = group_ids[start : start + _BATCH]
+        verdicts = _verdicts(session, ids)
+        edited = edited_groups(session, ids)
+        heads = session.execute(
+            select(GroupModel.id, GroupModel.inputs_hash, QueueModel.passes)
+            .join(QueueModel, QueueModel.group_id == GroupModel.id)
+            .where(GroupModel.id.in_(ids))
+        )
+        values = [
+            {"of": head.id, **_verdict_values(head, verdicts.get(head.id), edited, head.passes)}
+            for head in heads.all()
+        ]
+        if values:
+            session.execute(
+                update(QueueModel).where(QueueModel.group_id == bindparam("of")), values
+            )
+
+
+def update_row(
+    session: Session,
+    stored: StoredGroup,
+    verdict: StoredVerdict | None,
+    noticed: Sequence[str],
+    summary: SolutionSummary,
+) -> None:
+    """Bring a group's row in step whose edit and solution are at hand: nothing is read.
+
+    Not of a group in which findings were dismissed: ``refresh_queue`` knows these.
+
+    Args:
+        session: A write session.
+        stored: The group as it is now.
+        verdict: The newest one.
+        noticed: Kinds of what imports noticed.
+        summary: Of the group's solution.
+    """
+    edited = {stored.id} if stored.edited else set[int]()
+    values = {
+        "changed": stored.changed,
+        **_verdict_values(stored, verdict, edited, summary.passes),
+        **_computed(summary, noticed),
+    }
+    session.execute(_ROW, {"row": stored.id, **values})
+
+
+def update_verdict(
+    session: Session, stored: StoredGroup, verdict: StoredVerdict, passes: bool | None
+) -> None:
+    """Show a new verdict in a group's row; the rest of it is in step."""
+    edited = {stored.id} if stored.edited else set[int]()
+    session.execute(_ROW, {"row": stored.id, **_verdict_values(stored, verdict, edited, passes)})
+
+
+def differing_rows(session: Session) -> tuple[int, list[int]]:
+    """How many groups there are, and ids of those whose row ``refresh_queue`` would write otherwise.
+
+    Raises:
+        DamagedError: A solution's summary is not what was written.
+    """
+    ids = session.scalars(select(GroupModel.id).order_by(GroupModel.id)).all()
+    apart: list[int] = []
+    for start in range(0, len(ids), _BATCH):
+        some = ids[start : start + _BATCH]
+        present = session.execute(select(_QUEUE).where(_QUEUE.c.group_id.in_(some)))
+        found = {row.group_id: dict(row._mapping) for row in present}
+        apart += [
+            row["group_id"] for row in _rows(session, some) if row != found.get(row["group_id"])
+        ]
+    return len(ids), apart
+
+
+def _refresh(session: Session, ids: Sequence[int]) -> None:
+    rows = _rows(session, ids)
+    if rows:
+        session.execute(_REPLACE, rows)
+
+
+def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
+    """Rows of groups as they follow from everything else."""
+    views, verdicts = _views(session, ids), _verdicts(session, ids)
+    (findings, dismissals), edited = read_import_findings(session, ids), edited_groups(session, ids)
+    checked = _checked(session, dismissals, findings)
+    rows = []
+    for head, summary in _heads(session, ids):
+        passes = None if summary is None else summary.passes
+        judged = _verdict_values(head, verdicts.get(head.id), edited, passes)
+        row = {**_head_values(head, views[head.id]), **judged}
+        row.update(_computed(summary, [item.kind for item in findings[head.id]]))
+        rows.append(row | checked.get(head.id, {}))
+    return rows
+
+
+def _checked(
+    session: Session,
+    dismissals: Mapping[int, GroupDismissals],
+    noticed: Mapping[int, Sequence[Any]],
+) -> dict[int, dict[str, Any]]:
+    """Which kinds of findings are open and which dismissed, of the few groups in which people have
+    dismissed any: their solutions are decoded."""
+    if not dismissals:
+        return {}
+    keys = session.execute(
+        select(
+            GroupModel.id,
+            GroupModel.inputs_hash,
+            DatasetModel.policy_hash,
+            SolutionModel.solver_version,
+        )
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .join(SolutionModel, SolutionModel.id == fitting_solution())
+        .where(GroupModel.id.in_(list(dismissals)))
+    )
+    solutions = read_solutions(session, [SolutionKey(*key) for key in keys], markings=False)
+    checked = {}
+    for group, dismissed in dismissals.items():
+        solved = solutions.get(group)
+        own = [Finding(row.kind, row.sentence, view=row.view) for row in noticed[group]]
+        found = [*(() if solved is None else solved.findings), *own]
+        opened, closed = dismissed_kinds(found, dismissed)
+        checked[group] = {"findings": _list(opened), "dismissed": _list(closed)}
+    return checked
+
+
+def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSummary | None]]:
+    """Groups with the summary of the newest solution of their present state, if there is one.
+
+    That of an earlier solver counts until the group is solved again: its numbers stay in the queue.
+    """
+    statement = (
+        select(*GroupModel.__table__.columns, SolutionModel.summary)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .outerjoin(SolutionModel, SolutionModel.id == fitting_solution())
+        .where(GroupModel.id.in_(ids))
+    )
+    return [
+        (row, None if row.summary is None else read_summary(row.summary))
+        for row in session.execute(statement)
+    ]
+
+
+def _views(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+    statement = (
+        select(ViewModel.group_id, ViewModel.id, ViewModel.key, ViewModel.media_path)
+        .where(ViewModel.group_id.in_(ids))
+        .order_by(ViewModel.position)
+    )
+    views: dict[int, list[Any]] = defaultdict(list)
+    for row in session.execute(statement):
+        views[row.group_id].append(row)
+    return views
+
+
+def _verdicts(session: Session, ids: Sequence[int]) -> dict[int, Any]:
+    newest = (
+        select(func.max(VerdictModel.id))
+        .where(VerdictModel.group_id.in_(ids))
+        .group_by(VerdictModel.group_id)
+    )
+    plain = [column for column in VerdictModel.__table__.columns if column.name != "actor"]
+    actor = shown_actor(VerdictModel.actor, VerdictModel.at).label("actor")
+    rows = session.execute(select(*plain, actor).where(VerdictModel.id.in_(newest)))
+    return {row.group_id: row for row in rows}
+
+
+def read_import_findings(
+    session: Session, ids: Sequence[int]
+) -> tuple[dict[int, list[Any]], dict[int, GroupDismissals]]:
+    """What imports noticed about groups and about the shared stations of their views, and which
+    findings people have dismissed, in one statement.
+
+    Returns:
+        Rows (kind, sentence, view), and what was dismissed, by group id.
+    """
+    rows = session.execute(_NOTICED, {"ids": list(ids)}).all()
+    found: dict[int, list[Any]] = defaultdict(list)
+    for row in rows:
+        if row.source != _DISMISSED:
+            found[row.group].append(row)
+    return found, current_dismissals(row for row in rows if row.source == _DISMISSED)
+
+
+def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+    """The first part of ``read_import_findings``."""
+    return read_import_findings(session, ids)[0]
+
+
+def _head_values(head: Any, views: Sequence[Any]) -> dict[str, Any]:
+    main = views[0].id if views and views[0].media_path is not None else None
+    names = ("dataset_id", "number", "key", "label", "match", "split", "changed")
+    return {
+        **{name: getattr(head, name) for name in names},
+        "group_id": head.id,
+        "views": len(views),
+        "pictures": sum(view.media_path is not None for view in views),
+        "view_keys": _list([view.key for view in views]),
+        "main_view": main,
+    }
+
+
+def edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
+    """Those of the groups that are not what their dataset brought.
+
+    A shared station is not the group's: what is drawn there counts for no group.
+    """
+    own = and_(StationModel.shared.is_(False), StationModel.digest != StationModel.source_digest)
+    statement = (
+        select(ViewModel.group_id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(ViewModel.group_id.in_(ids), or_(ViewModel.digest != ViewModel.source_digest, own))
+        .distinct()
+    )
+    return set(session.scalars(statement))
+
+
+def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
+    """Whether a group was mended: edited, accepted as such, and not failing as it is now.
+
+    What was edited when the verdict was given may have been undone since; a group that was
+    accepted against a gate, or rejected, was not mended.
+
+    Args:
+        verdict: With ``state``, ``override`` and ``fixed`` as they were given.
+        edited: Whether the group differs from what its dataset brought, now.
+        passes: What the gates say now; None while that is not known.
+    """
+    accepted = verdict.state == "accepted" and verdict.override is None
+    return bool(verdict.fixed and accepted and edited and passes is not False)
+
+
+def _verdict_values(
+    head: Any, verdict: Any, edited: Collection[int], passes: bool | None
+) -> dict[str, Any]:
+    if verdict is None or verdict.state == "unreviewed":
+        nobody = dict.fromkeys(("reason", "reviewer", "override"))
+        return {**nobody, "status": "unreviewed", "stale": False, "fixed": False}
+    return {
+        "status": verdict.state,
+        "stale": verdict.inputs_hash != head.inputs_hash,
+        "reason": verdict.reason,
+        "reviewer": verdict.actor,
+        "override": verdict.override,
+        "fixed": is_fixed(verdict, head.id in edited, passes),
+    }
+
+
+def _computed(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[str, Any]:
+    if summary is None:
+        nothing: dict[str, Any] = {**dict.fromkeys(_NUMBERS), "dismissed": ""}
+        return {**nothing, "solved": False, "passes": None, "findings": _list(noticed)}
+    values = {name: getattr(summary, name) for name in _NUMBERS}
+    return {
+        **values,
+        "passes": summary.passes,
+        "solved": True,
+        "findings": _list([*summary.findings, *noticed]),
+        "dismissed": "",
+    }
+
+
+def _list(items: Sequence[str]) -> str:
+    return f",{','.join(dict.fromkeys(items))}," if items else ""
