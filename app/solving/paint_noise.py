@@ -84,6 +84,14 @@ def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
     return weights
 
 
+def cautious_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
+    """``marking_weights`` with at least what the points of a marking share where covariances are told."""
+    counts = np.bincount(marking)
+    shares = np.maximum(_shares(sigmas), LEAST_SHARE)
+    weights: FloatArray = 1 / (1 + shares * (counts[marking] - 1))
+    return weights
+
+
 def _shares(sigmas: FloatArray) -> FloatArray:
     """What each point has in common with its marking, as a share of its variance, shape (N,)."""
     shares: FloatArray = SHARE + THIN_SHARE * np.minimum(sigmas / THIN_SIGMA_PX, 1.0) ** 2

@@ -26,6 +26,49 @@ from app.solving.lone_frame import (
 )
 from app.solving.observations import pitch_curves
 
+CROWN, INWARD, LINES = 0, 1, slice(2, 2 + len(MARKINGS))
+SIZES = slice(2 + len(MARKINGS), 4 + len(MARKINGS))
+TERMS = 4 + len(MARKINGS)
+"""Columns of ``all_terms``: crown, inward, each marking, length and width."""
+
+
+def all_terms(
+    places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
+) -> FloatArray:
+    """``pitch_terms`` with a column for each marking, seen or not, shape (N, TERMS)."""
+    terms = np.zeros((len(marking), TERMS))
+    columns = [CROWN, INWARD, *(LINES.start + np.unique(marking)), SIZES.start, SIZES.stop - 1]
+    terms[:, columns] = pitch_terms(places, marking, jacobian, pitch)
+    return terms
+
+
+def painted_shift(
+    places: FloatArray, marking: IntArray, values: FloatArray, pitch: Pitch
+) -> FloatArray:
+    """How far paint lies off the plan of a pitch of its size, metres, shape (N, 3).
+
+    Args:
+        places: Of the paint, pitch frame, metres, shape (N, 2).
+        marking: Index into ``MARKINGS``, shape (N,).
+        values: Of the columns of ``all_terms``, in their standard deviations, shape (TERMS,).
+        pitch: The pitch, of the size that it has.
+    """
+    inside = INWARD_SIGMA_M * values[INWARD] * (marking != _MIDDLE)
+    inside = inside + LINE_SIGMA_M * values[LINES][marking]
+    raised = CROWN_SIGMA_M * values[CROWN] * _raised(places, pitch)
+    return np.column_stack([inside[:, None] * _inward(places, marking, pitch), -raised])
+
+
+def shifted_offsets(offsets: FloatArray, jacobian: FloatArray, shift: FloatArray) -> FloatArray:
+    """Offsets of paint from markings that lie off their plan, pixels, shape (N,).
+
+    Args:
+        offsets: From the markings of the plan, along their normals, shape (N,).
+        jacobian: Derivative of the marking's place along the normal, shape (N, 8).
+        shift: ``painted_shift``, shape (N, 3).
+    """
+    return np.asarray(offsets - (_by_place(jacobian) * shift).sum(axis=1))
+
 
 def pitch_terms(
     places: FloatArray, marking: IntArray, jacobian: FloatArray, pitch: Pitch
@@ -51,7 +94,7 @@ def painted_terms(
         pitch: The pitch.
     """
     by_place = _by_place(jacobian)
-    raised = np.maximum(1 - (2 * places[:, 1] / pitch.width) ** 2, 0.0)
+    raised = _raised(places, pitch)
     across = (by_place[:, :2] * _inward(places, marking, pitch)).sum(axis=1)
     seen = np.unique(marking)
     return np.column_stack(
@@ -77,6 +120,11 @@ def size_terms(marking: IntArray, jacobian: FloatArray, pitch: Pitch) -> FloatAr
 def _by_place(jacobian: FloatArray) -> FloatArray:
     """By the place on the pitch, shape (N, 3): a pitch that moves is a camera that moves back."""
     return -jacobian[:, X : Z + 1]
+
+
+def _raised(places: FloatArray, pitch: Pitch) -> FloatArray:
+    """Height of the grass as a share of its crown, which runs along the middle, shape (N,)."""
+    return np.asarray(np.maximum(1 - (2 * places[:, 1] / pitch.width) ** 2, 0.0))
 
 
 _MIDDLE = MARKINGS.index("Middle line")

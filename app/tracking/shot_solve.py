@@ -5,9 +5,11 @@ camera's position is that of the tripod, plus a slope by pan (a lens turns befor
 pitch is quite the plan), plus a deviation of its own; the lens's distortion follows the zoom.
 Between neighbours the background says how the camera turned and zoomed.
 
-The normal equations are block tridiagonal, one block of eight parameters for each frame, bordered by what the
-shot has in common, which is eliminated last (Schur complement). Covariances come from the same
+The normal equations are those of ``shot_equations``. Covariances come from the same
 factors; what no pitch has as planned (``solving.paint_terms``) all frames have in common.
+
+Where the shot shows its pitch (``solving.tripod_pitch``) it is solved twice: on the plan, whose markings then
+lie on the paint, and on that pitch. How far both cameras of a frame are apart is the uncertainty of the first.
 
 Source: Triggs et al., "Bundle adjustment: a modern synthesis", sections 6 and 7.
 """
@@ -15,6 +17,7 @@ Source: Triggs et al., "Bundle adjustment: a modern synthesis", sections 6 and 7
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -28,50 +31,58 @@ from app.geometry.resection import (
     PAN,
     PARAMETERS,
     ROLL,
-    CurvePoints,
     X,
     Z,
     camera_from_parameters,
     parameters_from_camera,
     projection_jacobians,
 )
+from app.paint.one_tripod import painted_frame
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import MARKINGS, Pitch
+from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.main_position import MAIN_MEAN, MAIN_SIGMA, is_main_position
 from app.solving.paint_camera import PaintProblem, offsets_of
-from app.solving.paint_noise import PaintOffsets, marking_weights
-from app.solving.paint_terms import pitch_terms
+from app.solving.paint_noise import PaintOffsets, cautious_weights, marking_weights
+from app.solving.paint_terms import TERMS, all_terms, shifted_offsets
 from app.solving.resect import ResectionProblem
+from app.solving.tripod_pitch import (
+    DEVIATION_M,
+    KAPPA_DEVIATION,
+    KAPPA_SLOPE_SIGMA,
+    PaintedFrame,
+    TripodPitch,
+    about_plan,
+    find_tripod_pitch,
+    grass_of,
+)
 from app.tracking.follow import LOST, TRACKED, TrackedFrame
 from app.tracking.motion import AIM, FAR_M, BackgroundMatches, rotate_camera
+from app.tracking.shot_equations import SHARED, ShotEquations
 
-DEVIATION_M = 0.3
-"""Standard deviation of a frame's position from where tripod and pan put it."""
-SLOPE_SIGMA = 4.0
-"""Of the slope of the position by pan, metres a radian."""
-KAPPA_DEVIATION, KAPPA_SLOPE_SIGMA = 0.002, 0.03
-"""Of the distortion from what the zoom says, and of its slope by the logarithm of the focal length."""
+SLOPE_SIGMA, SHOWN_SLOPE_SIGMA = 4.0, 0.1
+"""Of the slope of the position by pan, metres a radian: on the plan, and on the pitch that is shown."""
 FLOW_PX, FLOW_PLACES = 0.3, 4.0
 """Of what the background says of a turn, pixels at 960 wide, at so many places."""
 UNTIED_SIGMA = 1.0
 """Of a step of a frame that nothing else says anything of, radians."""
 ROUNDS, SETTLED_PX = 8, 0.02
 LEAST_FRAMES = 3
-SCALE = np.array([1e-3, 1e-3, 1e-3, 1.0, 1.0, 1.0, 1e-3, 1e-3])
-"""Units in which the equations are solved."""
-SHARED = 8
-"""What a shot has in common: place (3), slope by pan (3), distortion and its slope by zoom."""
-TERMS = len(MARKINGS) + 4
-"""Crown, inward, each marking, length and width."""
 
 
 @dataclass(frozen=True)
-class _Sight:
-    """The paint of a frame: places from the principal point and their sigmas, pixels."""
+class SolvedShot:
+    """The cameras that all frames of a shot together determine.
 
-    sightings: CurvePoints
-    sigmas: FloatArray
+    Attributes:
+        frames: With cameras whose markings of the plan lie on the paint.
+        shown: The pitch that the shot shows; None where it does not.
+        shown_frames: With cameras on that pitch.
+    """
+
+    frames: list[TrackedFrame]
+    shown: TripodPitch | None
+    shown_frames: list[TrackedFrame]
 
 
 def solve_shot(
@@ -80,7 +91,7 @@ def solve_shot(
     size: ImageSize,
     pitch: Pitch,
     policy: CalibrationPolicy,
-) -> list[TrackedFrame]:
+) -> SolvedShot:
     """The same frames, with the cameras that all of them together determine.
 
     Args:
@@ -92,11 +103,45 @@ def solve_shot(
     """
     chosen = [index for index, frame in enumerate(frames) if frame.outcome != LOST]
     if sum(frames[index].outcome == TRACKED for index in chosen) < LEAST_FRAMES:
-        return [_alone(frame) for frame in frames]
+        alone = [_alone(frame) for frame in frames]
+        return SolvedShot(alone, None, alone)
     shot = _Shot([frames[index] for index in chosen], chosen, matches, size, pitch, policy)
+    painted = shot.painted()
+    shown = find_tripod_pitch(list(painted.values()), size, pitch, policy)
     shot.descend()
+    if shown is None:
+        solved = _with_cameras(frames, chosen, shot, shot.covariances())
+        return SolvedShot(solved, None, solved)
+    on_shown = shot.on(shown)
+    on_shown.descend()
+    for place in shot.given:
+        on_shown.parameters[place] = shot.parameters[place]
+    known = {
+        place: shown.covariance_of(frame, on_shown.parameters[place])
+        for place, frame in painted.items()
+    }
+    if len(known) < len(chosen):
+        # What the background carries, or somebody drew, is known as on the plan.
+        known = dict(enumerate(shot.covariances())) | known
+    about = [
+        about_plan(shot.parameters[place], on_shown.parameters[place], known[place])
+        for place in range(len(chosen))
+    ]
+    return SolvedShot(
+        _with_cameras(frames, chosen, shot, about),
+        shown,
+        _with_cameras(frames, chosen, on_shown, [known[place] for place in range(len(chosen))]),
+    )
+
+
+def _with_cameras(
+    frames: Sequence[TrackedFrame],
+    chosen: Sequence[int],
+    shot: _Shot,
+    covariances: Sequence[FloatArray],
+) -> list[TrackedFrame]:
     solved = list(frames)
-    for place, (index, covariance) in enumerate(zip(chosen, shot.covariances(), strict=True)):
+    for place, (index, covariance) in enumerate(zip(chosen, covariances, strict=True)):
         camera, error = shot.camera(place), shot.error_px(place)
         solved[index] = replace(frames[index], camera=camera, covariance=covariance, error_px=error)
     return solved
@@ -111,7 +156,7 @@ def _alone(frame: TrackedFrame) -> TrackedFrame:
 
 
 class _Shot:
-    """The problem of one shot."""
+    """The problem of one shot, on the plan or on the pitch that it shows."""
 
     def __init__(
         self,
@@ -122,8 +167,8 @@ class _Shot:
         pitch: Pitch,
         policy: CalibrationPolicy,
     ):
-        self.half_diagonal = size.diagonal / 2
-        self._pitch = pitch
+        self.half_diagonal, self._size = size.diagonal / 2, size
+        self._pitch, self._slope_sigma = pitch, SLOPE_SIGMA
         first = frames[0].camera
         assert first is not None
         self.principal_point = first.principal_point
@@ -132,8 +177,9 @@ class _Shot:
         self.parameters[:, PAN] = np.unwrap(self.parameters[:, PAN])
         self._problem = PaintProblem.of(ResectionProblem.of(size, policy), self.parameters[0], None)
         self._sights = [self._sight(frame) for frame in frames]
+        self._shifts: dict[int, FloatArray] = {}
         # Without paint an annotated frame is where its lines say.
-        self._given = {
+        self.given = {
             place: (self.parameters[place].copy(), np.linalg.inv(frame.covariance))
             for place, frame in enumerate(frames)
             if frame.snapped is None and frame.covariance is not None
@@ -151,19 +197,24 @@ class _Shot:
         self.shared[6] = np.median(self.parameters[:, KAPPA])
         self._noise = 1.0
 
+    def on(self, shown: TripodPitch) -> _Shot:
+        """The same problem on the pitch that is shown; lines that somebody drew say nothing of that."""
+        other = copy(self)
+        other._pitch, other._slope_sigma = shown.pitch, SHOWN_SLOPE_SIGMA
+        other._shifts = {place: shown.shift_of(each) for place, each in self.painted().items()}
+        other.shared = np.zeros(SHARED)
+        other.shared[:3], other.shared[6] = shown.position, self.shared[6]
+        other.given, other._noise = {}, 1.0
+        return other
+
     def _row(self, frame: TrackedFrame) -> FloatArray:
         assert frame.camera is not None
         return parameters_from_camera(frame.camera, self.half_diagonal)
 
-    def _sight(self, frame: TrackedFrame) -> _Sight | None:
+    def _sight(self, frame: TrackedFrame) -> PaintedFrame | None:
         if frame.outcome != TRACKED or frame.snapped is None:
             return None
-        evidence = frame.snapped.evidence
-        traced = evidence.traced
-        middle = frame.snapped.camera.project(traced.places)
-        pixels = middle + evidence.offsets[:, None] * traced.normals - self.principal_point
-        sightings = CurvePoints(np.ascontiguousarray(pixels), traced.marking, np.ones(len(pixels)))
-        return _Sight(sightings, evidence.sigmas)
+        return painted_frame(frame.snapped)
 
     def _turn(self, place: int, match: BackgroundMatches | None) -> tuple[FloatArray, FloatArray]:
         """How the camera turned and zoomed to the next frame, shape (4,), and its information."""
@@ -187,17 +238,30 @@ class _Shot:
             self.parameters[place], self.principal_point, self.half_diagonal
         )
 
+    def painted(self) -> dict[int, PaintedFrame]:
+        """The frames with paint, by their place in the shot."""
+        return {
+            place: replace(sight, parameters=self.parameters[place])
+            for place, sight in enumerate(self._sights)
+            if sight is not None
+        }
+
     def _seen(self, place: int) -> PaintOffsets | None:
         sight = self._sights[place]
         if sight is None:
             return None
-        return offsets_of(
+        seen = offsets_of(
             self._problem, self.parameters[place], sight.sightings, sight.sigmas, self._pitch
         )
+        shift = self._shifts.get(place)
+        if shift is None:
+            return seen
+        return replace(seen, offsets=shifted_offsets(seen.offsets, seen.jacobian, shift))
 
     def _weights(self, seen: PaintOffsets) -> FloatArray:
         robust = self._problem.robust(seen.offsets, seen.sigmas, strict=True)
-        weights: FloatArray = robust * marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2
+        weigh = cautious_weights if self._shifts else marking_weights
+        weights: FloatArray = robust * weigh(seen.marking, seen.sigmas) / seen.sigmas**2
         return weights / self._noise
 
     def error_px(self, place: int) -> float | None:
@@ -205,9 +269,9 @@ class _Shot:
         seen = self._seen(place)
         return None if seen is None else float(np.median(np.abs(seen.offsets)))
 
-    def _equations(self) -> _Equations:
+    def _equations(self) -> ShotEquations:
         count = len(self.parameters)
-        equations = _Equations(count)
+        equations = ShotEquations(count)
         for place in range(count):
             seen = self._seen(place)
             if seen is not None:
@@ -230,7 +294,7 @@ class _Shot:
         basis[3, 6], basis[3, 7] = 1.0, away[LOG_FOCAL]
         return basis
 
-    def _add_tripod(self, equations: _Equations, place: int) -> None:
+    def _add_tripod(self, equations: ShotEquations, place: int) -> None:
         basis, own = self._basis(place), [X, X + 1, Z, KAPPA]
         rest = self.parameters[place][own] - basis @ self.shared
         weight = np.array([DEVIATION_M, DEVIATION_M, DEVIATION_M, KAPPA_DEVIATION]) ** -2.0
@@ -241,7 +305,7 @@ class _Shot:
         equations.below += basis.T @ (weight * rest)
 
     def _add_turn(
-        self, equations: _Equations, place: int, turned: FloatArray, information: FloatArray
+        self, equations: ShotEquations, place: int, turned: FloatArray, information: FloatArray
     ) -> None:
         rest = turned - (self.parameters[place + 1] - self.parameters[place])[AIM]
         here = np.ix_(AIM, AIM)
@@ -251,11 +315,11 @@ class _Shot:
         equations.right[place][AIM] -= information @ rest
         equations.right[place + 1][AIM] += information @ rest
 
-    def _add_priors(self, equations: _Equations) -> None:
+    def _add_priors(self, equations: ShotEquations) -> None:
         """What is known of tripods and lenses."""
         sigma = np.full(SHARED, np.inf)
         mean = np.zeros(SHARED)
-        sigma[3:6], sigma[7] = SLOPE_SIGMA, KAPPA_SLOPE_SIGMA
+        sigma[3:6], sigma[7] = self._slope_sigma, KAPPA_SLOPE_SIGMA
         sigma[6], mean[6] = self._policy.distortion_sigma, self._policy.distortion_mean
         if is_main_position(self.shared[:3]):
             sigma[:3], mean[:3] = MAIN_SIGMA[1:], MAIN_MEAN[1:]
@@ -265,7 +329,7 @@ class _Shot:
         weight = MAIN_SIGMA[0] ** -2.0 / len(self.parameters)
         equations.diagonal[:, ROLL, ROLL] += weight
         equations.right[:, ROLL] -= weight * self.parameters[:, ROLL]
-        for place, (given, known) in self._given.items():
+        for place, (given, known) in self.given.items():
             equations.diagonal[place] += known
             equations.right[place] += known @ (given - self.parameters[place])
         # A frame that neither paint nor background ties stays where it is.
@@ -296,109 +360,11 @@ class _Shot:
         """Of each frame's parameters, with what no pitch has as planned, shape (8, 8)."""
         equations = self._equations()
         terms = np.zeros((len(self.parameters), PARAMETERS, TERMS))
-        for place in range(len(self.parameters)):
+        for place, frame in self.painted().items():
             seen = self._seen(place)
-            if seen is None:
-                continue
-            camera = self.camera(place)
-            sight = self._sights[place]
-            assert sight is not None
-            grass = np.nan_to_num(camera.on_ground(sight.sightings.pixels + self.principal_point))
-            own = pitch_terms(grass, seen.marking, seen.jacobian, self._pitch)
-            columns = [0, 1, *(2 + np.unique(seen.marking)), TERMS - 2, TERMS - 1]
+            assert seen is not None
+            grass = grass_of(frame, self._size)
+            own = all_terms(grass, seen.marking, seen.jacobian, self._pitch)
             weighted = seen.jacobian * self._weights(seen)[:, None]
-            terms[place][:, columns] = weighted.T @ own
+            terms[place] = weighted.T @ own
         return equations.covariances(terms)
-
-
-class _Equations:
-    """Normal equations: a block tridiagonal matrix with a border.
-
-    Attributes:
-        diagonal: Shape (N, 8, 8).
-        beside: Block between each frame and the next one, shape (N - 1, 8, 8).
-        border: Between each frame and what is shared, shape (N, 8, S).
-        corner: Of what is shared, shape (S, S).
-        right: Shape (N, 8).
-        below: Shape (S,).
-    """
-
-    def __init__(self, count: int):
-        self.diagonal = np.zeros((count, PARAMETERS, PARAMETERS))
-        self.beside = np.zeros((max(count - 1, 0), PARAMETERS, PARAMETERS))
-        self.border = np.zeros((count, PARAMETERS, SHARED))
-        self.corner = np.zeros((SHARED, SHARED))
-        self.right = np.zeros((count, PARAMETERS))
-        self.below = np.zeros(SHARED)
-
-    def _scaled(self) -> tuple[FloatArray, FloatArray]:
-        both = SCALE[:, None] * SCALE
-        return self.diagonal * both, self.beside * both
-
-    def solve(self) -> tuple[FloatArray, FloatArray]:
-        """The step of the frames, shape (N, 8), and of what is shared, shape (S,)."""
-        right = np.concatenate([self.right[:, :, None], self.border], axis=2)
-        found = solve_tridiagonal(*self._scaled(), right * SCALE[:, None]) * SCALE[:, None]
-        alone, border = found[:, :, 0], found[:, :, 1:]
-        rest = self.corner - np.einsum("nis,nit->st", self.border, border)
-        below = self.below - np.einsum("nis,ni->s", self.border, alone)
-        shared = np.linalg.solve(rest, below)
-        return alone - border @ shared, shared
-
-    def covariances(self, terms: FloatArray) -> list[FloatArray]:
-        """Diagonal blocks of the inverse, and what terms that all have in common add to them.
-
-        Args:
-            terms: Right sides of one standard deviation of each term, shape (N, 8, K).
-        """
-        diagonal, beside = self._scaled()
-        right = np.concatenate([self.border, terms], axis=2) * SCALE[:, None]
-        found = solve_tridiagonal(diagonal, beside, right) * SCALE[:, None]
-        border, moved = found[:, :, :SHARED], found[:, :, SHARED:]
-        rest = self.corner - np.einsum("nis,nit->st", self.border, border)
-        shared = np.linalg.inv(rest)
-        below = shared @ -np.einsum("nis,nik->sk", self.border, moved)
-        moved = moved - border @ below
-        inverses = invert_diagonal(diagonal, beside) * (SCALE[:, None] * SCALE)
-        covariances = inverses + border @ shared @ border.transpose(0, 2, 1)
-        covariances += moved @ moved.transpose(0, 2, 1)
-        return [0.5 * (each + each.T) for each in covariances]
-
-
-def solve_tridiagonal(diagonal: FloatArray, beside: FloatArray, right: FloatArray) -> FloatArray:
-    """Solution of a symmetric block tridiagonal system.
-
-    Args:
-        diagonal: Shape (N, B, B).
-        beside: Above the diagonal, shape (N - 1, B, B).
-        right: Shape (N, B, K).
-
-    Returns:
-        Shape (N, B, K).
-
-    Raises:
-        numpy.linalg.LinAlgError: A block is singular.
-    """
-    count = len(diagonal)
-    pivots, rest = diagonal.copy(), right.copy()
-    for n in range(1, count):
-        share = np.linalg.solve(pivots[n - 1], beside[n - 1]).T
-        pivots[n] -= share @ beside[n - 1]
-        rest[n] -= share @ rest[n - 1]
-    found = np.empty_like(rest)
-    for n in range(count - 1, -1, -1):
-        if n < count - 1:
-            rest[n] -= beside[n] @ found[n + 1]
-        found[n] = np.linalg.solve(pivots[n], rest[n])
-    return found
-
-
-def invert_diagonal(diagonal: FloatArray, beside: FloatArray) -> FloatArray:
-    """Diagonal blocks of the inverse of such a system, shape (N, B, B)."""
-    count = len(diagonal)
-    before, after = diagonal.copy(), diagonal.copy()
-    for n in range(1, count):
-        before[n] -= beside[n - 1].T @ np.linalg.solve(before[n - 1], beside[n - 1])
-    for n in range(count - 2, -1, -1):
-        after[n] -= beside[n] @ np.linalg.solve(after[n + 1], beside[n].T)
-    return np.asarray(np.linalg.inv(before + after - diagonal))

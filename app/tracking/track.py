@@ -16,6 +16,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
+from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
 from app.tracking.follow import Outcome, TrackedFrame
 from app.tracking.shot import Given, Tell, follow_shot
@@ -54,13 +55,28 @@ class FrameCamera:
     reason: str | None
 
 
+@dataclass(frozen=True)
+class Track:
+    """The cameras of a clip.
+
+    Attributes:
+        frames: One for each frame, with cameras that lay the plan of the pitch on the paint.
+        shown: The pitch that the clip shows; None where it does not.
+        shown_frames: The same frames with cameras on that pitch.
+    """
+
+    frames: list[FrameCamera]
+    shown: TripodPitch | None
+    shown_frames: list[FrameCamera]
+
+
 def track_clip(
     clip: Clip | Path,
     lines: Mapping[int, Lines],
     pitch: Pitch | None = None,
     policy: CalibrationPolicy | None = None,
     tell: Tell | None = None,
-) -> list[FrameCamera]:
+) -> Track:
     """The camera of every frame of a clip.
 
     Args:
@@ -93,10 +109,14 @@ def track_clip(
         given[number - clip.start] = Given(clip.as_read(found.camera), spread)
     shot = follow_shot(clip, given, pitch, policy, tell)
     solved = solve_shot(shot.frames, shot.matches, clip.work, pitch, policy)
-    return [_as_shown(frame, clip) for frame in solved]
+    return Track(
+        [_in_video(frame, clip) for frame in solved.frames],
+        solved.shown,
+        [_in_video(frame, clip) for frame in solved.shown_frames],
+    )
 
 
-def _as_shown(frame: TrackedFrame, clip: Clip) -> FrameCamera:
+def _in_video(frame: TrackedFrame, clip: Clip) -> FrameCamera:
     """A frame in pixels and numbers of the video."""
     scale = clip.size.width / clip.work.width
     seen, covariance, error = frame.seen, frame.covariance, frame.error_px

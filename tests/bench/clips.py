@@ -3,7 +3,8 @@
 Of each pair of frames of a real clip the 95 % regions of the camera's position should meet: the
 difference, by the sum of both covariances, within chi-square's 95 % for three numbers. Crossbars
 are left out of everything that makes a camera; where people clicked them the camera predicts
-them with its covariance. ``python -m tests.bench.clips``; ``... N`` takes N frames of each clip
+them with its covariance. Frames of a clip that are drawn onto paint share the pitch that they show, as with ``snap
+--tripod``; stills have that of no other. ``python -m tests.bench.clips``; ``... N`` takes N frames of each clip
 for the cameras that need no clicks.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 
@@ -26,12 +27,13 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS, X, Z, parameters_from_camera, projection_jacobians
 from app.paint.grass import field_of_play
+from app.paint.one_tripod import share_tripod
 from app.paint.propose import propose
-from app.paint.snap import snap
+from app.paint.snap import SnappedCamera, snap
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
-from app.soccer.policy import PAPER
+from app.soccer.policy import PAPER, CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.solving.resect import REFERENCE_DIAGONAL
 from tests.bench.table import print_table
@@ -53,6 +55,7 @@ class Known:
     camera: Camera
     covariance: FloatArray
     size: ImageSize
+    snapped: SnappedCamera | None = None
 
     @property
     def sigma_m(self) -> float:
@@ -101,14 +104,18 @@ def bench_clips(data: Path, frames: int = FRAMES) -> None:
         "paint alone (propose)": _proposed,
     }
     found = {name: Found() for name in makers}
+    seen: dict[tuple[str, str | None], list[tuple[Known, Lines]]] = {}
     for clip, image, lines in pictures(folder, frames):
         for name, make in makers.items():
             known = make(image, lines)
-            if known is None:
-                continue
-            if clip is not None:
-                found[name].by_clip.setdefault(clip, []).append(known)
-            for off, sigma in bar_errors(known, lines or make_lines({})):
+            if known is not None:
+                seen.setdefault((name, clip), []).append((known, lines or make_lines({})))
+    for (name, clip), each in seen.items():
+        cameras = [known for known, _ in each]
+        if clip is not None:
+            found[name].by_clip[clip] = cameras = share(cameras)
+        for known, (_, lines) in zip(cameras, each, strict=True):
+            for off, sigma in bar_errors(known, lines):
                 found[name].off.append(off)
                 found[name].sigma.append(sigma)
     header = (
@@ -117,6 +124,16 @@ def bench_clips(data: Path, frames: int = FRAMES) -> None:
     )  # fmt: skip
     rows = [[name, *each.row()] for name, each in found.items()]
     print_table("Sigma on real clips and crossbars", header, rows)
+
+
+def share(cameras: list[Known]) -> list[Known]:
+    """Frames of one clip with what they show together of their pitch."""
+    painted = [known.snapped for known in cameras if known.snapped is not None]
+    shared = share_tripod(painted, PITCH, CalibrationPolicy()) if painted else None
+    if shared is None or len(painted) < len(cameras):
+        return cameras
+    pairs = zip(cameras, shared[1], strict=True)
+    return [replace(known, covariance=covariance) for known, covariance in pairs]
 
 
 def meet(one: Known, other: Known) -> bool:
@@ -206,7 +223,7 @@ def _snapped(image: np.ndarray, lines: Lines | None) -> Known | None:
     found = snap(image, field, start.camera, start_covariance=start.covariance)
     if found.reason is not None or found.covariance is None:
         return None
-    return Known(found.camera, found.covariance, start.size)
+    return Known(found.camera, found.covariance, start.size, found)
 
 
 def _proposed(image: np.ndarray, lines: Lines | None) -> Known | None:
@@ -215,7 +232,7 @@ def _proposed(image: np.ndarray, lines: Lines | None) -> Known | None:
         return None
     if found.snapped.covariance is None:
         return None
-    return Known(found.camera, found.snapped.covariance, _size(image))
+    return Known(found.camera, found.snapped.covariance, _size(image), found.snapped)
 
 
 if __name__ == "__main__":

@@ -66,7 +66,9 @@ class KnownRecording:
     def tracked(self, shot: int) -> list[FrameCamera]:
         """The cameras of a shot as the product finds them."""
         known = self.truth["shots"][shot]
-        return track_clip(Clip.open(self.path, self.index, known["first"], known["last"]), {})
+        return track_clip(
+            Clip.open(self.path, self.index, known["first"], known["last"]), {}
+        ).frames
 
     def linked(self, link: dict[str, Any], noise_px: float, seed: int = 0) -> TimeMap:
         """The map of a replay's times as the product finds it, from true cameras and a noisy ball."""

@@ -1,7 +1,8 @@
 """Cameras over time: how many frames of real clips are tracked, and how well they lie (docs/track.md).
 
 Distances are pixels at 960 wide. Paint is read anew beside each camera; clicked markings are those of the
-annotated frames, met where every click lies within 0.5 % of the diagonal. Without real clips a
+annotated frames, met where every click lies within 0.5 % of the diagonal: by the cameras on the plan, 105 x 68 m,
+and by those on the pitch that the clip shows. Without real clips a
 rendered film is followed. ``python -m tests.bench.track [CLIP ...]``.
 """
 
@@ -28,6 +29,7 @@ from app.paint.evidence import seek, trace
 from app.soccer.annotation import Lines
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.jaccard import project_markings
+from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
 from app.tracking.picture import read_frames
 from app.tracking.track import FrameCamera, track_clip
@@ -41,7 +43,8 @@ PAIRS_EVERY = 5
 RENDERED = 24
 HEADER = (
     "clip", "annotated", "frames", "tracked %", "bridged", "lost", "paint px", "p95", "clicked met",
-    "sigma m", "pairs meet %", "frames/s", "cpu ms", "x decoding",
+    "sigma m", "pairs meet %", "pitch that is shown, m", "on it: paint px", "p95", "met", "sigma m",
+    "pairs meet %", "frames/s", "cpu ms", "x decoding",
 )  # fmt: skip
 
 
@@ -69,26 +72,53 @@ def bench_track(data: Path, names: Sequence[str] = ()) -> None:
 def measure(file: Path, known: Mapping[int, Lines], chosen: list[int]) -> list[object]:
     """Numbers of one clip."""
     began, spent = time.perf_counter(), time.process_time()
-    found = track_clip(file, {number: known[number] for number in chosen})
+    track = track_clip(file, {number: known[number] for number in chosen})
+    found = track.frames
     wall, cpu = time.perf_counter() - began, time.process_time() - spent
     clip = Clip.open(file)
     decoding = -time.process_time()
     count = sum(1 for _ in clip.frames())
     decoding += time.process_time()
     paint = paint_distances(clip, found)
-    met = [hits for number in known for hits in clicked_hits(found[number], known[number])]
+    met, met_shown = (
+        [hits for number in known for hits in clicked_hits(each[number], known[number], shown)]
+        for each, shown in ((found, None), (track.shown_frames, track.shown))
+    )
     outcomes = [frame.outcome for frame in found]
     tracked = [frame for frame in found if frame.outcome == "tracked"]
-    pairs = [meet(*pair) for pair in combinations(tracked[::PAIRS_EVERY], 2)]
+    shown = track.shown
+    on_shown = [frame for frame in track.shown_frames if frame.outcome == "tracked"]
+    apart = [frame.error_px for frame in on_shown if frame.error_px is not None]
+    unit = clip.size.width / 960
     return [
         file.stem, ",".join(map(str, chosen)) or "none", count,
         f"{100 * outcomes.count('tracked') / count:.1f}", outcomes.count("bridged"),
         outcomes.count("lost"), *(np.percentile(paint, [50, 95]).tolist() if paint else [None, None]),
-        f"{np.mean(met):.2f} of {len(met)}" if met else None,
-        float(np.median([sigma_m(frame) for frame in tracked])) if tracked else None,
-        100 * float(np.mean(pairs)) if pairs else None,
+        f"{np.mean(met):.2f} of {len(met)}" if met else None, *_agreement(tracked),
+        "" if shown is None else said(shown),
+        *(np.percentile(apart, [50, 95]) / unit if apart else [None, None]),
+        f"{np.mean(met_shown):.2f}" if met_shown else None, *_agreement(on_shown),
         f"{count / wall:.0f}", f"{1000 * cpu / count:.0f}", f"{cpu / decoding:.1f}",
     ]  # fmt: skip
+
+
+def _agreement(tracked: Sequence[FrameCamera]) -> list[float | None]:
+    """Median sigma of the position, metres, and the percentage of pairs whose regions meet."""
+    pairs = [meet(*pair) for pair in combinations(tracked[::PAIRS_EVERY], 2)]
+    return [
+        float(np.median([sigma_m(frame) for frame in tracked])) if tracked else None,
+        100 * float(np.mean(pairs)) if pairs else None,
+    ]
+
+
+def said(shown: TripodPitch) -> str:
+    """Length, width and crown with their standard deviations."""
+    length, width = shown.sizes_sigma
+    crown, sigma = shown.crown
+    return (
+        f"{shown.pitch.length:.1f} ±{length:.1f} x {shown.pitch.width:.1f} ±{width:.1f},"
+        f" crown {crown:.2f} ±{sigma:.2f}"
+    )
 
 
 def clicked(clip: Clip, name: str, lines: Path) -> dict[int, Lines]:
@@ -101,12 +131,15 @@ def clicked(clip: Clip, name: str, lines: Path) -> dict[int, Lines]:
     }
 
 
-def clicked_hits(frame: FrameCamera, lines: Lines) -> list[bool]:
-    """Of each clicked marking of the grass, whether the camera lays it there."""
+def clicked_hits(frame: FrameCamera, lines: Lines, pitch: TripodPitch | None = None) -> list[bool]:
+    """Of each clicked marking of the grass, whether the camera lays it there; that of a pitch, or of the plan."""
     names = [name for name in lines if name in MARKINGS and not name.startswith("Goal")]
     if frame.camera is None:
         return [False] * len(names)
     shown = project_markings(frame.camera, Pitch(), frame.size)
+    if pitch is not None:
+        lines_of = ((name, frame.camera.project(pitch.line(name))) for name in names)
+        shown = {name: line[np.isfinite(line).all(axis=1)] for name, line in lines_of}
     hits = []
     for name in names:
         points = np.array([[point.x, point.y] for point in lines[name]])

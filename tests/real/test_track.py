@@ -19,7 +19,7 @@ def test_a_real_clip_is_tracked_onto_its_paint(annotated: list[int]):
     file = FOLDER / "clips" / "rma_sev.mp4"
     clip = Clip.open(file)
     known = clicked(clip, file.stem, FOLDER / "lines")
-    found = track_clip(file, {number: known[number] for number in annotated})
+    found = track_clip(file, {number: known[number] for number in annotated}).frames
     tracked = [frame for frame in found if frame.outcome == "tracked"]
     assert len(tracked) >= 0.97 * len(found)
     distances = paint_distances(clip, found)

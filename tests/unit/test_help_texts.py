@@ -32,7 +32,7 @@ PLAIN_WORDS = """
     command comment comments compare comparison completion config confirm connections contact cookies copy copying corner
     counts cross css csv cursor curve cuts damped database datasets day delete deps descriptions details detect
     devices diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor
-    empty endings engine enrol ephemeral errors estimator evaluate event events executors export exports facets facts faults
+    empty endings engine enrol ephemeral equations errors estimator evaluate event events executors export exports facets facts faults
     fields figure figures files film finder finite first fit fixture folder folders follow form format formats frozen
     gestures give glossary gold grass grid guess guide guideline guidelines header headers heat help histograms
     history hit home hooks hosts idempotency identity if image images import imports index indexing info init insert
@@ -51,7 +51,7 @@ PLAIN_WORDS = """
     sign singular site smallest snapshot solve solving source sources sphere spill spread sqlite squares stacks
     stage staging standpoints starts state statements statistics steps storage store stored straight stream stretches strict
     submit suggested suggestions summary surface swap synloc tab table tall team term terminal text threads
-    threshold ticks time tokens tools trace tracing track tracking transfer transitions tree trees triangulate tries truth types
+    threshold ticks time tokens tools trace tracing track tracking transfer transitions tree trees triangulate tries tripod truth types
     undo undrawn upload v3 v3d video viewport viewports virtual visibility wal walk warm web what when window words
     work worker workspace write writer zip
 """

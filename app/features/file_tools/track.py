@@ -22,9 +22,10 @@ from app.geometry.resection import LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Z
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
+from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
 from app.tracking.follow import OUTCOMES
-from app.tracking.track import FrameCamera, track_clip
+from app.tracking.track import FrameCamera, Track, track_clip
 from app.worker_process import WorkerEnded, WorkerLimits, WorkerProcess
 
 RESULT = "track.json"
@@ -38,6 +39,7 @@ def track_files(
     out: Path,
     lines: Sequence[str] = (),
     *,
+    on_shown: bool = False,
     progress: ReportProgress | None = None,
 ) -> dict[str, Any]:
     """Write a camera file for each frame of a clip that has a camera, and what became of each.
@@ -49,6 +51,7 @@ def track_files(
         out: Folder that gets ``camera_<frame>.json`` and ``track.json``. Camera files that an
             earlier run left there for the same frames are replaced or removed.
         lines: ``FILE@FRAME``: a line file of SoccerNet's form, and the number of its frame.
+        on_shown: Whether cameras are those of the pitch that the clip shows, instead of the plan.
         progress: Called with frames done.
 
     Returns:
@@ -69,14 +72,16 @@ def track_files(
 
     with closing(WorkerProcess(LIMITS)) as worker:
         try:
-            found: list[FrameCamera] = worker.run(
-                track_video, clip, contents, shown, on_message=tell
-            )
+            found: Track = worker.run(track_video, clip, contents, shown, on_message=tell)
         except WorkerEnded as error:
             raise InputError(f"{clip.name} {error}") from error
-    rows = [frame_row(frame) for frame in found]
-    write_cameras(out, found, rows)
-    return {"frames": rows}
+    frames = found.shown_frames if on_shown else found.frames
+    result = {
+        "frames": [frame_row(frame) for frame in frames],
+        "pitch": pitch_row(found.shown, on_shown=on_shown),
+    }
+    write_cameras(out, frames, result)
+    return result
 
 
 def track_video(
@@ -84,7 +89,7 @@ def track_video(
     contents: Mapping[int, bytes],
     shown: Mapping[int, str],
     send: Callable[[int], Any],
-) -> list[FrameCamera]:
+) -> Track:
     """The work of the process: decode, calibrate and follow.
 
     Args:
@@ -175,17 +180,48 @@ def _sigma(covariance: Sequence[float], focal: float) -> dict[str, float]:
     }
 
 
+def pitch_row(shown: TripodPitch | None, *, on_shown: bool) -> dict[str, Any] | None:
+    """The pitch that a clip shows, for ``track.json``: metres; None where it shows none.
+
+    ``cameras`` says whether the cameras are those of the ``plan`` or of the pitch that is ``shown``;
+    ``other`` is the size where it certainly is not the plan's.
+    """
+    if shown is None:
+        return None
+    (crown, crown_sigma), (inward, inward_sigma) = shown.crown, shown.inward
+    (knows_length, knows_width), (length, width) = shown.knows_sizes, shown.sizes_sigma.tolist()
+    spread = np.linalg.eigvalsh(shown.position_covariance)[-1]
+    other = shown.other_pitch()
+    return {
+        "cameras": "shown" if on_shown else "plan",
+        "length": shown.pitch.length if knows_length else None,
+        "width": shown.pitch.width if knows_width else None,
+        "crown": crown,
+        "inward": inward,
+        "tripod": shown.position.tolist(),
+        "sigma": {
+            "length": length if knows_length else None,
+            "width": width if knows_width else None,
+            "crown": crown_sigma,
+            "inward": inward_sigma,
+            "tripod": float(np.sqrt(spread)),
+        },
+        "frames": shown.frames,
+        "other": None if other is None else {"length": other.length, "width": other.width},
+    }
+
+
 def count_outcomes(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
     """How many frames had which outcome."""
     counts = Counter(row["outcome"] for row in rows)
     return {"frames": len(rows), **{name: counts[name] for name in OUTCOMES}}
 
 
-def write_cameras(out: Path, found: Sequence[FrameCamera], rows: list[dict[str, Any]]) -> None:
+def write_cameras(out: Path, found: Sequence[FrameCamera], result: Mapping[str, Any]) -> None:
     """Write ``camera_<frame>.json`` of each frame that has a camera, and ``track.json``.
 
     Args:
-        rows: ``frame_row`` of each frame.
+        result: What ``track.json`` holds: ``frame_row`` of each frame, and ``pitch_row``.
 
     Raises:
         InputError: ``out`` cannot hold them.
@@ -199,7 +235,7 @@ def write_cameras(out: Path, found: Sequence[FrameCamera], rows: list[dict[str, 
                 continue
             text = camera_text(frame.camera, frame.covariance, frame.size)
             replace_file(file, text.encode(), durable=False, private=False)
-        text = json_text({"frames": rows}, indent=1) + "\n"
+        text = json_text(result, indent=1) + "\n"
         replace_file(out / RESULT, text.encode(), durable=False, private=False)
     except (OSError, UnsafePathError) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -17,6 +18,14 @@ from app.terminal.options import Json, Workers, acting, parse_size, read_setting
 from app.terminal.terminal import print_json, print_values, say, show_progress
 
 commands = typer.Typer()
+
+
+class CamerasOn(StrEnum):
+    """Of which pitch the cameras of a clip are."""
+
+    PLAN = "plan"
+    SHOWN = "shown"
+
 
 Images = Annotated[
     list[Path],
@@ -239,6 +248,13 @@ def track(
             help="Lines of a frame, which count from 0; may be given several times.",
         ),
     ] = None,
+    pitch: Annotated[
+        CamerasOn,
+        typer.Option(
+            help="plan: cameras lay the markings of 105 x 68 m on the paint; shown: they are those "
+            "of the pitch that the clip shows, of its own length, width and crown (track.json)."
+        ),
+    ] = CamerasOn.PLAN,
     json_: Json = False,
 ) -> None:
     """Follow the camera of a clip: a camera for each frame.
@@ -250,8 +266,13 @@ def track(
     from app.features.file_tools.track import count_outcomes, track_files
 
     with show_progress("Tracking") as progress:
-        result = track_files(clip, out, lines or (), progress=progress)
+        on_shown = pitch is CamerasOn.SHOWN
+        result = track_files(clip, out, lines or (), on_shown=on_shown, progress=progress)
     if json_:
         print_json(result)
         return
     print_values(count_outcomes(result["frames"]), False)
+    shown = result["pitch"]
+    if shown is not None and shown["other"] is not None:
+        length, width = shown["other"]["length"], shown["other"]["width"]
+        say(f"The clip shows a pitch of {length:g} x {width:g} m, not 105 x 68 m.")

@@ -266,8 +266,8 @@ def track_stretch(
 
     usable = {number: drawn for number, drawn in lines.items() if makes_camera(drawn)}
     total = last - first + 1
-    frames = track_clip(clip, usable, pitch, policy, tell)
-    return Tracked(frames, tuple(sorted(set(lines) - set(usable))))
+    found = track_clip(clip, usable, pitch, policy, tell)
+    return Tracked(found.frames, tuple(sorted(set(lines) - set(usable))))
 
 
 def save_cameras(

@@ -24,7 +24,8 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.follow import BRIDGED, LOST, TRACKED, TrackedFrame
 from app.tracking.motion import BackgroundMatches
-from app.tracking.shot_solve import invert_diagonal, solve_shot, solve_tridiagonal
+from app.tracking.shot_equations import invert_diagonal, solve_tridiagonal
+from app.tracking.shot_solve import solve_shot
 from tests.unit.paint.lawns import SMALL, TRUE
 
 HALF = SMALL.diagonal / 2
@@ -73,7 +74,7 @@ def shot(
 def solve(
     frames: list[TrackedFrame], matches: list[BackgroundMatches | None]
 ) -> list[TrackedFrame]:
-    return solve_shot(frames, matches, SMALL, Pitch(), CalibrationPolicy())
+    return solve_shot(frames, matches, SMALL, Pitch(), CalibrationPolicy()).frames
 
 
 def positions(frames: list[TrackedFrame]) -> FloatArray:

@@ -40,7 +40,7 @@ def drawn(film: Film, number: int) -> Lines:
 
 def test_every_frame_is_tracked_without_any_annotation(film: Film, tmp_path: Path):
     heard: list[int] = []
-    found = track_clip(film.write(tmp_path), {}, tell=heard.append)
+    found = track_clip(film.write(tmp_path), {}, tell=heard.append).frames
     assert outcomes(found) == ["tracked"] * len(film.images)
     assert [frame.number for frame in found] == list(range(len(film.images)))
     assert [frame.time for frame in found] == pytest.approx(np.arange(len(found)) / 25)
@@ -57,7 +57,7 @@ def test_every_frame_is_tracked_without_any_annotation(film: Film, tmp_path: Pat
 def test_lines_of_one_frame_place_the_frames_before_and_behind_it(film: Film, tmp_path: Path):
     middle = len(film.images) // 2
     lines = drawn(film, middle)
-    found = track_clip(film.write(tmp_path), {middle: lines})
+    found = track_clip(film.write(tmp_path), {middle: lines}).frames
     assert outcomes(found) == ["tracked"] * len(film.images)
     assert [frame.number for frame in found if frame.is_keyframe] == [middle]
     assert farthest(film, found) < 1.5
@@ -67,7 +67,7 @@ def test_lines_of_a_frame_that_shows_nothing_hold_its_camera(film: Film, tmp_pat
     images, rng = list(film.images), np.random.default_rng(1)
     for number in (3, 4):
         images[number] = rng.integers(0, 255, images[number].shape, dtype=np.uint8)
-    found = track_clip(film.write(tmp_path, images), {3: drawn(film, 3)})
+    found = track_clip(film.write(tmp_path, images), {3: drawn(film, 3)}).frames
     expected = ["tracked"] * len(images)
     expected[3:5] = "bridged", "lost"
     assert outcomes(found) == expected
@@ -79,7 +79,7 @@ def test_frames_without_paint_are_bridged_by_the_background(film: Film, tmp_path
     images = list(film.images)
     for number in (4, 5):
         images[number] = cv2.medianBlur(images[number], 15)
-    found = track_clip(film.write(tmp_path, images), {})
+    found = track_clip(film.write(tmp_path, images), {}).frames
     expected = ["tracked"] * len(images)
     expected[4] = expected[5] = "bridged"
     assert outcomes(found) == expected
@@ -94,7 +94,7 @@ def test_frames_of_something_else_have_no_camera_and_those_behind_them_do(
     images, rng = list(film.images), np.random.default_rng(1)
     for number in (4, 5):
         images[number] = rng.integers(0, 255, images[number].shape, dtype=np.uint8)
-    found = track_clip(film.write(tmp_path, images), {})
+    found = track_clip(film.write(tmp_path, images), {}).frames
     expected = ["tracked"] * len(images)
     expected[4] = expected[5] = "lost"
     assert outcomes(found) == expected
@@ -104,7 +104,7 @@ def test_frames_of_something_else_have_no_camera_and_those_behind_them_do(
 
 def test_a_film_of_nothing_has_no_camera(tmp_path: Path):
     images = [np.full((270, 480, 3), (40, 110, 40), np.uint8)] * 3
-    found = track_clip(Film(images, []).write(tmp_path), {})
+    found = track_clip(Film(images, []).write(tmp_path), {}).frames
     assert outcomes(found) == ["lost"] * 3
 
 

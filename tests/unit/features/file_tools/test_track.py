@@ -6,18 +6,38 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.errors import InputError
 from app.features.file_tools import track
-from app.features.file_tools.track import count_outcomes, frame_row, track_files
+from app.features.file_tools.track import count_outcomes, frame_row, pitch_row, track_files
 from app.formats.cameras_reader import read_cameras
 from app.formats.report import Report
-from app.tracking.track import FrameCamera
+from app.soccer.frames import ImageSize
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.solving.lone_frame import CROWN_SIGMA_M, PAINT_SIZE_SIGMA_M
+from app.solving.paint_terms import CROWN, SIZES, TERMS
+from app.solving.tripod_pitch import SHARED, TripodPitch
+from app.tracking.track import FrameCamera, Track
 from tests.tracked_frames import CAMERA, frame
 from tests.unit.tracking.test_clip import write
 
 Run = Callable[..., tuple[int, str, str]]
+
+
+def _shown() -> TripodPitch:
+    """A pitch of 101 x 68 m with a crown of 0.16 m, each number known to a tenth of its prior."""
+    shared, terms = np.zeros(SHARED), np.zeros(TERMS)
+    terms[CROWN], terms[SIZES.start] = 0.16 / CROWN_SIGMA_M, -4 / PAINT_SIZE_SIGMA_M[0]
+    shared[:3], shared[SHARED - TERMS :] = (0.5, 66.0, -15.0), terms
+    covariance, spread = 0.01 * np.eye(SHARED), np.zeros((3, 3))
+    size = ImageSize(960, 540)
+    return TripodPitch(Pitch(), size, 24, shared, covariance, 7.0, 1.0, spread, CalibrationPolicy())
+
+
+SHOWN = _shown()
 
 
 @pytest.fixture
@@ -29,9 +49,9 @@ def found(monkeypatch: pytest.MonkeyPatch) -> list[FrameCamera]:
         def __init__(self, limits: object) -> None:
             pass
 
-        def run(self, *arguments: object, on_message: Callable[[int], None]) -> list[FrameCamera]:
+        def run(self, *arguments: object, on_message: Callable[[int], None]) -> Track:
             on_message(3)
-            return frames
+            return Track(frames, SHOWN, [frames[1], frames[1], frames[2]])
 
         def close(self) -> None:
             pass
@@ -64,9 +84,31 @@ def test_files_of_cameras_and_the_outcome_of_each_frame_are_written(
     cameras = read_cameras(out, Report())
     assert cameras["0"].position == pytest.approx(CAMERA.position)
     code, told, _ = touchline("track", clip, out)
-    assert (code, told.split()) == (
-        0, ["frames", "3", "tracked", "1", "bridged", "1", "lost", "1"],
-    )  # fmt: skip
+    assert code == 0
+    counts, sentence = told.strip().rsplit("\n", 1)
+    assert counts.split() == ["frames", "3", "tracked", "1", "bridged", "1", "lost", "1"]
+    assert sentence == "The clip shows a pitch of 101 x 68 m, not 105 x 68 m."
+
+
+def test_the_pitch_that_is_shown_is_told_and_cameras_are_of_it_where_asked(
+    found: list[FrameCamera], tmp_path: Path, touchline: Run
+):
+    clip, out = tmp_path / "clip.mp4", tmp_path / "out"
+    clip.touch()
+    code, told, _ = touchline("track", clip, out, "--pitch", "shown", "--json")
+    result = json.loads(told)
+    assert code == 0
+    assert [row["outcome"] for row in result["frames"]] == ["bridged", "bridged", "lost"]
+    pitch = result["pitch"]
+    assert pitch["cameras"] == "shown" and pitch["frames"] == 24
+    assert pitch["length"] == pytest.approx(101) and pitch["width"] == pytest.approx(68)
+    assert pitch["crown"] == pytest.approx(0.16)
+    assert pitch["tripod"] == pytest.approx([0.5, 66.0, -15.0])
+    assert pitch["other"] == {"length": 101.0, "width": 68.0}
+    sigma = pitch["sigma"]
+    assert (sigma["length"], sigma["width"]) == pytest.approx((0.15, 0.05))
+    assert sigma["tripod"] == pytest.approx(0.1)
+    assert pitch_row(None, on_shown=True) is None
 
 
 @pytest.mark.parametrize(

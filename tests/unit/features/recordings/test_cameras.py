@@ -47,7 +47,7 @@ from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
-from app.tracking.track import FrameCamera
+from app.tracking.track import FrameCamera, Track
 from tests.tripod_films import Film, render_film
 from tests.videos import write_pictures
 
@@ -424,7 +424,12 @@ def test_lines_that_make_no_camera_are_named_and_left_out(
     app: Any, found: Recording, monkeypatch: pytest.MonkeyPatch, tripod: Film
 ) -> None:
     asked: dict[str, Any] = {}
-    monkeypatch.setattr(module, "track_clip", lambda clip, lines, *_: asked.update(lines) or [])
+
+    def follow(clip: Any, lines: Any, *_: Any) -> Track:
+        asked.update(lines)
+        return Track([], None, [])
+
+    monkeypatch.setattr(module, "track_clip", follow)
     few = make_lines({"Middle line": (ImagePoint(600, 100), ImagePoint(620, 500))})
     known = (found.path, app.state.services.settings, found.require_readable(), 4, 11)
     tracked = track_stretch(*known, {5: few}, None, CalibrationPolicy(), lambda _: None)
