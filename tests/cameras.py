@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.formats.cameras_writer import camera_name, camera_text
-from app.formats.view_files import write_below
+from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.view_files import write_file_below
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE
@@ -93,5 +93,6 @@ def _level(place: FloatArray, target: FloatArray) -> FloatArray:
 def write_cameras(root: Path, cameras: Mapping[str, Camera]) -> list[Path]:
     """Write ``camera_<stem>.json`` per camera below an existing folder; the paths written."""
     return [
-        write_below(root, camera_name(key), camera_text(camera)) for key, camera in cameras.items()
+        write_file_below(root, camera_file_name(key), camera_file_text(camera))
+        for key, camera in cameras.items()
     ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from app.evaluation.table import FrameRange, Table
-from app.formats.csv_text import Value, cell
+from app.formats.csv_text import Value, csv_cell
 
 FIGURES = (
     "precision_recall",
@@ -142,5 +142,5 @@ def _text(header: tuple[str, ...] | list[str], rows: Iterator[list[Value]]) -> s
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows([cell(value) for value in row] for row in rows)
+    writer.writerows([csv_cell(value) for value in row] for row in rows)
     return file.getvalue()

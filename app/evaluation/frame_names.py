@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from app.formats.export_names import key_in_group, named
+from app.formats.export_names import key_in_group, with_export_key
 from app.formats.fields import id_text
-from app.formats.frame_names import flat_frame, match_frame
-from app.formats.gamestate import sequence_frame
-from app.formats.sn_calibration import line_frame
+from app.formats.frame_names import frame_path_by_match, frame_path_in_split
+from app.formats.gamestate import sequence_frame_path
+from app.formats.sn_calibration import line_frame_path
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
@@ -218,14 +218,14 @@ def _exported(frame: NamedFrame) -> Iterator[str]:
     station = Station(frame.station or frame.view, frame.size, shared=bool(frame.station))
     view = View(frame.view, station)
     group = Group(frame.group, (view,), match=frame.match)
-    in_group, flat = (named(view, key_in_group(group, view, glue)) for glue in "/_")
+    in_group, flat = (with_export_key(view, key_in_group(group, view, glue)) for glue in "/_")
     for called in (view, in_group):
-        yield _without_ending(match_frame(group, called, "", ".jpg"))
+        yield _without_ending(frame_path_by_match(group, called, "", ".jpg"))
     for called in (view, flat):
-        yield _without_ending(sequence_frame(group, called, "", ".jpg").split("/", 1)[-1])
-    yield _without_ending(flat_frame(group, view, "", ".jpg").rsplit("/", 1)[-1])
+        yield _without_ending(sequence_frame_path(group, called, "", ".jpg").split("/", 1)[-1])
+    yield _without_ending(frame_path_in_split(group, view, "", ".jpg").rsplit("/", 1)[-1])
     for called in (view, in_group):
-        lines = _without_ending(line_frame(group, called, "", ".jpg").rsplit("/", 1)[-1])
+        lines = _without_ending(line_frame_path(group, called, "", ".jpg").rsplit("/", 1)[-1])
         # A plain number tells no match, and a static camera has one file of lines.
         if not frame.station and lines != _without_ending(frame.view).rsplit("/", 1)[-1]:
             yield lines

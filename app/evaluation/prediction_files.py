@@ -43,7 +43,7 @@ from app.formats.ball_names import is_ball
 from app.formats.cameras_reader import read_cameras
 from app.formats.fields import IdIndex, id_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
-from app.formats.json_text import json_kind, read_json, read_json_lines
+from app.formats.json_text import describe_document, read_json, read_json_lines
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
@@ -246,7 +246,7 @@ def _json_documents(tree: FileTree, path: Path, report: Report) -> Documents:
         if isinstance(value, list) or "images" in value or "annotations" in value:
             found.append((shown, value))
         else:
-            other = f"{json_kind(value)}; {_RESULTS}"
+            other = f"{describe_document(value)}; {_RESULTS}"
     if not found:
         problem = other or "holds no COCO results"
         raise DatasetFormatError(str(path), None, None, problem)
@@ -278,19 +278,19 @@ class _CocoImages:
         for shown, value in documents:
             for number, item in enumerate(_listed(value, "images")):
                 with noted(report, shown, f"image {number}"):
-                    image = fields.mapping(item)
+                    image = fields.require_object(item)
                     name = str(image.get("file_name", ""))
                     with noted(report, shown, f"image {number}"):
                         if image.get("width") and image.get("height"):
                             sides = (
-                                read_field(image, side, fields.whole)
+                                read_field(image, side, fields.whole_number)
                                 for side in ("width", "height")
                             )
                             sizes[name] = ImageSize(*sides)
                     _add_id(names, image, name)
             for number, item in enumerate(_listed(value, "categories")):
                 with noted(report, shown, f"category {number}"):
-                    category = fields.mapping(item)
+                    category = fields.require_object(item)
                     name = str(category.get("name", ""))
                     _add_id(classes, category, name)
                     balls = balls or is_ball(name)
@@ -334,7 +334,7 @@ def _class_of(value: Mapping[str, Any], known: _CocoImages) -> tuple[int | str, 
         return 1, known.classes.find(1) or ""
     label, text = known.classes.find(value["category_id"]), id_text(value["category_id"])
     try:
-        return read_field(value, "category_id", fields.whole), label or ""
+        return read_field(value, "category_id", fields.whole_number), label or ""
     except FieldError:
         # A class may be called by a word, where the document lists it so.
         if label is None or text is None:
@@ -343,13 +343,13 @@ def _class_of(value: Mapping[str, Any], known: _CocoImages) -> tuple[int | str, 
 
 
 def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
-    value = fields.mapping(item)
+    value = fields.require_object(item)
     own = next((name for field in _NAMES if isinstance(name := value.get(field), str) and name), "")
     identity = ""
     if not own or value.get("image_id") is not None:
         with in_field("image_id"):
             identity = _identity(value.get("image_id"))
-    box = read_field(value, "bbox", lambda item: Box(*fields.numbers(item, 4)))
+    box = read_field(value, "bbox", lambda item: Box(*fields.number_list(item, 4)))
     score = read_field(value, "score", fields.number) if "score" in value else None
     if not run.wants(*_class_of(value, known)):
         return
@@ -443,7 +443,7 @@ def _add_yolo(
         raise ValueError(
             f"has {len(cells)} numbers, not class, cx, cy, w, h, and maybe a confidence and a track"
         )
-    category = fields.whole(cells[0])
+    category = fields.whole_number(cells[0])
     x, y, width, height = (fields.number(cell) for cell in cells[1:5])
     if not all(-1 <= value <= 2 for value in (x, y, width, height)):
         raise ValueError("is in pixels; YOLO's numbers are shares of the image")

@@ -14,7 +14,7 @@ from app.errors import DatasetFormatError
 from app.evaluation.frame_names import NamedFrame
 from app.evaluation.prediction_run import FieldError, PredictionRun, in_field, noted, read_field
 from app.formats import fields
-from app.formats.csv_text import is_missing, numbers_in, read_rows
+from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.fields import id_text
 from app.formats.file_tree import FileTree, Limits
 from app.soccer.frames import Box, ImageSize
@@ -142,7 +142,8 @@ def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
         size = None
         if not is_missing(cells.get("img_w")) and not is_missing(cells.get("img_h")):
             size = ImageSize(
-                read_field(cells, "img_w", fields.whole), read_field(cells, "img_h", fields.whole)
+                read_field(cells, "img_w", fields.whole_number),
+                read_field(cells, "img_h", fields.whole_number),
             )
         with in_field(where):
             run.add(frame, box, score, size)
@@ -158,7 +159,7 @@ def _wanted(run: PredictionRun, cells: Mapping[str, str]) -> bool:
         (cells[name].strip() for name in _CLASS_NAMES if not is_missing(cells.get(name))), ""
     )
     try:
-        return run.wants(fields.whole(text), named)
+        return run.wants(fields.whole_number(text), named)
     except ValueError:
         return run.wants(text, text)
 
@@ -169,7 +170,7 @@ def _row_box(cells: Mapping[str, str]) -> tuple[Box | None, str]:
         if name in cells:
             if is_missing(cells[name]):
                 return None, name
-            return read_field(cells, name, lambda text: Box(*numbers_in(text, 4))), name
+            return read_field(cells, name, lambda text: Box(*parse_number_list(text, 4))), name
     for layouts, made in (
         (_CORNER_AND_SIZE, Box),
         (_CENTERS, lambda x, y, w, h: Box(x - w / 2, y - h / 2, w, h)),
@@ -189,9 +190,9 @@ def _row_frame(run: PredictionRun, cells: Mapping[str, str]) -> NamedFrame | Non
     """The frame of a row; one that is none is counted."""
     number = next((name for name in _FRAME_NUMBERS if not is_missing(cells.get(name))), None)
     if not is_missing(cells.get("main_action")):
-        action = read_field(cells, "main_action", fields.whole)
+        action = read_field(cells, "main_action", fields.whole_number)
         replay = cells.get("replay")
-        image = f"{action}" if is_missing(replay) else f"{action}_{fields.whole(replay)}"
+        image = f"{action}" if is_missing(replay) else f"{action}_{fields.whole_number(replay)}"
         parts = [cells.get(name, "").strip() for name in ("league", "season", "match")]
         return run.frame("/".join([part for part in parts if part] + [image]))
     if number is not None and not is_missing(cells.get("camera")):

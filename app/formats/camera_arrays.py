@@ -34,7 +34,7 @@ _TEXT = "tag:yaml.org,2002:str"
 _MERGE = "tag:yaml.org,2002:merge"
 
 
-def cameras_of_arrays(
+def read_camera_arrays(
     content: bytes, key: str, path: str, limits: Limits
 ) -> list[tuple[str | None, Any]]:
     """The cameras of an ``.npz`` file as objects of matrices, each with its name.
@@ -45,12 +45,15 @@ def cameras_of_arrays(
         DatasetFormatError: It is damaged, too large or of too many cameras, or K, R and t do not
             fit together.
     """
-    arrays = _arrays(content, path, limits)
+    arrays = _read_number_arrays(content, path, limits)
     missing = [name for name in _SHAPES if name not in arrays]
     if missing:
         there = ", ".join(sorted(arrays)[:10]) or "nothing"
         raise DatasetFormatError(path, None, missing[0], f"is missing; the file holds {there}")
-    parts = {name: _rows(arrays[name], shape, name, path) for name, shape in _SHAPES.items()}
+    parts = {
+        name: _one_row_per_camera(arrays[name], shape, name, path)
+        for name, shape in _SHAPES.items()
+    }
     if _DISTORTION in arrays:
         found = arrays[_DISTORTION]
         if found.size == 0:
@@ -65,7 +68,7 @@ def cameras_of_arrays(
         count = 1
     if count > MOST_CAMERAS:
         longest = max(parts, key=lambda name: len(parts[name]))
-        raise _too_many(path, longest, f"has {count:,} rows")
+        raise _too_many_cameras_error(path, longest, f"has {count:,} rows")
     objects = [
         {name: part[min(at, len(part) - 1)].tolist() for name, part in parts.items()}
         for at in range(count)
@@ -73,7 +76,7 @@ def cameras_of_arrays(
     return [(None if count == 1 else f"{key}/{at}", item) for at, item in enumerate(objects)]
 
 
-def arrays_of_cameras(cameras: Mapping[int, Camera], path: str) -> dict[str, FloatArray]:
+def camera_arrays(cameras: Mapping[int, Camera], path: str) -> dict[str, FloatArray]:
     """Cameras over time as FIFA's skeletal kit has them: a row a frame, from frame 0 on.
 
     The world is x along the pitch, y across it away from the main stand, z up. Frames without a camera
@@ -92,7 +95,7 @@ def arrays_of_cameras(cameras: Mapping[int, Camera], path: str) -> dict[str, Flo
     """
     count = max(cameras, default=-1) + 1
     if count > MOST_CAMERAS:
-        raise _too_many(path, "K", f"would have {count:,} rows")
+        raise _too_many_cameras_error(path, "K", f"would have {count:,} rows")
     arrays = {name: np.full((count, *shape), np.nan) for name, shape in _SHAPES.items()}
     lens = np.full((count, 12), np.nan)
     for frame, camera in cameras.items():
@@ -107,7 +110,7 @@ def arrays_of_cameras(cameras: Mapping[int, Camera], path: str) -> dict[str, Flo
     return {**arrays, _DISTORTION: lens[:, : next(size for size in (5, 8, 12) if used < size)]}
 
 
-def _rows(
+def _one_row_per_camera(
     array: npt.NDArray[Any], shape: tuple[int, ...], name: str, path: str
 ) -> npt.NDArray[Any]:
     """An array as a row a camera."""
@@ -121,7 +124,7 @@ def _rows(
     return array.reshape(-1, *shape)
 
 
-def _arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[Any]]:
+def _read_number_arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[Any]]:
     """The arrays of numbers by name; nothing is unpickled, and no header is believed about its size.
 
     Arrays that say nothing of cameras are named, and not read: they stay empty.
@@ -140,7 +143,7 @@ def _arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[
                 if name not in _NUMBERS:
                     found[name] = np.empty(0)
                     continue
-                found[name] = _array(archive, item, name, path)
+                found[name] = _read_array(archive, item, name, path)
     except (ValueError, OverflowError) as error:
         raise DatasetFormatError(path, None, None, f"is no file of numpy's ({error})") from error
     except BROKEN as error:
@@ -148,7 +151,7 @@ def _arrays(content: bytes, path: str, limits: Limits) -> dict[str, npt.NDArray[
     return found
 
 
-def _array(
+def _read_array(
     archive: zipfile.ZipFile, item: zipfile.ZipInfo, name: str, path: str
 ) -> npt.NDArray[Any]:
     """An array, whose header and length are looked at before its numbers are unpacked."""
@@ -163,12 +166,12 @@ def _array(
         if numbers * kind.itemsize != item.file_size - file.tell():
             raise ValueError("holds an array of another size than it says")
         if numbers > MOST_CAMERAS * _NUMBERS[name]:
-            raise _too_many(path, name, f"holds {numbers:,} numbers")
+            raise _too_many_cameras_error(path, name, f"holds {numbers:,} numbers")
         body = file.read()
     return np.frombuffer(body, kind).reshape(shape, order="F" if fortran else "C").astype(float)
 
 
-def _too_many(path: str, name: str, problem: str) -> DatasetFormatError:
+def _too_many_cameras_error(path: str, name: str, problem: str) -> DatasetFormatError:
     return DatasetFormatError(
         path,
         None,
@@ -177,7 +180,7 @@ def _too_many(path: str, name: str, problem: str) -> DatasetFormatError:
     )
 
 
-class _StorageLoader(yaml.SafeLoader):
+class _OpenCVStorageLoader(yaml.SafeLoader):
     """Plain YAML with OpenCV's matrices, without anchors: they could make a small file huge.
 
     Keys are text, as JSON's are, whatever YAML takes them for: ``1``, ``2026-11-28``, ``on``.
@@ -196,12 +199,16 @@ class _StorageLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
-def _matrix(loader: _StorageLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+def _construct_opencv_matrix(
+    loader: _OpenCVStorageLoader, node: yaml.MappingNode
+) -> dict[Any, Any]:
     return dict(loader.construct_mapping(node, deep=True))
 
 
 for _kind in ("matrix", "nd-matrix"):
-    _StorageLoader.add_constructor(f"tag:yaml.org,2002:opencv-{_kind}", _matrix)
+    _OpenCVStorageLoader.add_constructor(
+        f"tag:yaml.org,2002:opencv-{_kind}", _construct_opencv_matrix
+    )
 
 
 # A tag with a value that it does not fit (!!int x, !!timestamp x) ends in one of Python's own errors.
@@ -211,7 +218,7 @@ _NO_YAML = (
 )  # fmt: skip
 
 
-def opencv_storage(content: bytes, path: str) -> Any:
+def read_opencv_storage(content: bytes, path: str) -> Any:
     """The value of a YAML file that OpenCV's FileStorage wrote.
 
     Raises:
@@ -222,6 +229,6 @@ def opencv_storage(content: bytes, path: str) -> Any:
     try:
         # OpenCV writes "%YAML:1.0", which is no directive of YAML.
         text = re.sub(r"\A%YAML:[^\n]*\n", "", content.decode("utf-8-sig"))
-        return yaml.load(text, _StorageLoader)
+        return yaml.load(text, _OpenCVStorageLoader)
     except _NO_YAML as error:
         raise DatasetFormatError(path, None, None, "is no YAML of OpenCV's FileStorage") from error

@@ -80,7 +80,7 @@ def covariance_to_json(
         camera: With one radial term.
         size: Of its images.
     """
-    ways = _file_numbers(camera, size)
+    ways = _file_number_derivatives(camera, size)
     known = np.reshape(covariance, (PARAMETERS, PARAMETERS))
     rows: list[list[float]] = (ways @ known @ ways.T).tolist()
     return rows
@@ -101,15 +101,15 @@ def covariance_from_json(
         raise ValueError(
             "is for a lens with one radial term, and this camera has another lens: leave it out"
         )
-    rows = [fields.numbers(row, PARAMETERS) for row in fields.sequence(found)]
+    rows = [fields.number_list(row, PARAMETERS) for row in fields.require_list(found)]
     if len(rows) != PARAMETERS:
         raise ValueError(f"has {len(rows)} rows, not {PARAMETERS}")
     known = np.reshape(camera_covariance(number for row in rows for number in row), (8, 8))
-    back = np.linalg.inv(_file_numbers(camera, size))
+    back = np.linalg.inv(_file_number_derivatives(camera, size))
     return camera_covariance(row_by_row(back @ known @ back.T))
 
 
-def _file_numbers(camera: Camera, size: ImageSize) -> FloatArray:
+def _file_number_derivatives(camera: Camera, size: ImageSize) -> FloatArray:
     """Derivatives of a file's numbers by the camera's parameters, shape (8, 8)."""
     focal = float(np.sqrt(camera.focal_length[0] * camera.focal_length[1]))
     ways = np.zeros((PARAMETERS, PARAMETERS))
@@ -151,19 +151,19 @@ def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera
     """
     if not isinstance(value, dict):
         raise DatasetFormatError(path, record, None, "is not a camera object")
-    reader = _Fields(value, path, record)
-    rotation = _rotation(reader)
-    lens, coefficients = _lens(reader)
+    reader = _CameraFields(value, path, record)
+    rotation = _read_rotation(reader)
+    lens, coefficients = _read_lens(reader)
     try:
         return Camera(
             rotation=rotation,
-            position=np.array(reader.read("position_meters", _three)),
+            position=np.array(reader.read_field("position_meters", _three_numbers)),
             focal_length=(
-                reader.read("x_focal_length", _positive),
-                reader.read("y_focal_length", _positive),
+                reader.read_field("x_focal_length", _positive_number),
+                reader.read_field("y_focal_length", _positive_number),
             ),
-            principal_point=reader.read("principal_point", _two),
-            skew=reader.read("skew", fields.number) if "skew" in value else 0.0,
+            principal_point=reader.read_field("principal_point", _two_numbers),
+            skew=reader.read_field("skew", fields.number) if "skew" in value else 0.0,
             distortion=np.array(coefficients),
             lens=lens,
         )
@@ -171,57 +171,59 @@ def camera_from_json(value: Any, path: str, record: str | None = None) -> Camera
         raise DatasetFormatError(path, record, None, error.message) from error
 
 
-class _Fields:
+class _CameraFields:
     """One camera object, read field by field."""
 
     def __init__(self, value: Mapping[str, Any], path: str, record: str | None):
         self.value, self.path, self.record = value, path, record
 
-    def read(self, name: str, parse: Callable[[Any], T]) -> T:
+    def read_field(self, name: str, parse: Callable[[Any], T]) -> T:
         if name not in self.value:
             raise self.error(name, "is missing")
         try:
-            return _within_reason(parse(self.value[name]))
+            return _require_plausible_size(parse(self.value[name]))
         except ValueError as error:
             raise self.error(name, str(error)) from error
 
-    def distortion(self, name: str, count: int) -> tuple[float, ...]:
+    def read_distortion(self, name: str, count: int) -> tuple[float, ...]:
         if self.value.get(name) is None:
             return (0.0,) * count
-        return self.read(name, lambda value: fields.numbers(value, count))
+        return self.read_field(name, lambda value: fields.number_list(value, count))
 
     def error(self, name: str, problem: str) -> DatasetFormatError:
         return DatasetFormatError(self.path, self.record, name, problem)
 
 
-def _lens(reader: _Fields) -> tuple[str, tuple[float, ...]]:
+def _read_lens(reader: _CameraFields) -> tuple[str, tuple[float, ...]]:
     """Name of the lens and its coefficients, in the order that the camera has them."""
     name = reader.value.get(LENS)
     if name is None or name == BROWN_CONRADY:
         if reader.value.get(LENS_COEFFICIENTS) is not None:
-            raise reader.error(LENS_COEFFICIENTS, f"need a {LENS} of {_lens_names()}")
-        radial, tangential, prism = (reader.distortion(*each) for each in _DISTORTION)
+            raise reader.error(LENS_COEFFICIENTS, f"need a {LENS} of {_list_lens_names()}")
+        radial, tangential, prism = (reader.read_distortion(*each) for each in _DISTORTION)
         k1, k2, k3, k4, k5, k6 = radial
         return BROWN_CONRADY, (k1, k2, *tangential, k3, k4, k5, k6, *prism)
     if not isinstance(name, str) or name not in LENSES:
-        raise reader.error(LENS, f"is {quoted(str(name), 40)}; lenses are {_lens_names()}")
+        raise reader.error(LENS, f"is {quoted(str(name), 40)}; lenses are {_list_lens_names()}")
     for other, count in _DISTORTION:
-        if any(reader.distortion(other, count)):
+        if any(reader.read_distortion(other, count)):
             raise reader.error(other, f"contradicts the lens {name}, which has none")
     count = LENSES[name].count
-    return name, reader.read(LENS_COEFFICIENTS, lambda value: fields.numbers(value, count))
+    return name, reader.read_field(
+        LENS_COEFFICIENTS, lambda value: fields.number_list(value, count)
+    )
 
 
-def _lens_names() -> str:
+def _list_lens_names() -> str:
     return " or ".join(name for name in LENSES if name != BROWN_CONRADY)
 
 
-def _rotation(reader: _Fields) -> FloatArray:
-    pan, tilt, roll = (reader.read(name, fields.number) for name in _ANGLES)
+def _read_rotation(reader: _CameraFields) -> FloatArray:
+    pan, tilt, roll = (reader.read_field(name, fields.number) for name in _ANGLES)
     rotation = rotation_from_pan_tilt_roll(*np.radians([pan, tilt, roll]))
     if reader.value.get("rotation_matrix") is None:
         return rotation
-    matrix = np.array(reader.read("rotation_matrix", _matrix))
+    matrix = np.array(reader.read_field("rotation_matrix", _three_by_three_matrix))
     if float(np.abs(matrix - rotation).max()) < ROUNDING:
         # The same rotation: the matrix keeps the last digits that the angles lose, so what we
         # wrote comes back exactly.
@@ -235,30 +237,30 @@ def _rotation(reader: _Fields) -> FloatArray:
     return rotation
 
 
-def _within_reason(value: T) -> T:
+def _require_plausible_size(value: T) -> T:
     if np.abs(np.asarray(value)).max() > MAX_NUMBER:
         raise ValueError(f"is larger than any camera has (at most {MAX_NUMBER:.0e})")
     return value
 
 
-def _positive(value: Any) -> float:
+def _positive_number(value: Any) -> float:
     result = fields.number(value)
     if result <= 0:
         raise ValueError(f"is {result:g}; a focal length is positive")
     return result
 
 
-def _two(value: Any) -> tuple[float, float]:
-    x, y = fields.numbers(value, 2)
+def _two_numbers(value: Any) -> tuple[float, float]:
+    x, y = fields.number_list(value, 2)
     return x, y
 
 
-def _three(value: Any) -> tuple[float, ...]:
-    return fields.numbers(value, 3)
+def _three_numbers(value: Any) -> tuple[float, ...]:
+    return fields.number_list(value, 3)
 
 
-def _matrix(value: Any) -> list[tuple[float, ...]]:
-    rows = fields.sequence(value)
+def _three_by_three_matrix(value: Any) -> list[tuple[float, ...]]:
+    rows = fields.require_list(value)
     if len(rows) != 3:
         raise ValueError(f"has {len(rows)} rows, not 3")
-    return [fields.numbers(row, 3) for row in rows]
+    return [fields.number_list(row, 3) for row in rows]

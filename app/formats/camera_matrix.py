@@ -50,16 +50,19 @@ MAX_DISTANCE_M = 1000.0
 
 def holds_matrices(value: Mapping[str, Any]) -> bool:
     """Whether an object describes a camera by matrices."""
-    intrinsic = _first(value, _INTRINSICS) or all(name in value for name in _FOCAL[0])
+    intrinsic = _first_given_name(value, _INTRINSICS) or all(name in value for name in _FOCAL[0])
     intrinsic = intrinsic or all(name in value for name in _FOCAL[1])
-    placed = _first(value, _TRANSLATIONS) or _first(value, _POSITIONS)
-    return bool((intrinsic and _first(value, _ROTATIONS) and placed) or _first(value, _PROJECTIONS))
+    placed = _first_given_name(value, _TRANSLATIONS) or _first_given_name(value, _POSITIONS)
+    return bool(
+        (intrinsic and _first_given_name(value, _ROTATIONS) and placed)
+        or _first_given_name(value, _PROJECTIONS)
+    )
 
 
 def holds_homography(value: Any) -> bool:
     """Whether a value is a homography, or an object with one and without a camera."""
     if isinstance(value, dict):
-        return _first(value, _HOMOGRAPHIES) is not None
+        return _first_given_name(value, _HOMOGRAPHIES) is not None
     rows = value if isinstance(value, list) else []
     return len(rows) == 3 and all(isinstance(row, list) and len(row) == 3 for row in rows)
 
@@ -77,23 +80,27 @@ def camera_from_matrices(value: Mapping[str, Any], path: str, record: str | None
     """
     name = ""
     try:
-        name = _first(value, _ROTATIONS) or ""
-        placed = _first(value, _TRANSLATIONS) or _first(value, _POSITIONS)
+        name = _first_given_name(value, _ROTATIONS) or ""
+        placed = _first_given_name(value, _TRANSLATIONS) or _first_given_name(value, _POSITIONS)
         if name and placed:
-            rotation = _rotation(value[name])
+            rotation = _parse_rotation(value[name])
             name = placed
-            place = _numbers(value[name], 3)
+            place = _flat_array(value[name], 3)
             position = place if name in _POSITIONS else -rotation.T @ place
-            name = _first(value, _INTRINSICS) or ""
+            name = _first_given_name(value, _INTRINSICS) or ""
             intrinsic = (
-                _intrinsic(_numbers(value[name], 9).reshape(3, 3)) if name else _of_focal(value)
+                _normalize_camera_matrix(_flat_array(value[name], 9).reshape(3, 3))
+                if name
+                else _camera_matrix_from_focal_length(value)
             )
         else:
-            name = _first(value, _PROJECTIONS) or ""
-            intrinsic, rotation, position = _decomposed(_numbers(value[name], 12).reshape(3, 4))
+            name = _first_given_name(value, _PROJECTIONS) or ""
+            intrinsic, rotation, position = _decompose_projection_matrix(
+                _flat_array(value[name], 12).reshape(3, 4)
+            )
         pose = _pose_problem(rotation, position)
-        name = _first(value, _DISTORTIONS) or ""
-        distortion = _distortion(value.get(name))
+        name = _first_given_name(value, _DISTORTIONS) or ""
+        distortion = _parse_distortion(value.get(name))
         name = ""
         if pose:
             raise ValueError(pose)
@@ -111,13 +118,13 @@ def camera_from_matrices(value: Mapping[str, Any], path: str, record: str | None
         raise DatasetFormatError(path, record, None, error.message) from error
 
 
-def _first(value: Mapping[str, Any], names: Sequence[str]) -> str | None:
+def _first_given_name(value: Mapping[str, Any], names: Sequence[str]) -> str | None:
     return next((name for name in names if value.get(name) is not None), None)
 
 
-def _numbers(value: Any, count: int) -> FloatArray:
+def _flat_array(value: Any, count: int) -> FloatArray:
     """Numbers of a list, nested as it may be, or of OpenCV's ``{rows, cols, data}``."""
-    flat = _flat(value)
+    flat = _flatten_numbers(value)
     if len(flat) != count:
         poses = len(flat) // count if len(flat) % count == 0 else 0
         more = f": {poses} poses, and a camera has one" if poses > 1 else ""
@@ -125,7 +132,7 @@ def _numbers(value: Any, count: int) -> FloatArray:
     return np.array(flat)
 
 
-def _flat(value: Any) -> list[float]:
+def _flatten_numbers(value: Any) -> list[float]:
     if isinstance(value, dict) and "data" in value:
         value = value["data"]
     flat: list[float] = []
@@ -145,11 +152,11 @@ def _flat(value: Any) -> list[float]:
     return flat
 
 
-def _rotation(value: Any) -> FloatArray:
-    numbers = _flat(value)
+def _parse_rotation(value: Any) -> FloatArray:
+    numbers = _flatten_numbers(value)
     if len(numbers) == 3:
         return rotation_from_vector(np.array(numbers))
-    matrix = _numbers(numbers, 9).reshape(3, 3)
+    matrix = _flat_array(numbers, 9).reshape(3, 3)
     left, _, right = np.linalg.svd(matrix)
     nearest: FloatArray = left @ right
     if np.abs(nearest - matrix).max() > MAX_SKEWNESS:
@@ -159,7 +166,7 @@ def _rotation(value: Any) -> FloatArray:
     return nearest
 
 
-def _intrinsic(matrix: FloatArray) -> FloatArray:
+def _normalize_camera_matrix(matrix: FloatArray) -> FloatArray:
     if matrix[2, 2] == 0 or np.abs([*matrix[2, :2], matrix[1, 0]]).max() > 1e-9:
         raise ValueError("is no camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
     scaled: FloatArray = matrix / matrix[2, 2]
@@ -168,16 +175,16 @@ def _intrinsic(matrix: FloatArray) -> FloatArray:
     return scaled
 
 
-def _of_focal(value: Mapping[str, Any]) -> FloatArray:
+def _camera_matrix_from_focal_length(value: Mapping[str, Any]) -> FloatArray:
     if "fx" in value:
         fx, fy, cx, cy = (fields.number(value[name]) for name in _FOCAL[0])
     else:
         fx, fy = (fields.number(value[name]) for name in _FOCAL[1])
-        cx, cy = fields.numbers(value.get("principal_point"), 2)
-    return _intrinsic(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]]))
+        cx, cy = fields.number_list(value.get("principal_point"), 2)
+    return _normalize_camera_matrix(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]]))
 
 
-def _decomposed(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _decompose_projection_matrix(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """K, R and the position of a projection matrix. Source: Hartley & Zisserman, sec. 6.2.4."""
     determinant = np.linalg.det(matrix[:, :3])
     if determinant == 0:
@@ -191,14 +198,14 @@ def _decomposed(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     upper = upper @ signs
     position = -np.linalg.solve(matrix[:, :3], matrix[:, 3])
     upper[1, 0] = upper[2, 0] = upper[2, 1] = 0.0
-    return _intrinsic(upper), turned, np.asarray(position, dtype=float)
+    return _normalize_camera_matrix(upper), turned, np.asarray(position, dtype=float)
 
 
-def _distortion(value: Any) -> FloatArray:
+def _parse_distortion(value: Any) -> FloatArray:
     result = np.zeros(12)
     if value is None:
         return result
-    numbers = _flat(value)
+    numbers = _flatten_numbers(value)
     size = len(numbers)
     if size in (1, 2):
         result[:size] = numbers

@@ -10,17 +10,17 @@ from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 from app.errors import DatasetFormatError
-from app.formats.camera_arrays import cameras_of_arrays, opencv_storage
+from app.formats.camera_arrays import read_camera_arrays, read_opencv_storage
 from app.formats.camera_json import COVARIANCE, camera_from_json, covariance_from_json
 from app.formats.camera_matrix import camera_from_matrices, holds_matrices
 from app.formats.corner_origin import HALF
 from app.formats.fields import stated_size
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
-from app.formats.json_text import is_camera, json_kind, read_json, read_json_lines
-from app.formats.match_info import place_of, read_match_info
+from app.formats.json_text import describe_document, is_camera, read_json, read_json_lines
+from app.formats.match_info import original_frame_path, read_match_info
 from app.formats.report import Report
 from app.formats.sn_calibration import CAMERAS, LINES
-from app.formats.synloc import camera_from_synloc, images_of, is_synloc
+from app.formats.synloc import camera_from_synloc, image_records_by_stem, is_synloc
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
@@ -81,19 +81,22 @@ def read_cameras(
         if tree is None:
             return {}
         names = tree.names()
-        files = _camera_files(names)
+        files = _select_camera_files(names)
         if names and not files:
             endings = sorted({PurePosixPath(name).suffix.lower() or "no ending" for name in names})
             report.note(
-                str(path), None, None, f"holds no camera files ({_ENDINGS}), but {_some(endings)}"
+                str(path),
+                None,
+                None,
+                f"holds no camera files ({_ENDINGS}), but {_name_some_endings(endings)}",
             )
-        places = _places(tree, names)
-        cameras = cameras_of(tree, files, report, places, limits, sizes, covariances)
+        places = _frame_places_of_export(tree, names)
+        cameras = read_camera_files(tree, files, report, places, limits, sizes, covariances)
     report.imported += len(cameras)
     return cameras
 
 
-def cameras_of(
+def read_camera_files(
     tree: FileTree,
     names: Sequence[str],
     report: Report,
@@ -104,46 +107,50 @@ def cameras_of(
 ) -> dict[str, Camera]:
     """The cameras of some files of a tree, by key: that of ``places``, or made from the name."""
     cameras: dict[str, Camera] = {}
-    stated = _Stated({} if sizes is None else sizes, {} if covariances is None else covariances)
+    stated = _StatedValues(
+        {} if sizes is None else sizes, {} if covariances is None else covariances
+    )
     known = places or {}
-    stems = Counter(_key(name, deep=False) for name in names)
+    stems = Counter(_camera_key(name, deep=False) for name in names)
     for name in names:
-        deep = stems[_key(name, deep=False)] > 1
-        _read_file(tree, name, known.get(name) or _key(name, deep), cameras, stated, report, limits)
+        deep = stems[_camera_key(name, deep=False)] > 1
+        _read_file(
+            tree, name, known.get(name) or _camera_key(name, deep), cameras, stated, report, limits
+        )
     return cameras
 
 
-class _Stated(NamedTuple):
+class _StatedValues(NamedTuple):
     """What files say beside their cameras, by key."""
 
     sizes: dict[str, ImageSize]
     covariances: dict[str, Any]
 
 
-def _places(tree: FileTree, names: list[str]) -> dict[str, str]:
+def _frame_places_of_export(tree: FileTree, names: list[str]) -> dict[str, str]:
     """Where the frames of an export as sn-calibration came from, by the files of their cameras."""
     found = {}
     # What is wrong with the file is no matter of cameras.
     for image, record in read_match_info(tree, names, Report()).items():
-        lines, place = PurePosixPath(image), place_of(record)
+        lines, place = PurePosixPath(image), original_frame_path(record)
         if place is not None and lines.parts[0] == LINES:
             file = PurePosixPath(CAMERAS, *lines.parts[1:-1], f"camera_{lines.name}.json")
             found[str(file)] = place
     return found
 
 
-def _some(endings: Sequence[str]) -> str:
+def _name_some_endings(endings: Sequence[str]) -> str:
     return ", ".join(endings[:5]) + (" and others" if len(endings) > 5 else "")
 
 
-def _camera_files(names: Iterable[str]) -> list[str]:
+def _select_camera_files(names: Iterable[str]) -> list[str]:
     """Camera files; where none is called ``camera_...``, every file of such an ending may be one."""
     names = [name for name in names if _FILE.fullmatch(PurePosixPath(name).name)]
     named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
     return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
 
 
-def _key(name: str, deep: bool) -> str:
+def _camera_key(name: str, deep: bool) -> str:
     place = PurePosixPath(name)
     found = _FILE.fullmatch(place.name)
     stem = found.group(1) if found else place.stem
@@ -157,26 +164,28 @@ def _read_file(
     name: str,
     key: str,
     cameras: dict[str, Camera],
-    stated: _Stated,
+    stated: _StatedValues,
     report: Report,
     limits: Limits,
 ) -> None:
     shown = tree.shown(name)
     try:
-        items = _items(tree.read_bytes(name), name, key, shown, report, limits)
+        items = _parse_camera_items(tree.read_bytes(name), name, key, shown, report, limits)
     except DatasetFormatError as error:
         report.read += 1
         report.skip(error)
         return
-    stems = Counter(_record_key(record, deep=False) for record, _ in items if record)
+    stems = Counter(_camera_key_of_record(record, deep=False) for record, _ in items if record)
     for record, item in items:
         report.read += 1
         called = key if record is None else record
         if record is not None:
-            called = _record_key(record, deep=stems[_record_key(record, deep=False)] > 1)
+            called = _camera_key_of_record(
+                record, deep=stems[_camera_key_of_record(record, deep=False)] > 1
+            )
         try:
-            camera = _camera(item, shown, record)
-            covariance = _covariance(item, camera, shown, record)
+            camera = _parse_camera(item, shown, record)
+            covariance = _read_covariance(item, camera, shown, record)
             if called in cameras:
                 problem = f'is a second camera called "{called}"; the first one is used'
                 raise DatasetFormatError(shown, record, None, problem)
@@ -189,9 +198,9 @@ def _read_file(
             report.skip(error)
 
 
-def _covariance(item: Any, camera: Camera, shown: str, record: str | None) -> Any:
+def _read_covariance(item: Any, camera: Camera, shown: str, record: str | None) -> Any:
     """What a file says of how well its camera is known, checked; None where it says nothing."""
-    value = _inner(item)
+    value = _unwrap_camera(item)
     found = value.get(COVARIANCE) if isinstance(value, dict) else None
     try:
         covariance_from_json({COVARIANCE: found}, camera, _ANY_SIZE)
@@ -200,8 +209,8 @@ def _covariance(item: Any, camera: Camera, shown: str, record: str | None) -> An
     return found
 
 
-def _record_key(record: str, deep: bool) -> str:
-    """Key of a camera that is named in a file: as ``_key`` of the image's place."""
+def _camera_key_of_record(record: str, deep: bool) -> str:
+    """Key of a camera that is named in a file: as ``_camera_key`` of the image's place."""
     name = record.replace("\\", "/")
     place = PurePosixPath(name)
     if not _IMAGE.fullmatch(place.suffix):
@@ -218,14 +227,14 @@ _Items = list[tuple[str | None, Any]]
 """Camera objects of a file, each with its name; None: it is called like the file."""
 
 
-def _items(
+def _parse_camera_items(
     content: bytes, name: str, key: str, shown: str, report: Report, limits: Limits
 ) -> _Items:
     ending = PurePosixPath(name).suffix.lower()
     if ending == ".npz":
-        return cameras_of_arrays(content, key, shown, limits)
+        return read_camera_arrays(content, key, shown, limits)
     if ending in (".yml", ".yaml"):
-        return [(None, opencv_storage(content, shown))]
+        return [(None, read_opencv_storage(content, shown))]
     try:
         value = read_json(content, shown, double_encoded=True, nan="keep")
     except DatasetFormatError:
@@ -233,34 +242,39 @@ def _items(
         if lines is None:
             raise
         value = lines
-    several = _several(value, shown)
+    several = _named_cameras(value, shown)
     if several is not None:
         return several
     # A camera file is called like its view; any other may say the name of its image inside.
-    own = None if PurePosixPath(name).name.startswith("camera_") else _image_name(value)
+    own = None if PurePosixPath(name).name.startswith("camera_") else _image_name_of_camera(value)
     return [(own, value)]
 
 
-def _several(value: Any, shown: str) -> _Items | None:
+def _named_cameras(value: Any, shown: str) -> _Items | None:
     """The cameras by name when the file holds several, else None."""
     if isinstance(value, dict) and isinstance(value.get("cameras"), (dict, list)):
         value = value["cameras"]
-    elif not isinstance(value, (dict, list)) or is_camera(value) or is_camera(_inner(value)):
+    elif (
+        not isinstance(value, (dict, list)) or is_camera(value) or is_camera(_unwrap_camera(value))
+    ):
         return None
-    elif isinstance(value, dict) and (images := images_of(value)) is not None:
+    elif isinstance(value, dict) and (images := image_records_by_stem(value)) is not None:
         return list(images.items())
     if isinstance(value, list):
-        if not any(map(is_camera, map(_inner, value))):
+        if not any(map(is_camera, map(_unwrap_camera, value))):
             return None
-        return [_named(item, number) for number, item in enumerate(value)]
-    if not any(map(is_camera, map(_inner, value.values()))) and json_kind(value)[:5] == "holds":
-        raise DatasetFormatError(shown, None, None, json_kind(value))
+        return [_name_camera(item, number) for number, item in enumerate(value)]
+    if (
+        not any(map(is_camera, map(_unwrap_camera, value.values())))
+        and describe_document(value)[:5] == "holds"
+    ):
+        raise DatasetFormatError(shown, None, None, describe_document(value))
     if not any(isinstance(item, dict) for item in value.values()):
         return None
     return [(name, item) for name, item in value.items() if not name.startswith("_")]
 
 
-def _inner(value: Any) -> Any:
+def _unwrap_camera(value: Any) -> Any:
     """The camera within what a tool says of it; the value itself where it is none."""
     if isinstance(value, dict) and not is_camera(value):
         for name in _WRAPPERS:
@@ -269,11 +283,11 @@ def _inner(value: Any) -> Any:
     return value
 
 
-def _named(item: Any, number: int) -> tuple[str | None, Any]:
-    return _image_name(item) or f"camera {number}", item
+def _name_camera(item: Any, number: int) -> tuple[str | None, Any]:
+    return _image_name_of_camera(item) or f"camera {number}", item
 
 
-def _image_name(value: Any) -> str | None:
+def _image_name_of_camera(value: Any) -> str | None:
     """How a camera object names its image; None where it does not."""
     if not isinstance(value, dict):
         return None
@@ -288,18 +302,22 @@ def _image_name(value: Any) -> str | None:
     return None
 
 
-def _camera(item: Any, shown: str, record: str | None) -> Camera:
+def _parse_camera(item: Any, shown: str, record: str | None) -> Camera:
     if is_synloc(item):
         return camera_from_synloc(item, shown, record)
-    value = item["cam_params"] if isinstance(item, dict) and "cam_params" in item else _inner(item)
+    value = (
+        item["cam_params"]
+        if isinstance(item, dict) and "cam_params" in item
+        else _unwrap_camera(item)
+    )
     if isinstance(value, dict) and "pan_degrees" not in value:
         if holds_matrices(value):
             return camera_from_matrices(value, shown, record)
         known = {"position_meters", "x_focal_length", "lens", *_CAMERA_FIELDS}
         if not known & value.keys():
-            raise DatasetFormatError(shown, record, None, f"{json_kind(value)}{_MEANT}")
+            raise DatasetFormatError(shown, record, None, f"{describe_document(value)}{_MEANT}")
     elif isinstance(value, list):
-        raise DatasetFormatError(shown, record, None, json_kind(value))
+        raise DatasetFormatError(shown, record, None, describe_document(value))
     camera = camera_from_json(value, shown, record)
     if isinstance(item, dict) and any(name in item for name in _TVCALIB):
         # TVCalib's middle of W x H is (W / 2, H / 2), ours ((W - 1) / 2, (H - 1) / 2).

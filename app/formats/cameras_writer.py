@@ -8,23 +8,23 @@ from pathlib import Path, PurePosixPath
 from app.errors import InputError
 from app.finite import json_text
 from app.formats.camera_json import camera_to_json
-from app.formats.export_names import folded, frame_claims
+from app.formats.export_names import fold_file_name, frame_claims
 from app.formats.export_record import ExportRecord
-from app.formats.frame_names import view_place
-from app.formats.view_files import PutText, put_on_disk
+from app.formats.frame_names import view_file_path
+from app.formats.view_files import PutText, write_to_disk
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View
 
 
-def camera_text(
+def camera_file_text(
     camera: Camera, covariance: Sequence[float] | None = None, size: ImageSize | None = None
 ) -> str:
     """The text of one camera file (``camera_to_json``)."""
     return json_text(camera_to_json(camera, covariance, size), indent=1, ascii_=True) + "\n"
 
 
-def camera_name(key: str) -> str:
+def camera_file_name(key: str) -> str:
     """Relative path of a camera's file: frames of the same name stay in their folders."""
     place = PurePosixPath(key)
     return str(place.with_name(f"camera_{place.name}.json"))
@@ -51,22 +51,25 @@ def write_camera_files(
     """
     counts = {"groups": 0, "cameras": 0}
     written: dict[str, tuple[str, ...]] = {}
-    put = put or put_on_disk(root)
+    put = put or write_to_disk(root)
     for record in records:
         counts["groups"] += 1
         for view in record.group.views:
-            name, camera = _file_of(record.group, record.named(view)), record.camera(view)
+            name, camera = (
+                _camera_file_of_view(record.group, record.named(view)),
+                record.camera(view),
+            )
             if camera is None:
                 continue
             owner = camera_owner(record.group, view)
-            first = written.setdefault(folded(name), owner)
+            first = written.setdefault(fold_file_name(name), owner)
             if first != owner:
                 raise InputError(
                     f"the cameras of two frames ({', '.join(first)} and {', '.join(owner)})"
                     f" would both be called {name}"
                 )
             if len(written) > counts["cameras"]:
-                put(name, camera_text(camera, record.covariance(view), view.size))
+                put(name, camera_file_text(camera, record.covariance(view), view.size))
                 counts["cameras"] = len(written)
     return counts
 
@@ -78,9 +81,9 @@ def camera_owner(group: Group, view: View) -> tuple[str, ...]:
 
 def camera_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The names of a view in an export, and whose each would be (``export_names.Claims``)."""
-    camera = {_file_of(group, view): camera_owner(group, view)}
+    camera = {_camera_file_of_view(group, view): camera_owner(group, view)}
     return {**camera, **frame_claims(group, view, split)}
 
 
-def _file_of(group: Group, view: View) -> str:
-    return camera_name(view_place(group, view))
+def _camera_file_of_view(group: Group, view: View) -> str:
+    return camera_file_name(view_file_path(group, view))

@@ -14,7 +14,7 @@ from app.finite import quoted
 from app.formats import fields
 from app.formats.corner_origin import box_from_corner
 from app.formats.fields import IdIndex, id_text
-from app.formats.picture_finder import picture_parts
+from app.formats.picture_finder import picture_name_parts
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -23,7 +23,7 @@ Annotation = tuple[str, Mapping[str, Any]]
 """Its place in the file (``annotations[3]``), and itself."""
 
 
-class Joined:
+class JoinedAnnotations:
     """The annotations of each image.
 
     Args:
@@ -81,12 +81,12 @@ class Joined:
     def _add_image(self, index: int, item: Any) -> None:
         if not isinstance(item, dict):
             return
-        if parts := _parts(item.get("file_name")):
+        if parts := _name_parts(item.get("file_name")):
             self._names.setdefault(parts[-1], []).append(index)
         value = item.get("id")
         if not self._ids.add(value, index):
             known = id_text(value) is not None
-            problem = f"is {spelt(value)}, as another image's is" if known else "is missing"
+            problem = f"is {quote_value(value)}, as another image's is" if known else "is missing"
             self._note(f"images[{index}]", "id", f"{problem}; no annotation joins this image")
 
     def _image(self, item: Any, record: str) -> int | None:
@@ -99,24 +99,24 @@ class Joined:
             return None
         value = item["image_id"]
         image = self._ids.find(value)
-        if image is None and (parts := _parts(value)) and self.is_alone(parts[-1]):
+        if image is None and (parts := _name_parts(value)) and self.is_alone(parts[-1]):
             return self._names[parts[-1]][0]
         if image is None:
             self._report.counts["annotations without image"] += 1
-            problem = f"is {spelt(value)}, which no image of the file has; left out"
+            problem = f"is {quote_value(value)}, which no image of the file has; left out"
             self._note(record, "image_id", problem)
         return image
 
 
-def spelt(value: Any) -> str:
+def quote_value(value: Any) -> str:
     """A value as the file spells it, no longer than a sentence can take."""
     if isinstance(value, str):
         return quoted(value, 40)
     return "null" if value is None else str(value)[:40]
 
 
-def _parts(name: Any) -> tuple[str, ...]:
-    return picture_parts(name) if isinstance(name, str) else ()
+def _name_parts(name: Any) -> tuple[str, ...]:
+    return picture_name_parts(name) if isinstance(name, str) else ()
 
 
 CENTERS = ("center", "centre", "ball", "middle", "point")
@@ -124,7 +124,7 @@ CENTERS = ("center", "centre", "ball", "middle", "point")
 _YES = ("true", "yes", "1")
 
 
-class NoPlaceError(ValueError):
+class MissingPositionError(ValueError):
     """An annotation that does not say where its object is."""
 
     def __init__(self, field: str, problem: str):
@@ -143,7 +143,7 @@ class Keypoint:
     name: str
 
 
-def ball_of(item: Mapping[str, Any], names: Sequence[str] = ()) -> BallAnnotation:
+def ball_from_annotation(item: Mapping[str, Any], names: Sequence[str] = ()) -> BallAnnotation:
     """The ball of an annotation: its box; where that has no area, the point that it is at.
 
     Args:
@@ -155,20 +155,20 @@ def ball_of(item: Mapping[str, Any], names: Sequence[str] = ()) -> BallAnnotatio
     """
     hidden, box = False, None
     try:
-        box = _box(item)
-    except NoPlaceError:
+        box = _read_bbox(item)
+    except MissingPositionError:
         # A box that cannot be read takes no keypoint along.
         if not item.get("keypoints"):
             raise
     if box is None or not (box.width and box.height):
-        points = _keypoints(item.get("keypoints"), names)
+        points = _read_labelled_keypoints(item.get("keypoints"), names)
         if points:
-            point = _center(points)
+            point = _center_keypoint(points)
             box, hidden = Box(point.x, point.y, 0.0, 0.0), not point.visible
     if box is None:
-        box = _around_polygons(item.get("segmentation"))
+        box = _box_around_polygons(item.get("segmentation"))
     if max(box.x + box.width, box.y + box.height) <= 1 and min(box.x, box.y) >= 0:
-        raise NoPlaceError("bbox", "is in fractions of the image, and COCO's are in pixels")
+        raise MissingPositionError("bbox", "is in fractions of the image, and COCO's are in pixels")
     ours = box_from_corner(box)
     occluded = hidden or is_occluded(item)
     if ours.width and ours.height:
@@ -176,17 +176,17 @@ def ball_of(item: Mapping[str, Any], names: Sequence[str] = ()) -> BallAnnotatio
     return BallAnnotation(point=ours.center, occluded=occluded)
 
 
-def box_of(item: Mapping[str, Any]) -> Box:
+def box_from_annotation(item: Mapping[str, Any]) -> Box:
     """The box of any other object, without area where all that is known of it is a point.
 
     Raises:
         NoPlaceError: It has no box, keypoint or polygon that says where.
     """
-    box = _box(item)
+    box = _read_bbox(item)
     if box is None:
-        points = _keypoints(item.get("keypoints"), ())
+        points = _read_labelled_keypoints(item.get("keypoints"), ())
         corners = [(point.x, point.y) for point in points]
-        box = _bounds(corners) if corners else _around_polygons(item.get("segmentation"))
+        box = _bounding_box(corners) if corners else _box_around_polygons(item.get("segmentation"))
     return box_from_corner(box)
 
 
@@ -200,26 +200,26 @@ def is_occluded(item: Mapping[str, Any]) -> bool:
     )
 
 
-def _box(item: Mapping[str, Any]) -> Box | None:
+def _read_bbox(item: Mapping[str, Any]) -> Box | None:
     """``bbox``; None where there is none."""
     value = item.get("bbox")
     if value is None or value == []:
         return None
     try:
-        x, y, width, height = map(fields.pixel, fields.numbers(value, 4))
+        x, y, width, height = map(fields.pixel_coordinate, fields.number_list(value, 4))
     except ValueError as error:
-        raise NoPlaceError("bbox", str(error)) from error
+        raise MissingPositionError("bbox", str(error)) from error
     if width < 0 or height < 0:
-        raise NoPlaceError("bbox", "has a negative width or height")
+        raise MissingPositionError("bbox", "has a negative width or height")
     return Box(x, y, width, height)
 
 
-def _keypoints(value: Any, names: Sequence[str]) -> list[Keypoint]:
+def _read_labelled_keypoints(value: Any, names: Sequence[str]) -> list[Keypoint]:
     """The keypoints that are labelled."""
     if value is None:
         return []
     try:
-        flat = fields.sequence(value)
+        flat = fields.require_list(value)
         if len(flat) % 3:
             raise ValueError(f"has {len(flat)} numbers, which are not three for each point")
         found = []
@@ -228,43 +228,45 @@ def _keypoints(value: Any, names: Sequence[str]) -> list[Keypoint]:
             # 0: not annotated, whatever its numbers are; 1: annotated and hidden.
             if (seen := fields.number(label)) > 0:
                 name = names[index] if index < len(names) else ""
-                found.append(Keypoint(fields.pixel(x), fields.pixel(y), seen > 1, name))
+                found.append(
+                    Keypoint(fields.pixel_coordinate(x), fields.pixel_coordinate(y), seen > 1, name)
+                )
     except ValueError as error:
-        raise NoPlaceError("keypoints", str(error)) from error
+        raise MissingPositionError("keypoints", str(error)) from error
     return found
 
 
-def _center(points: Sequence[Keypoint]) -> Keypoint:
+def _center_keypoint(points: Sequence[Keypoint]) -> Keypoint:
     if len(points) == 1:
         return points[0]
     named = [point for point in points if point.name.strip().lower() in CENTERS]
     if len(named) != 1:
         problem = f"has {len(points)} points, and none of them alone is called center"
-        raise NoPlaceError("keypoints", problem)
+        raise MissingPositionError("keypoints", problem)
     return named[0]
 
 
-def _around_polygons(value: Any) -> Box:
+def _box_around_polygons(value: Any) -> Box:
     if isinstance(value, dict):
         problem = "is missing, and the segmentation is a mask (RLE), which is not read"
-        raise NoPlaceError("bbox", problem)
+        raise MissingPositionError("bbox", problem)
     if not isinstance(value, list) or not value:
-        raise NoPlaceError("bbox", "is missing, and so are keypoints and a segmentation")
+        raise MissingPositionError("bbox", "is missing, and so are keypoints and a segmentation")
     corners: list[tuple[float, float]] = []
     try:
         for polygon in value:
-            flat = list(map(fields.pixel, fields.sequence(polygon)))
+            flat = list(map(fields.pixel_coordinate, fields.require_list(polygon)))
             if len(flat) % 2 or len(flat) < 6:
                 raise ValueError("has a polygon of fewer than three points")
             corners += zip(flat[::2], flat[1::2], strict=True)
-        box = _bounds(corners)
+        box = _bounding_box(corners)
         if not (box.width and box.height):
             raise ValueError("has no area")
     except ValueError as error:
-        raise NoPlaceError("segmentation", str(error)) from error
+        raise MissingPositionError("segmentation", str(error)) from error
     return box
 
 
-def _bounds(points: Sequence[tuple[float, float]]) -> Box:
+def _bounding_box(points: Sequence[tuple[float, float]]) -> Box:
     x, y = min(x for x, _ in points), min(y for _, y in points)
     return Box(x, y, max(x for x, _ in points) - x, max(y for _, y in points) - y)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.formats.ball_names import is_ball, same_name
+from app.formats.ball_names import is_ball, is_same_name
 from app.formats.fields import IdIndex, id_text
 from app.formats.report import Report
 from app.plural import plural
@@ -67,7 +67,11 @@ class Categories:
         self._all: list[Category] = []
         self._found: Counter[str] = Counter()
         self.listed = bool(listed)
-        found = self._of_list(listed) if listed else self._of_ids(annotations)
+        found = (
+            self._read_listed_categories(listed)
+            if listed
+            else self._make_categories_from_ids(annotations)
+        )
         for value, category in found:
             if self._index.add(value, category):
                 self._all.append(category)
@@ -78,11 +82,11 @@ class Categories:
         """The category of an annotation's ``category_id``; some tools write its name there."""
         found = self._index.find(value)
         if found is None and isinstance(value, str):
-            named = [item for item in self._all if item.name and same_name(item.name, value)]
+            named = [item for item in self._all if item.name and is_same_name(item.name, value)]
             return named[0] if len(named) == 1 else None
         return found
 
-    def count(self, category: Category) -> None:
+    def count_ball(self, category: Category) -> None:
         """Note a ball that was read."""
         self._found[category.id] += 1
 
@@ -91,7 +95,7 @@ class Categories:
         """How many balls were read."""
         return sum(self._found.values())
 
-    def tell(self, *, alone: bool) -> None:
+    def report_ball_category(self, *, alone: bool) -> None:
         """Say which category was taken for the ball; where none brought one it is a problem.
 
         Args:
@@ -120,7 +124,7 @@ class Categories:
         else:
             self._report.remark(f"{self._path}: {sentence}")
 
-    def _of_list(self, listed: Sequence[Any]) -> Iterable[tuple[Any, Category]]:
+    def _read_listed_categories(self, listed: Sequence[Any]) -> Iterable[tuple[Any, Category]]:
         for index, item in enumerate(listed):
             record = f"categories[{index}]"
             if not isinstance(item, dict) or id_text(item.get("id")) is None:
@@ -130,9 +134,9 @@ class Categories:
             if not isinstance(name, str) or not name.strip():
                 self._report.note(self._path, record, "name", "is missing or no text")
                 name = ""
-            yield item["id"], self._category(item["id"], name.strip(), item)
+            yield item["id"], self._make_category(item["id"], name.strip(), item)
 
-    def _category(self, value: Any, name: str, item: Mapping[str, Any]) -> Category:
+    def _make_category(self, value: Any, name: str, item: Mapping[str, Any]) -> Category:
         text = id_text(value) or ""
         points = item.get("keypoints")
         keypoints = tuple(map(str, points)) if isinstance(points, list) else ()
@@ -140,10 +144,12 @@ class Categories:
 
     def _is_ball(self, text: str, name: str) -> bool:
         if self._named:
-            return id_text(self._named) == text or (bool(name) and same_name(name, self._named))
+            return id_text(self._named) == text or (bool(name) and is_same_name(name, self._named))
         return is_ball(name)
 
-    def _of_ids(self, annotations: Sequence[Any]) -> Iterable[tuple[Any, Category]]:
+    def _make_categories_from_ids(
+        self, annotations: Sequence[Any]
+    ) -> Iterable[tuple[Any, Category]]:
         """A category for each id; the only one is the ball where no picture has two of it."""
         images: dict[str, Counter[str]] = {}
         for item in annotations:

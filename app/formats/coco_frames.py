@@ -16,12 +16,12 @@ from urllib.parse import unquote
 from app.formats.file_tree import FileTree
 from app.formats.picture_finder import (
     PICTURE_FOLDERS,
-    Found,
-    Home,
+    LabelLocation,
     PictureFinder,
-    own_pictures,
-    picture_parts,
-    split_of,
+    PictureSearchResult,
+    assign_pictures,
+    picture_name_parts,
+    split_of_word,
 )
 from app.formats.report import Report
 from app.geometry.camera import Camera
@@ -44,7 +44,7 @@ class Frame:
     Attributes:
         path: The file, for problems.
         record: The image in it.
-        parts: Its name as ``picture_parts`` gives it.
+        parts: Its name as ``picture_name_parts`` gives it.
         key: Its name as a key; unlike ``parts`` without the folders of another machine.
         group: Its ``group_id``, or None.
         view: Name of the view in that group.
@@ -78,7 +78,7 @@ class FrameFile:
     """The frames of one file, and where that lies."""
 
     path: str
-    home: Home
+    home: LabelLocation
     frames: list[Frame]
 
     @property
@@ -87,7 +87,7 @@ class FrameFile:
         return "/".join(part for part in (self.home.root, self.home.subset) if part)
 
 
-def groups_of(
+def group_frames(
     files: Sequence[FrameFile],
     tree: FileTree,
     names: Sequence[str],
@@ -104,17 +104,24 @@ def groups_of(
         report: Takes contradictions, and pictures that are missing or cannot be told apart.
     """
     finder = PictureFinder(names)
-    for file in _with_homes(files):
+    for file in _with_folders_of_others(files):
         _find_pictures(file, finder, report)
-    frames = _merged(files, report)
-    for key, members in _grouped(frames, report):
-        views = tuple(_view(key, frame, tree, calibration) for frame in members)
+    frames = _merge_frames(files, report)
+    for key, members in _group_by_key(frames, report):
+        views = tuple(_make_view(key, frame, tree, calibration) for frame in members)
         report.imported += len(views)
         report.counts["balls"] += sum(len(view.balls) for view in views)
-        yield Group(key, views, "", Pitch(), _split(members, key, report), _label(members[0], key))
+        yield Group(
+            key,
+            views,
+            "",
+            Pitch(),
+            _choose_split(members, key, report),
+            _group_label(members[0], key),
+        )
 
 
-def _with_homes(files: Sequence[FrameFile]) -> Iterator[FrameFile]:
+def _with_folders_of_others(files: Sequence[FrameFile]) -> Iterator[FrameFile]:
     """The files, each knowing which pictures are those of others."""
     subsets = {file.home.subset.lower() for file in files} - {"", "default", *PICTURE_FOLDERS}
     roots = {file.home.root for file in files} - {""}
@@ -133,23 +140,25 @@ def _find_pictures(file: FrameFile, finder: PictureFinder, report: Report) -> No
     first: dict[tuple[str, ...], Frame] = {}
     for frame in file.frames:
         first.setdefault(frame.parts, frame)
-    found = own_pictures({parts: _find(parts, file.home, finder) for parts in first})
+    found = assign_pictures({parts: _find_picture(parts, file.home, finder) for parts in first})
     for frame in file.frames:
         frame.place = found[frame.parts].place
     _report_pictures(file, found, first, finder, report)
 
 
-def _find(parts: tuple[str, ...], home: Home, finder: PictureFinder) -> Found:
-    found = finder.find(parts, home)
-    if found == Found() and any("%" in part for part in parts):
+def _find_picture(
+    parts: tuple[str, ...], home: LabelLocation, finder: PictureFinder
+) -> PictureSearchResult:
+    found = finder.find_picture(parts, home)
+    if found == PictureSearchResult() and any("%" in part for part in parts):
         # Written as a part of an address: a%20b.jpg.
-        return finder.find(picture_parts(unquote("/".join(parts))), home)
+        return finder.find_picture(picture_name_parts(unquote("/".join(parts))), home)
     return found
 
 
 def _report_pictures(
     file: FrameFile,
-    found: Mapping[tuple[str, ...], Found],
+    found: Mapping[tuple[str, ...], PictureSearchResult],
     first: Mapping[tuple[str, ...], Frame],
     finder: PictureFinder,
     report: Report,
@@ -173,21 +182,21 @@ def _report_pictures(
     if guessed:
         report.remark(
             f"{file.path}: {plural(len(guessed), 'picture was', 'pictures were')} found by the end of"
-            f" the name: {_listed(guessed)}"
+            f" the name: {_list_some_names(guessed)}"
         )
     if missing:
         where = ", ".join(f"{folder or '.'}/" for folder in list(file.home.folders())[:_SHOWN])
         sentence = (
-            f"{plural(len(missing), 'picture was', 'pictures were')} not found: {_listed(missing)}"
+            f"{plural(len(missing), 'picture was', 'pictures were')} not found: {_list_some_names(missing)}"
             f" (looked in {where} and everywhere else)"
         )
-        if finder.some:
+        if finder.has_pictures:
             report.note(file.path, None, "file_name", sentence)
         else:
             report.remark(f"{file.path}: {sentence}")
 
 
-def _merged(files: Sequence[FrameFile], report: Report) -> list[Frame]:
+def _merge_frames(files: Sequence[FrameFile], report: Report) -> list[Frame]:
     """Each frame once, with all that the files say of it."""
     known: dict[tuple[str, ...], list[Frame]] = {}
     frames: list[Frame] = []
@@ -200,7 +209,7 @@ def _merged(files: Sequence[FrameFile], report: Report) -> list[Frame]:
                 same.append(frame)
                 frames.append(frame)
             else:
-                _join(other, frame, report)
+                _merge_records_of_frame(other, frame, report)
     return frames
 
 
@@ -210,7 +219,7 @@ def _is_one_view(one: Frame, other: Frame) -> bool:
     return (one.group, one.view) == (other.group, other.view)
 
 
-def _join(frame: Frame, other: Frame, report: Report) -> None:
+def _merge_records_of_frame(frame: Frame, other: Frame, report: Report) -> None:
     """Add what another record says of a frame; what contradicts is named, and the first one counts."""
     first = f"{frame.path}, {frame.record}" if other.path != frame.path else frame.record
     if other.size != frame.size:
@@ -239,11 +248,11 @@ def _join(frame: Frame, other: Frame, report: Report) -> None:
         report.note(other.path, other.record, "split", problem)
     for ball in other.balls:
         _add_ball(frame, ball, other, first, report)
-    shown = [_shape(box) for box in frame.boxes]
-    frame.boxes += [box for box in other.boxes if _shape(box) not in shown]
+    shown = [_class_and_points(box) for box in frame.boxes]
+    frame.boxes += [box for box in other.boxes if _class_and_points(box) not in shown]
 
 
-def _shape(box: Mapping[str, Any]) -> tuple[Any, Any]:
+def _class_and_points(box: Mapping[str, Any]) -> tuple[Any, Any]:
     return box.get("class"), box.get("points")
 
 
@@ -267,7 +276,7 @@ def _add_ball(frame: Frame, ball: BallAnnotation, other: Frame, first: str, repo
 def _is_one_ball(one: BallAnnotation, other: BallAnnotation) -> bool:
     """Whether two annotations are of one ball: equal boxes, or a point that lies in the box."""
     if one.box is not None and other.box is not None:
-        sides = zip(_corners(one.box), _corners(other.box), strict=True)
+        sides = zip(_box_corners(one.box), _box_corners(other.box), strict=True)
         return all(abs(a - b) <= SAME_PX for a, b in sides)
     if one.center is None or other.center is None:
         return False
@@ -276,18 +285,18 @@ def _is_one_ball(one: BallAnnotation, other: BallAnnotation) -> bool:
     return apart <= max([SAME_PX, *reach])
 
 
-def _corners(box: Box) -> tuple[float, ...]:
+def _box_corners(box: Box) -> tuple[float, ...]:
     return box.x, box.y, box.x + box.width, box.y + box.height
 
 
-def _grouped(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, list[Frame]]]:
+def _group_by_key(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, list[Frame]]]:
     """Groups by key; where sets of frames use one key for different frames, each has its own."""
     groups: dict[str, list[Frame]] = {}
     for frame in frames:
         groups.setdefault(frame.key if frame.group is None else frame.group, []).append(frame)
     taken = set(groups)
     for key, members in groups.items():
-        _number_frames(members)
+        _add_folders_to_view_names(members)
         views = Counter(frame.view for frame in members)
         scopes = list(dict.fromkeys(frame.scope for frame in members))
         if max(views.values()) == 1 or len(scopes) == 1:
@@ -303,7 +312,7 @@ def _grouped(frames: Sequence[Frame], report: Report) -> Iterator[tuple[str, lis
             yield name, _unique_frames(name, own, report)
 
 
-def _number_frames(frames: Sequence[Frame]) -> None:
+def _add_folders_to_view_names(frames: Sequence[Frame]) -> None:
     """Give views that no file names, and whose files have one name, their folders as well."""
     if len({frame.split for frame in frames}) > 1:
         return
@@ -328,7 +337,7 @@ def _unique_frames(key: str, frames: Sequence[Frame], report: Report) -> list[Fr
     return list(views.values())
 
 
-def _view(group: str, frame: Frame, tree: FileTree, calibration: str) -> View:
+def _make_view(group: str, frame: Frame, tree: FileTree, calibration: str) -> View:
     # A group of one view is the place of its frame, and so is its camera.
     alone = frame.group is None
     key = group if alone else frame.view
@@ -339,7 +348,7 @@ def _view(group: str, frame: Frame, tree: FileTree, calibration: str) -> View:
     return View(key, station, tuple(frame.balls), media, extras=Extras(tuple(frame.boxes)))
 
 
-def _split(frames: Sequence[Frame], key: str, report: Report) -> str:
+def _choose_split(frames: Sequence[Frame], key: str, report: Report) -> str:
     splits = list(dict.fromkeys(frame.split for frame in frames if frame.split))
     for other in splits[1:]:
         frame = next(item for item in frames if item.split == other)
@@ -348,15 +357,15 @@ def _split(frames: Sequence[Frame], key: str, report: Report) -> str:
     return splits[0] if splits else ""
 
 
-def _label(frame: Frame, key: str) -> str:
+def _group_label(frame: Frame, key: str) -> str:
     kind = "Image" if frame.group is None else "Group"
     return f"{kind} {PurePosixPath(key).name}"
 
 
 def split_of_folders(parts: Sequence[str]) -> str:
     """The split that the innermost folder of a name says; empty where none does."""
-    return next((split for part in reversed(parts) if (split := split_of(part))), "")
+    return next((split for part in reversed(parts) if (split := split_of_word(part))), "")
 
 
-def _listed(items: Sequence[str]) -> str:
+def _list_some_names(items: Sequence[str]) -> str:
     return ", ".join(items[:_SHOWN]) + (", ..." if len(items) > _SHOWN else "")

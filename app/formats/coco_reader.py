@@ -12,12 +12,12 @@ from app.errors import DatasetFormatError, UnsafePathError
 from app.formats.camera_json import camera_from_json
 from app.formats.coco_annotation import (
     Annotation,
-    Joined,
-    NoPlaceError,
-    ball_of,
-    box_of,
+    JoinedAnnotations,
+    MissingPositionError,
+    ball_from_annotation,
+    box_from_annotation,
     is_occluded,
-    spelt,
+    quote_value,
 )
 from app.formats.coco_categories import (
     CAMERA,
@@ -29,15 +29,20 @@ from app.formats.coco_categories import (
     Categories,
     Category,
 )
-from app.formats.coco_frames import Frame, FrameFile, groups_of, split_of_folders
+from app.formats.coco_frames import Frame, FrameFile, group_frames, split_of_folders
 from app.formats.corner_origin import box_from_corner
 from app.formats.fields import id_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import UNASSIGNED
-from app.formats.json_text import is_gamestate, json_kind, read_json
-from app.formats.picture_finder import Home, PictureFinder, picture_parts, split_in
+from app.formats.json_text import describe_document, is_gamestate, read_json
+from app.formats.picture_finder import (
+    LabelLocation,
+    PictureFinder,
+    picture_name_parts,
+    split_within_word,
+)
 from app.formats.report import Report
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.formats.synloc import camera_from_synloc, is_synloc
 from app.formats.trees import opened_tree
 from app.formats.view_groups import PlacedView, ViewGroups
@@ -85,27 +90,29 @@ def read_coco(
             return
         names = tree.names()
         finder, groups = PictureFinder(names), ViewGroups(report)
-        files: list[_File] = []
+        files: list[_CocoFile] = []
         for name in names:
             place = PurePosixPath(name)
             if place.suffix.lower() != ".json" or place.name in _OURS:
                 continue
-            value = _value(tree, name, report, limits)
+            value = _read_coco_file(tree, name, report, limits)
             if value is not None:
-                file = _File(tree, name, finder, value, report, ball_category)
+                file = _CocoFile(tree, name, finder, value, report, ball_category)
                 files.append(file)
                 for view in file.views():
                     yield from groups.add(view, tree.shown(name))
-                file.close()
-        yield from groups.rest()
+                file.release_parsed_content()
+        yield from groups.incomplete_groups()
         foreign = [file.frames for file in files if file.frames.frames]
-        yield from groups_of(foreign, tree, names, calibration, report)
-        _report_balls(files, report)
+        yield from group_frames(foreign, tree, names, calibration, report)
+        _report_ball_categories(files, report)
         if not files:
             report.note(str(root), None, None, "holds no COCO file (images and annotations)")
 
 
-def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[str, Any] | None:
+def _read_coco_file(
+    tree: FileTree, name: str, report: Report, limits: Limits
+) -> dict[str, Any] | None:
     """A file with a list of images; None for any other, which is said."""
     shown = tree.shown(name)
     try:
@@ -117,21 +124,21 @@ def _value(tree: FileTree, name: str, report: Report, limits: Limits) -> dict[st
     if isinstance(value, dict) and isinstance(value.get("images"), list):
         if not is_gamestate(value.get("annotations")):
             return value
-        report.note(shown, None, None, json_kind(value))
+        report.note(shown, None, None, describe_document(value))
         return None
     report.remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
     return None
 
 
-def _report_balls(files: list[_File], report: Report) -> None:
+def _report_ball_categories(files: list[_CocoFile], report: Report) -> None:
     """Which category of each foreign file was taken for the ball, or that it brought none."""
     some = any(file.categories.balls for file in files)
     foreign = [file for file in files if file.frames.frames]
     for file in [file for file in foreign if not file.captions] or foreign:
-        file.categories.tell(alone=not some)
+        file.categories.report_ball_category(alone=not some)
 
 
-class _File:
+class _CocoFile:
     """One file on its way to views (images of ours) and frames (of others)."""
 
     def __init__(
@@ -149,30 +156,34 @@ class _File:
         stem = place.stem.removeprefix(PREFIX).removeprefix(OUTSIDE)
         task = _TASK.fullmatch(place.stem)
         subset = stem if task is None else task[1]
-        split = "" if stem == UNASSIGNED else split_in(stem) or split_of_folders(place.parts[:-1])
-        folder = "" if str(place.parent) == "." else str(place.parent)
-        known = task is not None or bool(split_in(stem))
-        self._home = Home(folder, subset if known and subset != "default" else "", split)
-        self.frames = FrameFile(self.path, self._home, [])
-        annotations = self._listed("annotations")
-        self.categories = Categories(
-            self._listed("categories"), annotations, self.path, report, ball_category
+        split = (
+            ""
+            if stem == UNASSIGNED
+            else split_within_word(stem) or split_of_folders(place.parts[:-1])
         )
-        self._joined = Joined(value["images"], annotations, self.path, report)
+        folder = "" if str(place.parent) == "." else str(place.parent)
+        known = task is not None or bool(split_within_word(stem))
+        self._home = LabelLocation(folder, subset if known and subset != "default" else "", split)
+        self.frames = FrameFile(self.path, self._home, [])
+        annotations = self._get_list("annotations")
+        self.categories = Categories(
+            self._get_list("categories"), annotations, self.path, report, ball_category
+        )
+        self._joined = JoinedAnnotations(value["images"], annotations, self.path, report)
         self.captions = self._joined.captions
 
-    def close(self) -> None:
+    def release_parsed_content(self) -> None:
         """Let go of everything but the frames: the next file may be as large."""
-        self._value, self._joined = {}, Joined([], [], self.path, self._report)
+        self._value, self._joined = {}, JoinedAnnotations([], [], self.path, self._report)
 
-    def _listed(self, name: str) -> list[Any]:
+    def _get_list(self, name: str) -> list[Any]:
         """A list that need not be there."""
         found = self._value.get(name)
         if found is not None and not isinstance(found, list):
             self._report.note(self.path, None, name, "is not a list; left out")
         return found if isinstance(found, list) else []
 
-    def _note(self, record: str, field: str | None, problem: str) -> None:
+    def _report_problem(self, record: str, field: str | None, problem: str) -> None:
         self._report.note(self.path, record, field, problem)
 
     def views(self) -> Iterator[PlacedView]:
@@ -186,13 +197,15 @@ class _File:
             try:
                 image = StateReader(item, self.path, record)
                 if STATE in image.value:
-                    yield self._ours(image, index)
+                    yield self._read_own_image(image, index)
                 else:
-                    self.frames.frames.append(self._foreign_frame(image, index))
+                    self.frames.frames.append(self._read_foreign_image(image, index))
             except DatasetFormatError as error:
-                self._report.skip(self._with_annotations(error, index))
+                self._report.skip(self._count_annotations_in_error(error, index))
 
-    def _with_annotations(self, error: DatasetFormatError, index: int) -> DatasetFormatError:
+    def _count_annotations_in_error(
+        self, error: DatasetFormatError, index: int
+    ) -> DatasetFormatError:
         """Why an image is left out, with how many annotations go with it."""
         count = len(self._joined.of_image[index])
         if not count:
@@ -200,15 +213,17 @@ class _File:
         problem = f"{error.problem}; left out with {plural(count, 'annotation')}"
         return DatasetFormatError(error.path, error.record, error.field, problem)
 
-    def _ours(self, image: StateReader, index: int) -> PlacedView:
+    def _read_own_image(self, image: StateReader, index: int) -> PlacedView:
         state = StateReader(image.value[STATE], self.path, image.record)
         view = state.view(image.size(), Extras())
-        changed = self._changed(index, view, state.value.get(ORIGIN) == CORNER)
-        media = self._media(image.text("file_name", ""))
+        changed = self._apply_box_changes(index, view, state.value.get(ORIGIN) == CORNER)
+        media = self._find_own_media(image.text("file_name", ""))
         view = replace(view, balls=changed, media=media)
         return PlacedView(state.head(), state.count("position"), view)
 
-    def _changed(self, index: int, view: View, from_corner: bool) -> tuple[BallAnnotation, ...]:
+    def _apply_box_changes(
+        self, index: int, view: View, from_corner: bool
+    ) -> tuple[BallAnnotation, ...]:
         """The balls, with the boxes that somebody changed or added after they were written.
 
         Args:
@@ -218,25 +233,27 @@ class _File:
                 our files of before are in our own frame.
         """
         annotations = self._joined.of_image[index]
-        added = self._added(annotations, from_corner)
+        added = self._read_added_balls(annotations, from_corner)
         if not view.balls:
             return tuple(added)
         # A tool that drops fields that it does not know hands the written box on as a new one.
         written = any("written_bbox" in item for _, item in annotations)
         if written or not any(ball.box for ball in view.balls):
             for record in added.values():
-                self._note(record, "bbox", "adds a ball to a view that has one; left out")
+                self._report_problem(record, "bbox", "adds a ball to a view that has one; left out")
         if len(view.balls) != 1:
             return view.balls
         for record, item in annotations:
             if item.get("bbox") != item.get("written_bbox", item.get("bbox")):
-                box = self._box(item, record)
+                box = self._read_bbox(item, record)
                 if box is not None:
                     box = box_from_corner(box) if from_corner else box
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
 
-    def _added(self, annotations: list[Annotation], from_corner: bool) -> dict[BallAnnotation, str]:
+    def _read_added_balls(
+        self, annotations: list[Annotation], from_corner: bool
+    ) -> dict[BallAnnotation, str]:
         """The balls that were added since, each with its place in the file; the rest is reported."""
         balls: dict[BallAnnotation, str] = {}
         for record, item in annotations:
@@ -244,92 +261,97 @@ class _File:
                 continue
             category = self.categories.find(item.get("category_id"))
             if category is None or not category.ball:
-                shown = spelt(item.get("category_id")) if category is None else category.shown
+                shown = quote_value(item.get("category_id")) if category is None else category.shown
                 problem = f"is {shown}: of boxes added to an export only the ball is read; left out"
-                self._note(record, "category_id", problem)
-            elif not self._is_crowd(item, record) and (box := self._box(item, record)) is not None:
+                self._report_problem(record, "category_id", problem)
+            elif (
+                not self._is_crowd(item, record)
+                and (box := self._read_bbox(item, record)) is not None
+            ):
                 box = box_from_corner(box) if from_corner else box
                 ball = BallAnnotation(box=box, occluded=is_occluded(item))
                 if ball in balls:
-                    self._note(record, "bbox", "puts a second ball at the same place; left out")
+                    self._report_problem(
+                        record, "bbox", "puts a second ball at the same place; left out"
+                    )
                 balls.setdefault(ball, record)
         return balls
 
-    def _box(self, item: Mapping[str, Any], record: str) -> Box | None:
+    def _read_bbox(self, item: Mapping[str, Any], record: str) -> Box | None:
         try:
             return StateReader.box(item.get("bbox"))
         except ValueError as error:
-            self._note(record, "bbox", f"{error}; left out")
+            self._report_problem(record, "bbox", f"{error}; left out")
             return None
 
-    def _media(self, name: str) -> Media | None:
+    def _find_own_media(self, name: str) -> Media | None:
         """The frame of an image of ours, where it lies in the tree."""
-        place = self._finder.find(picture_parts(name), self._home).place
+        place = self._finder.find_picture(picture_name_parts(name), self._home).place
         return None if place is None else self._tree.media(place)
 
-    def _foreign_frame(self, image: StateReader, index: int) -> Frame:
-        parts = picture_parts(image.text("file_name"))
-        key = self._key(image, parts)
-        group, view = self._placed(image, key)
+    def _read_foreign_image(self, image: StateReader, index: int) -> Frame:
+        parts = picture_name_parts(image.text("file_name"))
+        key = self._image_key(image, parts)
+        group, view = self._group_and_view(image, key)
         split = self._home.split or split_of_folders(parts[:-1])
         frame = Frame(
             self.path, image.record, parts, key, group, view, image.size(), split,
-            self._camera(image), named=image.value.get("view") is not None,
+            self._read_foreign_camera(image), named=image.value.get("view") is not None,
         )  # fmt: skip
         for record, item in self._joined.of_image[index]:
-            self._add(frame, item, record)
+            self._add_annotation(frame, item, record)
         return frame
 
-    def _key(self, image: StateReader, parts: tuple[str, ...]) -> str:
+    def _image_key(self, image: StateReader, parts: tuple[str, ...]) -> str:
         """Key of an image: its name; of one on another machine the last part, where that is enough."""
         text = image.text("file_name")
         key = "/".join(parts)
         try:
             if not parts:
-                check_name(text)
+                require_safe_path(text)
                 raise image.error("file_name", "is no name of a file")
-            if not _is_relative(text) and self._joined.is_alone(parts[-1]):
+            if not _is_relative_path(text) and self._joined.is_alone(parts[-1]):
                 key = parts[-1]
-            return check_name(key)
+            return require_safe_path(key)
         except UnsafePathError as error:
             raise image.error("file_name", error.message) from error
 
-    def _add(self, frame: Frame, item: Mapping[str, Any], record: str) -> None:
+    def _add_annotation(self, frame: Frame, item: Mapping[str, Any], record: str) -> None:
         """One annotation of a frame: its ball, or the box of something else."""
         category = self.categories.find(item.get("category_id"))
         if category is None:
-            shown = spelt(item["category_id"]) if "category_id" in item else "missing"
+            shown = quote_value(item["category_id"]) if "category_id" in item else "missing"
             problem = f"is {shown}, which no category of the file has; kept as a box without class"
-            self._note(record, "category_id", problem)
+            self._report_problem(record, "category_id", problem)
         try:
             if category is not None and category.ball:
                 self._add_ball(frame, item, category, record)
             else:
                 name = "" if category is None else category.name.lower()
-                frame.boxes.append(_shown(name, item, box_of(item)))
-        except NoPlaceError as error:
-            self._note(record, error.field, f"{error.problem}; left out")
+                frame.boxes.append(_box_of_other_category(name, item, box_from_annotation(item)))
+        except MissingPositionError as error:
+            self._report_problem(record, error.field, f"{error.problem}; left out")
 
     def _add_ball(
         self, frame: Frame, item: Mapping[str, Any], category: Category, record: str
     ) -> None:
         if self._is_crowd(item, record):
             return
-        ball = ball_of(item, category.keypoints)
+        ball = ball_from_annotation(item, category.keypoints)
         if ball in frame.balls:
-            self._note(record, "bbox", "puts a second ball at the same place; left out")
+            self._report_problem(record, "bbox", "puts a second ball at the same place; left out")
             return
         frame.balls.append(ball)
-        self.categories.count(category)
+        self.categories.count_ball(category)
 
     def _is_crowd(self, item: Mapping[str, Any], record: str) -> bool:
         """Whether an annotation is a crowd, which is reported: it is not one ball."""
         crowd = item.get("iscrowd") in (1, "1")
         if crowd:
-            self._note(record, "iscrowd", "is 1: a crowd is not one ball; left out")
+            self._report_problem(record, "iscrowd", "is 1: a crowd is not one ball; left out")
         return crowd
 
-    def _camera(self, image: StateReader) -> Camera | None:
+    def _read_foreign_camera(self, image: StateReader) -> Camera | None:
         """The camera that a file of somebody else gives; one that is none is reported."""
         given = image.value.get(CAMERA)
         try:
@@ -339,10 +361,10 @@ class _File:
         except DatasetFormatError as error:
             of_camera = [] if is_synloc(image.value) else [CAMERA]
             field = ".".join([*of_camera, *filter(None, [error.field])])
-            self._note(image.record, field, f"{error.problem}; left out")
+            self._report_problem(image.record, field, f"{error.problem}; left out")
             return None
 
-    def _placed(self, image: StateReader, key: str) -> tuple[str | None, str]:
+    def _group_and_view(self, image: StateReader, key: str) -> tuple[str | None, str]:
         """Group and name of a view; no group where the file says none."""
         group, view = image.value.get("group_id"), image.value.get("view")
         if group is None or isinstance(group, bool) or not isinstance(group, str | int | float):
@@ -351,26 +373,30 @@ class _File:
             view = PurePosixPath(key).name
         if isinstance(view, bool) or not isinstance(view, str | int | float):
             raise image.error("view", "is no name of a view")
-        return _safe(image, "group_id", group), _safe(image, "view", view)
+        return _require_safe_path(image, "group_id", group), _require_safe_path(image, "view", view)
 
 
-def _safe(image: StateReader, field: str, value: str | float) -> str:
+def _require_safe_path(image: StateReader, field: str, value: str | float) -> str:
     text = value if isinstance(value, str) else id_text(value) or ""
     try:
-        return str(PurePosixPath(check_name(text)))
+        return str(PurePosixPath(require_safe_path(text)))
     except UnsafePathError as error:
         raise image.error(field, error.message) from error
 
 
-def _is_relative(name: str) -> bool:
+def _is_relative_path(name: str) -> bool:
     """Whether a name leads to a file below a folder, whichever that is."""
     try:
-        return bool(check_name(name.replace("\\", "/"))) and "://" not in name and "?" not in name
+        return (
+            bool(require_safe_path(name.replace("\\", "/")))
+            and "://" not in name
+            and "?" not in name
+        )
     except UnsafePathError:
         return False
 
 
-def _shown(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:
+def _box_of_other_category(category: str, item: Mapping[str, Any], box: Box) -> Mapping[str, Any]:
     """A box of another category in the shape that all datasets show."""
     corners = {"x1": box.x, "y1": box.y, "x2": box.x + box.width, "y2": box.y + box.height}
     return {"class": category or None, "ID": str(item.get("id", "")), "points": corners}

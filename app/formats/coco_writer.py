@@ -64,7 +64,7 @@ def write_coco(
     folder = root / "annotations"
     folder.mkdir()
     with ExitStack() as stack:
-        files: dict[str, _Instances] = {}
+        files: dict[str, _CocoFileWriter] = {}
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
@@ -72,19 +72,19 @@ def write_coco(
                 prefix = PREFIX if teaches else OUTSIDE
                 name = f"{prefix}{record.split(view) or UNASSIGNED}.json"
                 if name not in files:
-                    files[name] = stack.enter_context(_Instances(folder / name, info or {}))
+                    files[name] = stack.enter_context(_CocoFileWriter(folder / name, info or {}))
                 counts["images" if teaches else "images_outside"] += 1
                 counts["balls"] += record.has_ball_3d(view)
                 identity = counts["images"] + counts["images_outside"]
-                files[name].add_image(_image(record, view, identity, everything))
-                annotation = _annotation(record, view, identity, everything, boxes)
+                files[name].add_image(_image_to_json(record, view, identity, everything))
+                annotation = _ball_annotation_to_json(record, view, identity, everything, boxes)
                 if annotation is not None:
                     files[name].add_annotation(annotation)
                     counts["annotations"] += teaches
     return counts
 
 
-class _Instances:
+class _CocoFileWriter:
     """One file: images go to its end at once, annotations wait in a file beside it."""
 
     def __init__(self, path: Path, info: Mapping[str, Any]):
@@ -96,7 +96,7 @@ class _Instances:
         head = {"info": {**info, ORIGIN: CORNER}, "licenses": [], "categories": categories}
         self._images.write(json_text(head)[:-1] + ', "images": [')
 
-    def __enter__(self) -> _Instances:
+    def __enter__(self) -> _CocoFileWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -119,13 +119,15 @@ class _Instances:
         self._counts[1] += 1
 
 
-def _image(record: ExportRecord, view: View, identity: int, everything: bool) -> dict[str, Any]:
+def _image_to_json(
+    record: ExportRecord, view: View, identity: int, everything: bool
+) -> dict[str, Any]:
     camera, fit = record.camera(view), record.ball_fit(view, everything)
     solved = record.view_solution(view)
     jac = solved.calibration.jac if solved else None
     computed = {
         CAMERA: None if camera is None else camera_to_json(camera),
-        "jac": None if jac is None else _by_gamma(jac),
+        "jac": None if jac is None else _jac_by_tolerance(jac),
         "ball_3d": list(record.point) if fit is not None and record.point else None,
         "verdict": record.verdict_text,
     }
@@ -146,7 +148,7 @@ def _image(record: ExportRecord, view: View, identity: int, everything: bool) ->
     }
 
 
-def _by_gamma(jac: Sequence[float]) -> dict[str, float]:
+def _jac_by_tolerance(jac: Sequence[float]) -> dict[str, float]:
     """JaC by tolerance, as REST spells it; also as it was spelt before, which is deprecated."""
     pairs = list(zip(GAMMAS_PERCENT, jac, strict=True))
     return {f"{gamma:g}": value for gamma, value in pairs} | {
@@ -154,14 +156,14 @@ def _by_gamma(jac: Sequence[float]) -> dict[str, float]:
     }
 
 
-def _annotation(
+def _ball_annotation_to_json(
     record: ExportRecord, view: View, identity: int, everything: bool, boxes: str
 ) -> dict[str, Any] | None:
     box = chosen_box(record, view, boxes)
     if view.ball is None or box is None:
         return None
     fit, annotated = record.ball_fit(view, everything), view.ball.box
-    written = _bbox(box)
+    written = _box_to_bbox(box)
     return {
         # A view has one box at most, so that both can have one number.
         "id": identity,
@@ -173,17 +175,17 @@ def _annotation(
         "occluded": view.ball.occluded,
         # So that a reader can tell a box that somebody changed from the one written here.
         "written_bbox": written,
-        "annotated_bbox": None if annotated is None else _bbox(annotated),
-        **dict(_fit_fields(record, fit)),
+        "annotated_bbox": None if annotated is None else _box_to_bbox(annotated),
+        **dict(_ball_fit_fields(record, fit)),
     }
 
 
-def _fit_fields(record: ExportRecord, fit: BallFit | None) -> Iterator[tuple[str, Any]]:
+def _ball_fit_fields(record: ExportRecord, fit: BallFit | None) -> Iterator[tuple[str, Any]]:
     yield "ball_3d", list(record.point) if fit is not None and record.point else None
     for name in ("error_px", "optimized_diameter_px", "optimized_error_m", "depth_m"):
         yield name, None if fit is None else getattr(fit, name)
 
 
-def _bbox(box: Box) -> list[float]:
+def _box_to_bbox(box: Box) -> list[float]:
     box = box_to_corner(box)
     return [*map(float, (box.x, box.y, box.width, box.height))]

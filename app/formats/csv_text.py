@@ -22,7 +22,7 @@ _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 Value = str | bool | int | float | None
 
 
-def cell(value: Value) -> str:
+def csv_cell(value: Value) -> str:
     """The text of one cell.
 
     Missing values (None, NaN) are empty. Text that a spreadsheet would run as a formula gets an
@@ -43,16 +43,16 @@ def cell(value: Value) -> str:
 def csv_line(values: Iterable[Value]) -> str:
     """A row of a CSV file with its end."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow([cell(value) for value in values])
+    csv.writer(text, lineterminator="\n").writerow([csv_cell(value) for value in values])
     return text.getvalue()
 
 
-def plain_list(values: Sequence[float | int]) -> str:
+def list_text(values: Sequence[float | int]) -> str:
     """A list as text, ``[1.0, 2.0]``, with every digit."""
-    return "[" + ", ".join(repr(_plain(value)) for value in values) + "]"
+    return "[" + ", ".join(repr(_plain_number(value)) for value in values) + "]"
 
 
-def _plain(value: float) -> float:
+def _plain_number(value: float) -> float:
     # numpy's own numbers would spell themselves np.float64(...).
     return int(value) if isinstance(value, int) else float(value)
 
@@ -67,10 +67,10 @@ class CsvTable:
 
     def add(self, values: Iterable[Value]) -> None:
         """One row; its index is the number of rows before it."""
-        self.add_cells(map(cell, values))
+        self.add_cells(map(csv_cell, values))
 
     def add_cells(self, cells: Iterable[str]) -> None:
-        """One row of what ``cell`` made."""
+        """One row of what ``csv_cell`` made."""
         self._writer.writerow([str(self.rows), *cells])
         self.rows += 1
 
@@ -110,14 +110,14 @@ def read_rows(
             raise DatasetFormatError(path, None, missing[0], "is missing from the columns")
         for row in reader:
             if row:
-                yield reader.line_num, dict(zip(header, map(_plain_cell, row), strict=False))
+                yield reader.line_num, dict(zip(header, map(_unescape_formula, row), strict=False))
     except csv.Error as error:
         line = f"line {reader.line_num}"
         raise DatasetFormatError(path, line, None, f"is not sound CSV ({error})") from error
 
 
-def _plain_cell(text: str) -> str:
-    """A cell without the apostrophe that ``cell`` put before a formula."""
+def _unescape_formula(text: str) -> str:
+    """A cell without the apostrophe that ``csv_cell`` put before a formula."""
     if text.startswith("'") and text.lstrip("'").startswith(_FORMULA):
         return text[1:]
     return text
@@ -128,7 +128,7 @@ def is_missing(text: str | None) -> bool:
     return text is None or text.strip().lower() in _MISSING
 
 
-def numbers_in(text: str, count: int) -> tuple[float, ...]:
+def parse_number_list(text: str, count: int) -> tuple[float, ...]:
     """The numbers of a list as text: ``[1, 2]``, ``[array([1., 2.])]``, ``[np.float64(1), 2]``.
 
     Nothing is evaluated; the words around the numbers are known ones.

@@ -13,17 +13,17 @@ from app.formats.coco_writer import write_coco
 from app.formats.export_names import Claims, ExportNames, Outline, frame_claims
 from app.formats.export_record import ExportRecord
 from app.formats.format_names import ExportFormat
-from app.formats.frame_names import FrameName, flat_frame, match_frame
-from app.formats.gamestate import sequence_claims, sequence_frame
+from app.formats.frame_names import FrameName, frame_path_by_match, frame_path_in_split
+from app.formats.gamestate import sequence_claims, sequence_frame_path
 from app.formats.gamestate_writer import write_gamestate
 from app.formats.issia import FramePersons
 from app.formats.issia_3d_writer import write_issia_3d
 from app.formats.issia_writer import write_issia
 from app.formats.manifest import SOFTWARE, software_version
 from app.formats.parquet_writer import write_parquet
-from app.formats.sn_calibration import line_claims, line_frame
+from app.formats.sn_calibration import line_claims, line_frame_path
 from app.formats.sn_calibration_writer import write_sn_calibration
-from app.formats.soccernet_v3_writer import labels_frame, write_soccernet_v3
+from app.formats.soccernet_v3_writer import labels_frame_path, write_soccernet_v3
 from app.formats.soccernet_v3d_writer import write_soccernet_v3d
 from app.formats.tracking_writer import write_cdf, write_tracab
 from app.formats.tracks_writer import TrackRecord, write_track_arrays, write_tracks
@@ -47,11 +47,11 @@ TRACKS = ("tracks", "tracab", "cdf", "npz")
 WITHOUT_LENSES = ("soccernet-v3d", "issia", "issia-3d", "sn-calibration")
 """Formats whose cameras are SoccerNet's: they have no place for a wide lens."""
 LAYOUTS: Mapping[str, FrameName] = {
-    "gamestate": sequence_frame,
-    "sn-calibration": line_frame,
-    "soccernet-v3": labels_frame,
-    "soccernet-v3d": labels_frame,
-    "yolo": flat_frame,
+    "gamestate": sequence_frame_path,
+    "sn-calibration": line_frame_path,
+    "soccernet-v3": labels_frame_path,
+    "soccernet-v3d": labels_frame_path,
+    "yolo": frame_path_in_split,
 }
 """Where a format looks for the frames of its views, unless beside the labels of a match."""
 CLAIMS: Mapping[str, Claims] = {
@@ -123,10 +123,10 @@ def write_format(
     if options.tracks is not None:
         return _TRACK_WRITERS[options.format](root, options.tracks(records))
     if options.format in WITHOUT_LENSES:
-        records = _with_plain_lenses(records, options.format)
+        records = _require_supported_lenses(records, options.format)
     everything, boxes = options.everything, options.boxes
     counts = {"groups": 0}
-    groups = _groups(records, counts)
+    groups = _count_groups(records, counts)
     match options.format:
         case "soccernet-v3d":
             return write_soccernet_v3d(root, records, everything=everything, boxes=boxes)
@@ -144,7 +144,7 @@ def write_format(
         case "gamestate":
             return write_gamestate(root, records)
         case "coco":
-            info = {"description": options.provenance.get("dataset"), "software": _software()}
+            info = {"description": options.provenance.get("dataset"), "software": _software_name()}
             return write_coco(
                 root,
                 records,
@@ -165,13 +165,13 @@ def write_format(
             )
 
 
-def _groups(records: Iterable[ExportRecord], counts: dict[str, int]) -> Iterator[Group]:
+def _count_groups(records: Iterable[ExportRecord], counts: dict[str, int]) -> Iterator[Group]:
     for record in records:
         counts["groups"] += 1
         yield record.group
 
 
-def _with_plain_lenses(
+def _require_supported_lenses(
     records: Iterable[ExportRecord],
     format: str,  # noqa: A002
 ) -> Iterator[ExportRecord]:
@@ -189,14 +189,14 @@ def _with_plain_lenses(
         yield record
 
 
-def used_options(format: str) -> list[str]:  # noqa: A002
+def options_used_by(format: str) -> list[str]:  # noqa: A002
     """The options that a format uses, of ``USERS``."""
     return [name for name in USERS if format in USERS[name]]
 
 
 def frame_layout(format: str) -> FrameName:  # noqa: A002
     """Where a format looks for the frames of its views."""
-    return LAYOUTS.get(format, match_frame)
+    return LAYOUTS.get(format, frame_path_by_match)
 
 
 def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # noqa: A002
@@ -209,7 +209,7 @@ def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # no
 
 def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
     """Which kind of ball box the files hold, for a format that has a choice."""
-    if "boxes" not in used_options(format):
+    if "boxes" not in options_used_by(format):
         return {}
     # optimized_d is defined around the centre of the annotated box.
     own = {"ball_bbox": "annotated"} if format == "soccernet-v3d" else {}
@@ -218,10 +218,10 @@ def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002
 
 def view_settings(format: str, every_view: bool) -> dict[str, str]:  # noqa: A002
     """Which views a detector learns from, for a format that leaves some out."""
-    return {"views": "all" if every_view else "valid"} if "views" in used_options(format) else {}
+    return {"views": "all" if every_view else "valid"} if "views" in options_used_by(format) else {}
 
 
-def lacking(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
+def missing_for_use(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
     """What the files of a format still lack before they can be used; None: nothing.
 
     YOLO trains on the pictures beside its labels; every other format is of use without them.
@@ -235,9 +235,9 @@ def lacking(format: str, counts: Mapping[str, int]) -> str | None:  # noqa: A002
 
 def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]:  # noqa: A002
     """What a manifest says of frames that a format needs and that were not copied."""
-    sentence = lacking(format, counts)
+    sentence = missing_for_use(format, counts)
     return {} if sentence is None else {"missing_images": sentence}
 
 
-def _software() -> str:
+def _software_name() -> str:
     return f"{SOFTWARE} {software_version()}"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from app.errors import InputError
-from app.formats.frame_names import likely_suffix, match_frame, view_stem
+from app.formats.frame_names import expected_frame_suffix, frame_path_by_match, view_stem
 from app.soccer.annotation import Extras
 from app.soccer.group import Group, View
 
@@ -18,18 +18,18 @@ Claims = Callable[[Group, View, str], Mapping[str, Hashable]]
 """The names that a view would have in an export, from its group and split; whose each would be."""
 
 
-def folded(name: str) -> str:
+def fold_file_name(name: str) -> str:
     """The same for names that a disk may take for one: they differ in case or composition only."""
     return unicodedata.normalize("NFC", name).casefold()
 
 
-def named(view: View, name: str | None) -> View:
+def with_export_key(view: View, name: str | None) -> View:
     """The view with the key that names its files; its own where ``name`` is None."""
     # What a source said of the frame's name counts no more.
     return view if name is None else replace(view, key=name, extras=Extras())
 
 
-def frame_of(group: Group, view: View) -> Hashable:
+def frame_identity(group: Group, view: View) -> Hashable:
     """Which frame a view shows: the file where there is one, which several groups may show."""
     if view.media is None:
         return group.key, view.key
@@ -38,7 +38,11 @@ def frame_of(group: Group, view: View) -> Hashable:
 
 def frame_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """Of formats whose records name the picture alone."""
-    return {match_frame(group, view, split, likely_suffix(view)): frame_of(group, view)}
+    return {
+        frame_path_by_match(group, view, split, expected_frame_suffix(view)): frame_identity(
+            group, view
+        )
+    }
 
 
 def key_in_group(group: Group, view: View, glue: str = "/") -> str:
@@ -68,7 +72,7 @@ class ExportNames:
         self._contested: set[int] = set()
         for group, splits in outlines:
             for view in group.views:
-                for name, owner in self._hashed(group, view, splits):
+                for name, owner in self._hash_claims(group, view, splits):
                     if self._owners.setdefault(name, owner) != owner:
                         self._contested.add(name)
 
@@ -80,15 +84,15 @@ class ExportNames:
         """
         found: dict[str, str] = {}
         for view in group.views:
-            key = self._free(group, view, splits)
+            key = self._choose_free_key(group, view, splits)
             if key != view.key:
                 found[view.key] = key
         return found
 
-    def _free(self, group: Group, view: View, splits: Mapping[str, str]) -> str:
-        for key in self._candidates(group, view):
+    def _choose_free_key(self, group: Group, view: View, splits: Mapping[str, str]) -> str:
+        for key in self._candidate_keys(group, view):
             other = None if key == view.key else key
-            names = self._hashed(group, view, splits, other)
+            names = self._hash_claims(group, view, splits, other)
             if all(
                 name not in self._contested and self._owners.get(name, owner) == owner
                 for name, owner in names
@@ -100,7 +104,7 @@ class ExportNames:
             hint="Rename the view or its group in the source, and import it again.",
         )
 
-    def _candidates(self, group: Group, view: View) -> Iterator[str]:
+    def _candidate_keys(self, group: Group, view: View) -> Iterator[str]:
         yield view.key
         yield key_in_group(group, view, self._glue)
         stem = view_stem(view.key)
@@ -108,9 +112,9 @@ class ExportNames:
         digest = hashlib.sha256(f"{group.key}\0{view.key}".encode()).hexdigest()[:12]
         yield f"{stem.replace('/', self._glue)}_{digest}{ending}"
 
-    def _hashed(
+    def _hash_claims(
         self, group: Group, view: View, splits: Mapping[str, str], key: str | None = None
     ) -> list[tuple[int, int]]:
         split = splits.get(view.key, group.split)
-        wanted = self._claims(group, named(view, key), split)
-        return [(hash(folded(name)), hash(owner)) for name, owner in wanted.items()]
+        wanted = self._claims(group, with_export_key(view, key), split)
+        return [(hash(fold_file_name(name)), hash(owner)) for name, owner in wanted.items()]

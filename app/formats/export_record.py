@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from app.formats.export_names import named
-from app.formats.frame_names import likely_suffix, match_frame
+from app.formats.export_names import with_export_key
+from app.formats.frame_names import expected_frame_suffix, frame_path_by_match
 from app.geometry.camera import Camera
 from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box
@@ -47,7 +47,7 @@ class ExportRecord:
 
     def named(self, view: View) -> View:
         """A view with the key by which its files are called."""
-        return named(view, self.names.get(view.key))
+        return with_export_key(view, self.names.get(view.key))
 
     def view_solution(self, view: View) -> ViewSolution | None:
         """What was computed for one view."""
@@ -114,4 +114,6 @@ def chosen_box(record: ExportRecord, view: View, kind: str) -> Box | None:
 def frame_name(record: ExportRecord, view: View) -> str:
     """Where the frame of a view is in the export, or would be."""
     placed, called = record.frames.get(view.key), record.named(view)
-    return placed or match_frame(record.group, called, record.split(view), likely_suffix(view))
+    return placed or frame_path_by_match(
+        record.group, called, record.split(view), expected_frame_suffix(view)
+    )

@@ -79,7 +79,7 @@ def number(value: Any) -> float:
     if type(value) is float and math.isfinite(value):
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"is {_kind(value)}, not a number")
+        raise ValueError(f"is {_kind_of_value(value)}, not a number")
     if isinstance(value, str):
         return _number_of_text(value)
     try:
@@ -103,7 +103,7 @@ def _number_of_text(text: str) -> float:
     return result
 
 
-def pixel(value: Any) -> float:
+def pixel_coordinate(value: Any) -> float:
     """A coordinate in an image, pixels; may lie outside the image, but not beyond reason.
 
     Raises:
@@ -115,7 +115,7 @@ def pixel(value: Any) -> float:
     return result
 
 
-def whole(value: Any) -> int:
+def whole_number(value: Any) -> int:
     """A whole number, also when spelt ``7.0`` or ``"7"``.
 
     Raises:
@@ -127,42 +127,42 @@ def whole(value: Any) -> int:
     return int(result)
 
 
-def numbers(value: Any, count: int) -> tuple[float, ...]:
+def number_list(value: Any, count: int) -> tuple[float, ...]:
     """A list of ``count`` finite numbers.
 
     Raises:
         ValueError: Not a list, another length, or a member that is no number.
     """
     if not isinstance(value, (list, tuple)):
-        raise ValueError(f"is {_kind(value)}, not a list of {count} numbers")
+        raise ValueError(f"is {_kind_of_value(value)}, not a list of {count} numbers")
     if len(value) != count:
         raise ValueError(f"has {len(value)} numbers, not {count}")
     return tuple(number(item) for item in value)
 
 
-def mapping(value: Any) -> dict[str, Any]:
+def require_object(value: Any) -> dict[str, Any]:
     """A JSON object.
 
     Raises:
         ValueError: Anything else.
     """
     if not isinstance(value, dict):
-        raise ValueError(f"is {_kind(value)}, not an object")
+        raise ValueError(f"is {_kind_of_value(value)}, not an object")
     return value
 
 
-def sequence(value: Any) -> list[Any]:
+def require_list(value: Any) -> list[Any]:
     """A JSON list.
 
     Raises:
         ValueError: Anything else.
     """
     if not isinstance(value, (list, tuple)):
-        raise ValueError(f"is {_kind(value)}, not a list")
+        raise ValueError(f"is {_kind_of_value(value)}, not a list")
     return list(value)
 
 
-def _kind(value: Any) -> str:
+def _kind_of_value(value: Any) -> str:
     if value is None:
         return "null"
     names = {bool: "a truth value", str: "text", dict: "an object", list: "a list"}
@@ -183,7 +183,7 @@ def stated_size(value: Mapping[str, Any]) -> ImageSize | None:
     pairs = [[value.get(width), value.get(height)] for width, height in _SIDES]
     for pair in (*pairs, *(value.get(name) for name in _PAIRS)):
         try:
-            width, height = map(whole, numbers(pair, 2))
+            width, height = map(whole_number, number_list(pair, 2))
         except ValueError:
             continue
         if min(width, height) >= 2 and max(width, height) <= MAX_SIDE:

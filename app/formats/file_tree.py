@@ -92,26 +92,26 @@ class FileTree(Protocol):
         """Release the archive."""
 
 
-def read_capped(file: IO[bytes], limit: int, shown: str) -> bytes:
+def read_limited(file: IO[bytes], limit: int, shown: str) -> bytes:
     """All bytes of a stream; real bytes are counted, whatever a header declares."""
-    return b"".join(capped_chunks(file, limit, shown))
+    return b"".join(limited_chunks(file, limit, shown))
 
 
-def capped_chunks(file: IO[bytes], limit: int, shown: str) -> Iterator[bytes]:
+def limited_chunks(file: IO[bytes], limit: int, shown: str) -> Iterator[bytes]:
     """A stream in chunks.
 
     Raises:
         DatasetFormatError: It holds more than ``limit`` bytes, or is damaged.
     """
     total = 0
-    while chunk := _chunk(file, shown):
+    while chunk := _read_chunk(file, shown):
         total += len(chunk)
         if total > limit:
             raise DatasetFormatError(shown, None, None, f"is longer than {limit:,} bytes")
         yield chunk
 
 
-def _chunk(file: IO[bytes], shown: str) -> bytes:
+def _read_chunk(file: IO[bytes], shown: str) -> bytes:
     try:
         return file.read(_CHUNK)
     except BROKEN as error:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import IO
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.formats.file_tree import Limits, read_capped
-from app.formats.plain_file import open_plain
+from app.formats.file_tree import Limits, read_limited
+from app.formats.plain_file import open_regular_file
 from app.formats.report import Report
 from app.formats.safe_path import is_hidden, resolve_inside
 from app.formats.zip_tree import ZipTree
@@ -33,13 +33,13 @@ class FolderTree:
         while pending:
             inside = pending.pop()
             try:
-                self._list(inside, found, pending)
+                self._list_folder(inside, found, pending)
             except OSError as error:
                 problem = f"cannot be read ({error.strerror})"
                 self._report.note(self.shown(inside), None, None, problem)
         return sorted(found)
 
-    def _list(self, inside: str, found: list[str], pending: list[str]) -> None:
+    def _list_folder(self, inside: str, found: list[str], pending: list[str]) -> None:
         with os.scandir(self.path / inside) as entries:
             for entry in entries:
                 name = inside + entry.name
@@ -65,13 +65,13 @@ class FolderTree:
     def read_bytes(self, name: str) -> bytes:
         """The whole content of one file."""
         with self.open(name) as file:
-            return read_capped(file, self._limits.file_bytes, self.shown(name))
+            return read_limited(file, self._limits.file_bytes, self.shown(name))
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
         shown = self.shown(name)
         try:
-            return open_plain(resolve_inside(self.path, name), shown)
+            return open_regular_file(resolve_inside(self.path, name), shown)
         except UnsafePathError as error:
             raise DatasetFormatError(shown, None, None, error.message) from error
         except OSError as error:
@@ -98,7 +98,7 @@ class FolderTree:
         """Nothing to release."""
 
 
-class FileAlone(FolderTree):
+class SingleFileTree(FolderTree):
     """One file as if it were alone in its folder."""
 
     def __init__(self, path: Path, report: Report, limits: Limits):

@@ -16,9 +16,9 @@ from app.config import Settings
 from app.errors import DatasetFormatError, InputError, NotFoundError
 from app.formats.file_tree import DEFAULT_LIMITS, Limits, Root
 from app.formats.json_text import read_json
-from app.formats.plain_file import read_plain
+from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.object_store.address import is_address, seal
 from app.object_store.path import StoredPath, find_path, target_path
 from app.plural import plural
@@ -63,11 +63,11 @@ class FrameList:
             raise DatasetFormatError(shown, None, "frames", "is missing or no list")
         for number, item in enumerate(items):
             try:
-                self._add(item)
+                self._add_frame(item)
             except (InputError, NotFoundError) as error:
                 report.note(shown, f"frames/{number}", None, error.message)
 
-    def _add(self, item: Any) -> None:
+    def _add_frame(self, item: Any) -> None:
         def text(name: str) -> str | None:
             found = item.get(name) if isinstance(item, dict) else None
             if found is not None and not (isinstance(found, str) and 0 < len(found) <= 1000):
@@ -80,21 +80,21 @@ class FrameList:
             raise InputError("needs group, view and path")
         if digest is not None and not _SHA256.fullmatch(digest):
             raise InputError("sha256 is not 64 hexadecimal digits")
-        address = self._address(path)
+        address = self._resolve_address(path)
         if member is not None:
-            check_name(member)
-        sealed = f"{address}#sha256={digest}" if digest else self._found(address)
+            require_safe_path(member)
+        sealed = f"{address}#sha256={digest}" if digest else self._add_entity_tag(address)
         self._media[group, view] = Media(sealed, member)
 
-    def _address(self, path: str) -> str:
+    def _resolve_address(self, path: str) -> str:
         if not is_address(path):
             if self._folder is None:
                 raise InputError(f"{path[:200]} is no address in a store (s3://NAME/...)")
-            return str(self._folder / check_name(path))
-        check_name(path.removeprefix("s3://"))
+            return str(self._folder / require_safe_path(path))
+        require_safe_path(path.removeprefix("s3://"))
         return str(target_path(self._settings, path))
 
-    def _found(self, address: str) -> str:
+    def _add_entity_tag(self, address: str) -> str:
         """The address with the entity tag of what is there now; asked once for each zip."""
         if address not in self._sealed:
             stored = find_path(self._settings, address).stored
@@ -103,7 +103,7 @@ class FrameList:
             self._sealed[address] = seal(address, stored.etag)
         return self._sealed[address]
 
-    def placed(self, groups: Iterator[Group]) -> Iterator[Group]:
+    def with_listed_frames(self, groups: Iterator[Group]) -> Iterator[Group]:
         """The groups, each view with the frame that the list names for it; others keep theirs.
 
         Entries that name no view are reported in the end.
@@ -112,7 +112,7 @@ class FrameList:
         for group in groups:
             for view in group.views:
                 unused.pop((group.key, view.key), None)
-            views = tuple(self._with_frame(group.key, view) for view in group.views)
+            views = tuple(self._with_listed_frame(group.key, view) for view in group.views)
             yield replace(group, views=views)
         if unused:
             count = plural(len(unused), "entry names", "entries name")
@@ -121,7 +121,7 @@ class FrameList:
             problem = f"{count} no view of what was read: {names}{more}"
             self._report.note(self._shown, None, "frames", problem)
 
-    def _with_frame(self, group: str, view: View) -> View:
+    def _with_listed_frame(self, group: str, view: View) -> View:
         media = self._media.get((group, view.key))
         return view if media is None else replace(view, media=media)
 
@@ -138,5 +138,5 @@ def read_frame_list(
         content = place.store.read_whole(place.key, limits.file_bytes)[0]
         return FrameList(content, str(place), settings, place.parent, report, limits)
     return FrameList(
-        read_plain(place, limits.file_bytes), str(place), settings, None, report, limits
+        read_regular_file(place, limits.file_bytes), str(place), settings, None, report, limits
     )

@@ -33,7 +33,7 @@ FrameName = Callable[[Group, View, str, str], str]
 """Place of a frame in an export, from its group, its view, its split and the ending to give."""
 
 
-def match_frame(group: Group, view: View, split: str, suffix: str) -> str:
+def frame_path_by_match(group: Group, view: View, split: str, suffix: str) -> str:
     """``<match>/Frames-v3/7_1.png``; static cameras: ``.../cam3/358.jpg``.
 
     The ending of a view's key stays, whatever the frame is: labels and readers go by the name.
@@ -47,24 +47,24 @@ def match_frame(group: Group, view: View, split: str, suffix: str) -> str:
     return f"{match}/{FOLDER}/{name}{suffix}"
 
 
-def flat_frame(group: Group, view: View, split: str, suffix: str) -> str:
+def frame_path_in_split(group: Group, view: View, split: str, suffix: str) -> str:
     """``images/<split>/<digest of the group>_<view>.jpg``: no name of ours meets another.
 
     Labels have the name without its ending: views that would share it have a digest of theirs, too.
     """
     ending = PurePosixPath(view.key).suffix.lower()
-    stem = _flat_stem(view.key)
-    if sum(_flat_stem(other.key).lower() == stem.lower() for other in group.views) > 1:
-        stem = f"{stem}_{_digest(view.key)}"
+    stem = _file_safe_stem(view.key)
+    if sum(_file_safe_stem(other.key).lower() == stem.lower() for other in group.views) > 1:
+        stem = f"{stem}_{_key_digest(view.key)}"
     ending = ending if ending in IMAGE_SUFFIXES else suffix
-    return f"images/{split_folder(split)}/{_digest(group.key)}_{stem}{ending}"
+    return f"images/{split_folder(split)}/{_key_digest(group.key)}_{stem}{ending}"
 
 
-def _flat_stem(key: str) -> str:
+def _file_safe_stem(key: str) -> str:
     return _UNSAFE.sub("-", view_stem(key))
 
 
-def _digest(key: str) -> str:
+def _key_digest(key: str) -> str:
     return hashlib.sha256(key.encode()).hexdigest()[:12]
 
 
@@ -73,7 +73,7 @@ def split_folder(split: str) -> str:
     return {"valid": "val", "test": "test", "challenge": "test"}.get(split, "train")
 
 
-def likely_suffix(view: View) -> str:
+def expected_frame_suffix(view: View) -> str:
     """Ending that a copy of a view's frame would most likely have."""
     media = view.media
     name = "" if media is None else media.member or unseal(media.path)[0]
@@ -87,7 +87,7 @@ def view_stem(key: str) -> str:
     return str(place.with_suffix("")) if place.suffix.lower() in IMAGE_SUFFIXES else key
 
 
-def view_place(group: Group, view: View) -> str:
+def view_file_path(group: Group, view: View) -> str:
     """Where the files of a view go, without prefix and ending: ``<match>/7_1``."""
     # The key of a frame that is a group alone is the place of its file.
     match = group.match if view.key != group.key else ""

@@ -89,11 +89,11 @@ def read_frames(
                 report.note(tree.shown(name), None, None, IS_VIDEO)
             elif not is_system_file(name):
                 report.note(tree.shown(name), None, None, "is no JPEG, PNG or WebP picture")
-        groups = _grouped(pictures, grouping, pattern)
+        groups = _group_by_name(pictures, grouping, pattern)
         if grouping and pictures:
-            _say_groups(report, groups, grouping)
+            _report_groups(report, groups, grouping)
         for key, names in groups.items():
-            views = list(_views(tree, names, names != [key], size_of, report))
+            views = list(_read_views(tree, names, names != [key], size_of, report))
             if views:
                 label = PurePosixPath(key).name
                 yield Group(key, tuple(views), label=f"Image {label}" if names == [key] else label)
@@ -101,7 +101,7 @@ def read_frames(
             report.note(str(root), None, None, "holds no picture (JPEG, PNG or WebP)")
 
 
-def _grouped(
+def _group_by_name(
     names: Iterable[str], grouping: str, pattern: re.Pattern[str] | None
 ) -> dict[str, list[str]]:
     """Names of pictures by the key of their group; what fits no pattern is one of its own."""
@@ -117,7 +117,7 @@ def _grouped(
     return groups
 
 
-def _say_groups(report: Report, groups: dict[str, list[str]], grouping: str) -> None:
+def _report_groups(report: Report, groups: dict[str, list[str]], grouping: str) -> None:
     """Say in one sentence what the grouping made, with the largest group as an example."""
     key, names = max(groups.items(), key=lambda item: len(item[1]))
     shown = ", ".join(PurePosixPath(name).name for name in names[:4])
@@ -132,13 +132,13 @@ def _say_groups(report: Report, groups: dict[str, list[str]], grouping: str) -> 
         report.remark(f"{fit} not fit {grouping}: each is a group of its own.")
 
 
-def _views(
+def _read_views(
     tree: FileTree, names: Iterable[str], short: bool, size_of: SizeOf, report: Report
 ) -> Iterator[View]:
     for name in names:
         report.read += 1
         try:
-            size = _size(tree, name, size_of)
+            size = _read_image_size(tree, name, size_of)
         except DatasetFormatError as error:
             report.skip(error)
             continue
@@ -147,7 +147,7 @@ def _views(
         yield View(key, Station(name, size), media=tree.media(name))
 
 
-def _size(tree: FileTree, name: str, size_of: SizeOf) -> ImageSize:
+def _read_image_size(tree: FileTree, name: str, size_of: SizeOf) -> ImageSize:
     shown, problem = tree.shown(name), "cannot be read"
     for count in _HEADS:
         try:

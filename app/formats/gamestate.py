@@ -32,9 +32,9 @@ def sequence_folder(match: str, split: str) -> str:
     return f"{split or UNASSIGNED}/{(match or SEQUENCE).replace('/', '_')}"
 
 
-def file_name(group: Group, view: View) -> str:
+def frame_file_name(group: Group, view: View) -> str:
     """Name of the frame of a view: as its file called it, or made from its key."""
-    image = kept_of(view).get("image")
+    image = source_fields(view).get("image")
     if isinstance(image, dict) and isinstance(image.get("file_name"), str):
         return str(image["file_name"])
     stem = view_stem(view.key)
@@ -49,16 +49,16 @@ def sequence_claims(group: Group, view: View, split: str) -> Mapping[str, Hashab
     Files of one sequence in several splits are one sequence to who reads them, and images are
     known by their name without its ending.
     """
-    stem = PurePosixPath(file_name(group, view)).stem
+    stem = PurePosixPath(frame_file_name(group, view)).stem
     return {f"{sequence_folder(group.match, '')}/{stem}": (group.key, view.key)}
 
 
-def kept_of(view: View) -> Mapping[str, Any]:
+def source_fields(view: View) -> Mapping[str, Any]:
     """What the file said that a view came from; empty for views of other formats."""
     kept = view.extras.metadata.get(METADATA)
     return kept if isinstance(kept, dict) else {}
 
 
-def sequence_frame(group: Group, view: View, split: str, suffix: str) -> str:
+def sequence_frame_path(group: Group, view: View, split: str, suffix: str) -> str:
     """Where the frame of a view lies in an export: ``<split>/<sequence>/img1/000001.jpg``."""
-    return f"{sequence_folder(group.match, split)}/{IMAGES}/{file_name(group, view)}"
+    return f"{sequence_folder(group.match, split)}/{IMAGES}/{frame_file_name(group, view)}"

@@ -15,7 +15,7 @@ from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_
 from app.formats.gamestate import BALL, LABELS, METADATA, PITCH
 from app.formats.json_text import read_json
 from app.formats.report import Report
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.soccernet_v3 import SPLITS
 from app.formats.trees import opened_tree
@@ -51,7 +51,7 @@ def read_gamestate(
         stems: dict[str, set[str]] = {}
         for name in files:
             try:
-                sequence = _Sequence(tree, name, names, report, limits)
+                sequence = _LabelledSequence(tree, name, names, report, limits)
                 # A match whose groups are in several splits has a file in each.
                 place = (sequence.key, sequence.split)
                 if place in seen:
@@ -65,7 +65,7 @@ def read_gamestate(
 
 
 @dataclass
-class _Image:
+class _AnnotatedImage:
     """An image and its annotations."""
 
     record: dict[str, Any]
@@ -77,7 +77,7 @@ class _Image:
     kept: dict[str, Any] = field(default_factory=dict)
 
 
-class _Sequence:
+class _LabelledSequence:
     """One Labels-GameState.json on its way to groups."""
 
     def __init__(self, tree: FileTree, name: str, names: list[str], report: Report, limits: Limits):
@@ -89,22 +89,22 @@ class _Sequence:
         self._value = value
         self._folder = name[: -len(LABELS)]
         self._inside = files_inside(names, self._folder)
-        self.key = self._key()
+        self.key = self._sequence_key()
         parts = PurePosixPath(name).parts
         self.split = next((part for part in reversed(parts) if part in SPLITS), "")
 
-    def _key(self) -> str:
+    def _sequence_key(self) -> str:
         folders = PurePosixPath(self._folder).parts
         info = self._value.get("info")
         named = info.get("name") if isinstance(info, dict) else None
         root = self._tree.path
         name = folders[-1] if folders else named or (root.name if root.is_dir() else root.stem)
         try:
-            return check_name(str(name)).replace("/", "_")
+            return require_safe_path(str(name)).replace("/", "_")
         except UnsafePathError as error:
             raise DatasetFormatError(self.path, None, "info.name", error.message) from error
 
-    def _list(self, name: str) -> list[Any]:
+    def _get_list(self, name: str) -> list[Any]:
         value = self._value.get(name)
         if not isinstance(value, list):
             self._report.note(self.path, None, name, "is missing or not a list")
@@ -118,15 +118,15 @@ class _Sequence:
             calibration: What counts for a view that has a camera and lines.
             stems: Names that other files of this sequence have already; those of this one join.
         """
-        images: list[_Image] = []
-        index: IdIndex[_Image] = IdIndex()
-        for identity, record, size in self._records(stems):
-            image = _Image(record, size)
+        images: list[_AnnotatedImage] = []
+        index: IdIndex[_AnnotatedImage] = IdIndex()
+        for identity, record, size in self._image_records(stems):
+            image = _AnnotatedImage(record, size)
             if not index.add(identity, image):
                 problem = f"is {identity}, as that of another image is; no annotation joins it"
                 self._report.note(self.path, str(record["file_name"]), "image_id", problem)
             images.append(image)
-        self._annotate(index)
+        self._join_annotations(index)
         common = {name: self._value[name] for name in ("info", "categories") if name in self._value}
         for image in images:
             record, size = image.record, image.size
@@ -135,26 +135,28 @@ class _Sequence:
             extras = Extras(tuple(image.boxes), image.other_lines, {METADATA: kept})
             name = f"{self.key}/{PurePosixPath(key).stem}"
             station = Station(name, size, lines=image.lines, calibration=calibration)
-            view = View(key, station, tuple(image.balls), self._media(key), extras=extras)
+            view = View(key, station, tuple(image.balls), self._find_frame(key), extras=extras)
             self._report.imported += 1
             label = f"{self.key} · {PurePosixPath(key).stem}"
             yield Group(name, (view,), match=self.key, split=self.split, label=label)
 
-    def _records(self, names: set[str]) -> Iterator[tuple[Any, dict[str, Any], ImageSize]]:
+    def _image_records(self, names: set[str]) -> Iterator[tuple[Any, dict[str, Any], ImageSize]]:
         """Sound image records with their ids, each name once."""
-        for index, record in enumerate(self._list("images")):
+        for index, record in enumerate(self._get_list("images")):
             self._report.read += 1
             where = f"images[{index}]"
             try:
-                image = fields.mapping(record)
+                image = fields.require_object(record)
                 key = image.get("file_name")
-                if not isinstance(key, str) or "/" in check_name(key):
+                if not isinstance(key, str) or "/" in require_safe_path(key):
                     raise ValueError("has no file_name that is a file's name")
                 if "image_id" not in image and "id" not in image:
                     raise ValueError("has no image_id")
                 if PurePosixPath(key).stem in names:
                     raise ValueError(f"is a second {key}")
-                size = ImageSize(_side(image, "width"), _side(image, "height"))
+                size = ImageSize(
+                    _read_side_length(image, "width"), _read_side_length(image, "height")
+                )
             except UnsafePathError as error:
                 self._report.note(self.path, where, "file_name", error.message)
                 continue
@@ -164,10 +166,10 @@ class _Sequence:
             names.add(PurePosixPath(key).stem)
             yield image.get("image_id", image.get("id")), image, size
 
-    def _annotate(self, images: IdIndex[_Image]) -> None:
+    def _join_annotations(self, images: IdIndex[_AnnotatedImage]) -> None:
         """Give each annotation to its image; one that joins none is named."""
-        categories = self._categories()
-        for index, item in enumerate(self._list("annotations")):
+        categories = self._category_names()
+        for index, item in enumerate(self._get_list("annotations")):
             where = f"annotations[{index}]"
             image = images.find(item.get("image_id")) if isinstance(item, dict) else None
             if image is None:
@@ -183,11 +185,11 @@ class _Sequence:
             elif name is not None and is_ball(name):
                 self._add_ball(image, item, where)
             elif isinstance(item.get("bbox_image"), dict):
-                image.boxes.append(_box(item))
+                image.boxes.append(_person_box(item))
             else:
                 image.kept.setdefault("others", []).append(item)
 
-    def _categories(self) -> IdIndex[str]:
+    def _category_names(self) -> IdIndex[str]:
         """Name of each category by its id; the usual ones where a file does not list them."""
         found: IdIndex[str] = IdIndex()
         listed = self._value.get("categories")
@@ -198,7 +200,9 @@ class _Sequence:
             found.add(identity, name)
         return found
 
-    def _add_lines(self, image: _Image, item: dict[str, Any], size: ImageSize, where: str) -> None:
+    def _add_lines(
+        self, image: _AnnotatedImage, item: dict[str, Any], size: ImageSize, where: str
+    ) -> None:
         if "pitch" in image.kept:
             self._report.note(self.path, where, None, "is a second pitch of its image; left out")
             return
@@ -210,9 +214,9 @@ class _Sequence:
         except DatasetFormatError as error:
             self._report.note(self.path, where, "lines", error.problem)
 
-    def _add_ball(self, image: _Image, item: dict[str, Any], where: str) -> None:
+    def _add_ball(self, image: _AnnotatedImage, item: dict[str, Any], where: str) -> None:
         try:
-            image.balls.append(_ball(item))
+            image.balls.append(_read_ball(item))
         except ValueError as error:
             self._report.note(self.path, where, "bbox_image", f"{error}; kept without geometry")
             image.kept.setdefault("others", []).append(item)
@@ -220,7 +224,7 @@ class _Sequence:
         rest = {name: value for name, value in item.items() if name != "bbox_image"}
         image.kept.setdefault("balls", []).append(rest)
 
-    def _media(self, key: str) -> Media | None:
+    def _find_frame(self, key: str) -> Media | None:
         for folder in _FOLDERS:
             if folder + key in self._inside:
                 name = self._folder + folder + key
@@ -229,24 +233,24 @@ class _Sequence:
         return None
 
 
-def _side(image: Mapping[str, Any], name: str) -> int:
-    side = fields.whole(image.get(name))
+def _read_side_length(image: Mapping[str, Any], name: str) -> int:
+    side = fields.whole_number(image.get(name))
     if not 2 <= side <= MAX_SIDE:
         raise ValueError(f"has a {name} of {side} pixels")
     return side
 
 
-def _corner_box(item: Mapping[str, Any]) -> Box:
-    place = fields.mapping(item.get("bbox_image"))
+def _read_bbox_image(item: Mapping[str, Any]) -> Box:
+    place = fields.require_object(item.get("bbox_image"))
     missing = [name for name in ("x", "y", "w", "h") if name not in place]
     if missing:
         raise ValueError(f"has no {missing[0]}")
-    return Box(*(fields.pixel(place[name]) for name in ("x", "y", "w", "h")))
+    return Box(*(fields.pixel_coordinate(place[name]) for name in ("x", "y", "w", "h")))
 
 
-def _ball(item: Mapping[str, Any]) -> BallAnnotation:
+def _read_ball(item: Mapping[str, Any]) -> BallAnnotation:
     """A box without area is the ball's centre alone."""
-    box = _corner_box(item)
+    box = _read_bbox_image(item)
     if box.width < 0 or box.height < 0:
         raise ValueError("has a negative width or height")
     if box.width == 0 or box.height == 0:
@@ -254,7 +258,7 @@ def _ball(item: Mapping[str, Any]) -> BallAnnotation:
     return BallAnnotation(box=box)
 
 
-def _box(item: Mapping[str, Any]) -> Mapping[str, Any]:
+def _person_box(item: Mapping[str, Any]) -> Mapping[str, Any]:
     """A person in the shape that all datasets show, with the annotation as it was."""
     attributes = item.get("attributes")
     details = attributes if isinstance(attributes, dict) else {}
@@ -265,7 +269,7 @@ def _box(item: Mapping[str, Any]) -> Mapping[str, Any]:
         METADATA: dict(item),
     }
     try:
-        box = _corner_box(item)
+        box = _read_bbox_image(item)
     except ValueError:
         return value
     corners = {"x1": box.x, "y1": box.y, "x2": box.x + box.width, "y2": box.y + box.height}

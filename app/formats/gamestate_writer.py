@@ -17,7 +17,7 @@ from app.errors import InputError
 from app.finite import json_text
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
-from app.formats.export_names import folded
+from app.formats.export_names import fold_file_name
 from app.formats.export_record import ExportRecord
 from app.formats.gamestate import (
     BALL_ID,
@@ -26,9 +26,9 @@ from app.formats.gamestate import (
     LABELS,
     METADATA,
     PITCH_ID,
-    file_name,
-    kept_of,
+    frame_file_name,
     sequence_folder,
+    source_fields,
 )
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration_writer import lines_to_json
@@ -71,7 +71,7 @@ _FIRST_OF_OURS = 100_001
 
 
 @dataclass
-class _File:
+class _LabelsFile:
     """One Labels-GameState.json while it is made; each image, and the annotations of each, are JSON already."""
 
     name: str
@@ -82,24 +82,24 @@ class _File:
     annotations: list[str] = field(default_factory=list)
     tracks: dict[Hashable, int] = field(default_factory=dict)
 
-    def text(self) -> str:
-        info = _text(self.kept.get("info") or self._info())
-        categories = _text(self.kept.get("categories") or _CATEGORIES)
+    def to_json_text(self) -> str:
+        info = _compact_json(self.kept.get("info") or self._sequence_info())
+        categories = _compact_json(self.kept.get("categories") or _CATEGORIES)
         images, annotations = ",\n".join(self.images), ",\n".join(self.annotations)
         return (
             f'{{"info":{info},"images":[\n{images}\n],"annotations":[\n{annotations}\n],'
             f'"categories":{categories}}}\n'
         )
 
-    def _info(self) -> dict[str, Any]:
+    def _sequence_info(self) -> dict[str, Any]:
         info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
         return {**info, "seq_length": len(self.images)}
 
-    def image_id(self) -> str:
+    def next_image_id(self) -> str:
         """Id of the next image; no sequence of an export has the same."""
         return f"{_SPLIT_NUMBERS.get(self.split, 9)}{self.number:03d}{len(self.images) + 1:06d}"
 
-    def track(self, who: Hashable) -> int:
+    def track_number(self, who: Hashable) -> int:
         """Number of a track, beyond those that a file may have brought."""
         start = _FIRST_OF_OURS if self.kept else 1
         return self.tracks.setdefault(who, start + len(self.tracks))
@@ -124,7 +124,7 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "images": 0, "annotated_balls": 0}
-    files, matches = dict[Path, _File](), dict[str, str]()
+    files, matches = dict[Path, _LabelsFile](), dict[str, str]()
     names: dict[tuple[str, str], str] = {}
     for match, run in groupby(records, key=lambda record: record.group.match):
         touched: dict[str, Path] = {}
@@ -135,79 +135,85 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
                 if split not in touched:
                     path = resolve_inside(root, f"{sequence_folder(match, split)}/{LABELS}")
                     # Whatever its split, a sequence is known by the name of its folder.
-                    other = matches.setdefault(folded(path.parent.name), match)
+                    other = matches.setdefault(fold_file_name(path.parent.name), match)
                     if other != match:
                         raise InputError(f"the matches {other} and {match} would be one sequence")
                     if path in files:
-                        _read_again(files[path], path)
+                        _reload_file(files[path], path)
                     else:
-                        files[path] = _File(path.parent.name, len(files) + 1, split)
+                        files[path] = _LabelsFile(path.parent.name, len(files) + 1, split)
                     touched[split] = path
-                _require_free(names, record, view)
-                _add(files[touched[split]], record, view, counts)
+                _reserve_image_name(names, record, view)
+                _add_view(files[touched[split]], record, view, counts)
         for path in sorted(touched.values()):
-            _write(files[path], path)
+            _write_file(files[path], path)
     return counts
 
 
-def _require_free(names: dict[tuple[str, str], str], record: ExportRecord, view: View) -> None:
+def _reserve_image_name(
+    names: dict[tuple[str, str], str], record: ExportRecord, view: View
+) -> None:
     """Keep the name of an image; raises InputError where another one of its sequence has it."""
-    name = file_name(record.group, record.named(view))
+    name = frame_file_name(record.group, record.named(view))
     whose = f"{record.group.key}, {view.key}"
-    first = names.setdefault((record.group.match, folded(PurePosixPath(name).stem)), whose)
+    first = names.setdefault((record.group.match, fold_file_name(PurePosixPath(name).stem)), whose)
     if first != whose:
         raise InputError(f"the images of two frames ({first} and {whose}) would be called {name}")
 
 
-def _write(file: _File, path: Path) -> None:
+def _write_file(file: _LabelsFile, path: Path) -> None:
     """Write a file, and forget what it holds until its match comes again."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(file.text(), encoding="utf-8")
+    path.write_text(file.to_json_text(), encoding="utf-8")
     file.images, file.annotations = [], []
 
 
-def _read_again(file: _File, path: Path) -> None:
+def _reload_file(file: _LabelsFile, path: Path) -> None:
     earlier = json.loads(path.read_text(encoding="utf-8"))
-    file.images = [_text(item) for item in earlier["images"]]
-    file.annotations = [_text(item) for item in earlier["annotations"]]
+    file.images = [_compact_json(item) for item in earlier["images"]]
+    file.annotations = [_compact_json(item) for item in earlier["annotations"]]
 
 
-def _text(value: Any) -> str:
+def _compact_json(value: Any) -> str:
     return json_text(value, compact=True)
 
 
-def _add(file: _File, record: ExportRecord, view: View, counts: dict[str, int]) -> None:
-    kept = kept_of(view)
+def _add_view(file: _LabelsFile, record: ExportRecord, view: View, counts: dict[str, int]) -> None:
+    kept = source_fields(view)
     file.kept = file.kept or kept
     camera = record.camera(view)
-    people = _people(file, record.group, view, camera)
-    image = _image(file, record, view, camera, people)
-    file.images.append(_text(image))
+    people = _people_of_view(file, record.group, view, camera)
+    image = _image_to_json(file, record, view, camera, people)
+    file.images.append(_compact_json(image))
     identity = str(image.get("image_id", image.get("id")))
-    annotations = [*people, *_balls(file, record, view), *_other_annotations(view, camera)]
+    annotations = [
+        *people,
+        *_ball_annotations(file, record, view),
+        *_other_annotations(view, camera),
+    ]
     if annotations:
         found = [
             {"id": f"{identity}{number:03d}", "image_id": identity, **annotation}
             for number, annotation in enumerate(annotations, 1)
         ]
-        file.annotations.append(_text(found).removeprefix("[").removesuffix("]"))
+        file.annotations.append(_compact_json(found).removeprefix("[").removesuffix("]"))
     counts["images"] += 1
     counts["annotated_balls"] += sum(ball.center is not None for ball in view.balls)
 
 
-def _image(
-    file: _File,
+def _image_to_json(
+    file: _LabelsFile,
     record: ExportRecord,
     view: View,
     camera: Camera | None,
     people: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    kept, name = kept_of(view).get("image"), file_name(record.group, record.named(view))
+    kept, name = source_fields(view).get("image"), frame_file_name(record.group, record.named(view))
     if isinstance(kept, dict):
         return kept | ({"file_name": name} if view.key in record.names else {})
     return {
         "is_labeled": True,
-        "image_id": file.image_id(),
+        "image_id": file.next_image_id(),
         "file_name": name,
         "height": view.size.height,
         "width": view.size.width,
@@ -215,18 +221,20 @@ def _image(
         "has_labeled_person": bool(people)
         and (camera is None or all(person["bbox_pitch"] for person in people)),
         "has_labeled_pitch": bool(view.station.lines),
-        "has_labeled_camera": _holds(camera),
+        "has_labeled_camera": _can_store_camera(camera),
         "ignore_regions_y": [],
         "ignore_regions_x": [],
     }
 
 
-def _holds(camera: Camera | None) -> bool:
+def _can_store_camera(camera: Camera | None) -> bool:
     """Whether the format has a place for a camera: it is SoccerNet's, with no wide lens."""
     return camera is not None and not camera.is_wide
 
 
-def _people(file: _File, group: Group, view: View, camera: Camera | None) -> list[dict[str, Any]]:
+def _people_of_view(
+    file: _LabelsFile, group: Group, view: View, camera: Camera | None
+) -> list[dict[str, Any]]:
     """The people of an image, as they came or made anew, each track once."""
     seen: set[int] = set()
     people: list[dict[str, Any]] = []
@@ -235,23 +243,23 @@ def _people(file: _File, group: Group, view: View, camera: Camera | None) -> lis
         if isinstance(box.get(METADATA), dict):
             people.append(dict(box[METADATA]))
             continue
-        person = _person(box)
+        person = _person_annotation(box)
         if person is None:
             continue
-        track = file.track(_owner_of(box, group, view, index))
+        track = file.track_number(_track_owner(box, group, view, index))
         if track in seen:
-            track = file.track((group.key, view.key, index))
+            track = file.track_number((group.key, view.key, index))
         seen.add(track)
         person["track_id"] = track
         people.append(person)
         made.append(person)
-    standing = _on_pitch(camera, [person["bbox_image"] for person in made])
+    standing = _boxes_on_pitch(camera, [person["bbox_image"] for person in made])
     for person, place in zip(made, standing, strict=True):
         person["bbox_pitch"] = place
     return people
 
 
-def _owner_of(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
+def _track_owner(box: Mapping[str, Any], group: Group, view: View, index: int) -> Hashable:
     """Whose box it is: a shirt number is the same all match long, another tag in its group."""
     # A class that is no text is kept as it came, like all that datasets bring.
     name, tag = str(box.get("class")), box.get("ID")
@@ -261,7 +269,7 @@ def _owner_of(box: Mapping[str, Any], group: Group, view: View, index: int) -> H
     return (name, text) if text.isdigit() else (name, text, group.key)
 
 
-def _on_pitch(
+def _boxes_on_pitch(
     camera: Camera | None, boxes: Sequence[Mapping[str, float]]
 ) -> list[dict[str, float] | None]:
     """Where the lower edge of each box stands on the grass, metres; None without a place there."""
@@ -272,29 +280,36 @@ def _on_pitch(
     places = np.round(camera.on_ground(edges.reshape(-1, 2)).reshape(-1, 6), _PLACE_DIGITS)
     stand = np.isfinite(places.sum(axis=1)).tolist()
     return [
-        _pitch_box(place) if stands else None
+        _bbox_pitch(place) if stands else None
         for place, stands in zip(places.tolist(), stand, strict=True)
     ]
 
 
-def _pitch_box(place: Sequence[float]) -> dict[str, float]:
+def _bbox_pitch(place: Sequence[float]) -> dict[str, float]:
     """``bbox_pitch`` of x and y of the left, middle and right of a lower edge, pitch frame."""
     return dict(zip(_PITCH_BOX, place, strict=True))
 
 
-def _balls(file: _File, record: ExportRecord, view: View) -> Iterator[dict[str, Any]]:
-    rest = kept_of(view).get("balls") or []
+def _ball_annotations(
+    file: _LabelsFile, record: ExportRecord, view: View
+) -> Iterator[dict[str, Any]]:
+    rest = source_fields(view).get("balls") or []
     balls = [ball for ball in view.balls if ball.center is not None]
     for index, ball in enumerate(balls):
-        kept = rest[index] if index < len(rest) else _new_ball(file, record, view, index)
-        yield {**_BALL, **kept, "bbox_image": _box_of(ball)}
+        kept = rest[index] if index < len(rest) else _new_ball_fields(file, record, view, index)
+        yield {**_BALL, **kept, "bbox_image": _bbox_of_ball(ball)}
 
 
-def _new_ball(file: _File, record: ExportRecord, view: View, index: int) -> dict[str, Any]:
-    return {"track_id": file.track(("ball", index)), "bbox_pitch": _below_ball(record, view)}
+def _new_ball_fields(
+    file: _LabelsFile, record: ExportRecord, view: View, index: int
+) -> dict[str, Any]:
+    return {
+        "track_id": file.track_number(("ball", index)),
+        "bbox_pitch": _spot_below_ball(record, view),
+    }
 
 
-def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
+def _spot_below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     """The spot below the 3D ball, where that holds: the box of a ball in the air stands elsewhere."""
     camera, point = record.camera(view), record.point
     if camera is None or point is None or not record.has_ball_3d(view):
@@ -304,33 +319,35 @@ def _below_ball(record: ExportRecord, view: View) -> dict[str, float] | None:
     share = PAPER.ball_diameter_m / 2 / max(math.hypot(x, y), 1e-9)
     (east, south, _), right, down = point, x * share, y * share
     edge = (east - right, south - down, east, south, east + right, south + down)
-    return _pitch_box([round(value, _PLACE_DIGITS) for value in edge])
+    return _bbox_pitch([round(value, _PLACE_DIGITS) for value in edge])
 
 
 def _other_annotations(view: View, camera: Camera | None) -> Iterator[dict[str, Any]]:
     """The lines, the camera, and what else there was."""
-    kept = kept_of(view)
+    kept = source_fields(view)
     if view.station.lines or view.extras.lines or "pitch" in kept:
         lines = lines_to_json(view.station.lines, view.size, view.extras.lines)
         head = {"supercategory": "pitch", "category_id": PITCH_ID}
         # This format spells no name with a space at its end.
         stripped = {name.strip(): points for name, points in lines.items()}
         yield head | (kept.get("pitch") or {}) | {"lines": stripped}
-    if camera is not None and _holds(camera) and not kept:
+    if camera is not None and _can_store_camera(camera) and not kept:
         head = {"supercategory": "camera", "category_id": CAMERA_ID}
         measured = {"relative_mean_reproj": None, "accuracy@5": None}
         yield {**head, "parameters": camera_to_json(camera), **measured}
     yield from (dict(item) for item in kept.get("others") or [])
 
 
-def _box_of(ball: BallAnnotation) -> dict[str, float]:
+def _bbox_of_ball(ball: BallAnnotation) -> dict[str, float]:
     assert ball.center is not None, "the caller leaves out what is out of view"
     x, y = ball.center
     box = ball.box
-    return _place(*((x, y, 0.0, 0.0) if box is None else (box.x, box.y, box.width, box.height)))
+    return _bbox_image(
+        *((x, y, 0.0, 0.0) if box is None else (box.x, box.y, box.width, box.height))
+    )
 
 
-def _place(x: float, y: float, width: float, height: float) -> dict[str, float]:
+def _bbox_image(x: float, y: float, width: float, height: float) -> dict[str, float]:
     return {
         "x": x,
         "y": y,
@@ -349,7 +366,7 @@ def _role_and_team(name: str) -> tuple[str, str | None]:
     return role, next((side for side in ("left", "right") if side in words), None)
 
 
-def _person(box: Mapping[str, Any]) -> dict[str, Any] | None:
+def _person_annotation(box: Mapping[str, Any]) -> dict[str, Any] | None:
     """A person of SoccerNet-v3 (``Player team left``, ``Main referee``); None without corners."""
     corners = box.get("points")
     try:
@@ -363,6 +380,6 @@ def _person(box: Mapping[str, Any]) -> dict[str, Any] | None:
         "supercategory": "object",
         "category_id": _ROLES.get(role, _OTHER),
         "attributes": {"role": role, "jersey": number if number.isdigit() else None, "team": team},
-        "bbox_image": _place(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1)),
+        "bbox_image": _bbox_image(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1)),
         "bbox_pitch": None,
     }

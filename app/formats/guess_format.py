@@ -45,10 +45,10 @@ _DOCUMENTS = re.compile(
 
 def guess_format(path: Path | StoredPath) -> str | None:
     """Name of the format for ``touchline import``, or None where nothing looks familiar."""
-    return guess_of_names(islice(_names(path), MAX_NAMES))
+    return guess_format_of_names(islice(_file_names(path), MAX_NAMES))
 
 
-def guess_of_names(found: Iterable[str]) -> str | None:
+def guess_format_of_names(found: Iterable[str]) -> str | None:
     """The same of names of files."""
     parts = (name.rpartition("/")[2] for name in found if not is_system_file(name))
     names = [part for part in parts if 0 < len(part) <= MAX_PART]
@@ -60,9 +60,9 @@ def guess_of_names(found: Iterable[str]) -> str | None:
     return "frames" if pictures and rest <= pictures | videos else None
 
 
-def holds_videos_alone(path: Path | StoredPath) -> bool:
+def holds_only_videos(path: Path | StoredPath) -> bool:
     """Whether a folder, a zip or a file is a video, or holds nothing but videos and documents."""
-    names = [name for name in islice(_names(path), MAX_NAMES) if not is_system_file(name)]
+    names = [name for name in islice(_file_names(path), MAX_NAMES) if not is_system_file(name)]
     parts = (name.rpartition("/")[2] for name in names if not name.endswith("/"))
     suffixes = _suffixes(part for part in parts if not _DOCUMENTS.fullmatch(part))
     return bool(suffixes) and suffixes <= set(VIDEO_SUFFIXES)
@@ -72,11 +72,11 @@ def _suffixes(names: Iterable[str]) -> set[str]:
     return {PurePosixPath(name).suffix.lower() for name in names}
 
 
-def _names(path: Path | StoredPath) -> Iterable[str]:
+def _file_names(path: Path | StoredPath) -> Iterable[str]:
     if isinstance(path, StoredPath):
-        return _stored_names(path)
+        return _object_names(path)
     if path.is_dir():
-        return _below(path, "", MAX_DEPTH)
+        return _names_below(path, "", MAX_DEPTH)
     if path.suffix.lower() != ".zip" or not path.is_file():
         return [path.name]
     try:
@@ -85,14 +85,14 @@ def _names(path: Path | StoredPath) -> Iterable[str]:
         return []
 
 
-def _stored_names(path: StoredPath) -> Iterable[str]:
+def _object_names(path: StoredPath) -> Iterable[str]:
     if not path.is_dir():
         return [path.name]
     start = len(path.key) + 1 if path.key else 0
     return (item.key[start:] for item in path.store.below(path.key))
 
 
-def _below(root: Path, inside: str, depth: int) -> Iterator[str]:
+def _names_below(root: Path, inside: str, depth: int) -> Iterator[str]:
     """Names below a folder, files before folders; links are not followed."""
     folders = []
     try:
@@ -105,7 +105,7 @@ def _below(root: Path, inside: str, depth: int) -> Iterator[str]:
     except OSError:
         return
     for folder in sorted(folders)[:20] if depth > 1 else ():
-        yield from _below(root, folder, depth - 1)
+        yield from _names_below(root, folder, depth - 1)
 
 
 MAX_FILES = 40
@@ -118,7 +118,7 @@ PREDICTED = f"it holds predictions, not annotations; give it to {EVALUATE}"
 
 
 @dataclass(frozen=True)
-class Look:
+class FormatGuess:
     """What files look like.
 
     Attributes:
@@ -138,14 +138,14 @@ class Look:
             return f"It looks like {self.name}: {self.advice}."
         return f"It looks like {self.format}: choose that format and import it again."
 
-    def is_said(self, problem: str) -> bool:
+    def is_stated_by(self, problem: str) -> bool:
         """Whether a problem says already what to do about such files, as ``json_kind`` does."""
         if self.format is not None:
             return f"import it as {self.format}" in problem
         return any(advice in self.advice and advice in problem for advice in (EVALUATE, EXPORT))
 
 
-def _keys(*names: str) -> tuple[re.Pattern[bytes], ...]:
+def _key_patterns(*names: str) -> tuple[re.Pattern[bytes], ...]:
     """That all of some keys stand in a JSON text."""
     return tuple(re.compile(rb'"%s"\s*:' % name.encode()) for name in names)
 
@@ -157,50 +157,59 @@ _NUMBER = rb"-?\d{1,9}(?:\.\d{1,20})?(?:e-?\d{1,3})?"
 _YOLO = re.compile(rb"\A\s*\d{1,4}(?:[ \t]+%s){4,60}[ \t]*(?:\r?\n|\Z)" % _NUMBER)
 _MOT = re.compile(rb"\A\s*\d{1,9}, ?-?\d{1,9}(?:, ?%s){4,8}\s*(?:\r?\n|\Z)" % _NUMBER)
 
-_Kinds = tuple[tuple[tuple[re.Pattern[bytes], ...], Look], ...]
+_Kinds = tuple[tuple[tuple[re.Pattern[bytes], ...], FormatGuess], ...]
 """What is found where all of some patterns are; the first one that fits."""
 _JSON: _Kinds = (
-    (_keys("imageMetadata", "calibration"), Look("soccernet-v3d", "soccernet-v3d")),
-    (_keys("imageMetadata"), Look("soccernet-v3", "soccernet-v3")),
-    (_keys("bbox_image"), Look("gamestate", "gamestate")),
-    (_keys("shapes", "imagePath"), Look("LabelMe, a JSON file for each picture")),
-    (_keys("file_attributes", "regions"), Look("a project of the VGG Image Annotator (VIA)")),
-    (_keys("from_name", "to_name"), Look("Label Studio's own JSON")),
-    (_keys("classTitle"), Look("Supervisely")),
-    (_keys("dm_format_version"), Look("Datumaro")),
-    (_keys("image", "annotations", "coordinates"), Look("Create ML")),
-    (_keys("images", "annotations"), Look("coco", "coco")),
-    (_keys("images", "categories"), Look("coco", "coco")),
-    (_keys("images", "file_name"), Look("coco", "coco")),
-    (_keys("image_id", "score"), Look("COCO results of a detector", None, PREDICTED)),
-    (_keys("gameTime", "label"), Look("SoccerNet's action spotting", None, NO_PLACES)),
-    (_keys("pan_degrees"), Look("cameras", "cameras")),
-    ((re.compile(_MARKING),), Look("sn-calibration", "sn-calibration")),
+    (_key_patterns("imageMetadata", "calibration"), FormatGuess("soccernet-v3d", "soccernet-v3d")),
+    (_key_patterns("imageMetadata"), FormatGuess("soccernet-v3", "soccernet-v3")),
+    (_key_patterns("bbox_image"), FormatGuess("gamestate", "gamestate")),
+    (_key_patterns("shapes", "imagePath"), FormatGuess("LabelMe, a JSON file for each picture")),
+    (
+        _key_patterns("file_attributes", "regions"),
+        FormatGuess("a project of the VGG Image Annotator (VIA)"),
+    ),
+    (_key_patterns("from_name", "to_name"), FormatGuess("Label Studio's own JSON")),
+    (_key_patterns("classTitle"), FormatGuess("Supervisely")),
+    (_key_patterns("dm_format_version"), FormatGuess("Datumaro")),
+    (_key_patterns("image", "annotations", "coordinates"), FormatGuess("Create ML")),
+    (_key_patterns("images", "annotations"), FormatGuess("coco", "coco")),
+    (_key_patterns("images", "categories"), FormatGuess("coco", "coco")),
+    (_key_patterns("images", "file_name"), FormatGuess("coco", "coco")),
+    (
+        _key_patterns("image_id", "score"),
+        FormatGuess("COCO results of a detector", None, PREDICTED),
+    ),
+    (
+        _key_patterns("gameTime", "label"),
+        FormatGuess("SoccerNet's action spotting", None, NO_PLACES),
+    ),
+    (_key_patterns("pan_degrees"), FormatGuess("cameras", "cameras")),
+    ((re.compile(_MARKING),), FormatGuess("sn-calibration", "sn-calibration")),
 )
 _XML: _Kinds = (
-    ((re.compile(rb"<(?:\w{1,40}:)?viper\b"),), Look("issia", "issia")),
+    ((re.compile(rb"<(?:\w{1,40}:)?viper\b"),), FormatGuess("issia", "issia")),
     (
         (re.compile(rb"<annotations\b"), re.compile(rb"<(?:meta|track|image)\b")),
-        Look("CVAT's own XML"),
+        FormatGuess("CVAT's own XML"),
     ),
     (
         (re.compile(rb"<annotation\b"), re.compile(rb"<(?:object|filename)\b")),
-        Look("Pascal VOC, an XML file for each picture"),
+        FormatGuess("Pascal VOC, an XML file for each picture"),
     ),
 )
 _TEXT: _Kinds = (
-    ((_YOLO,), Look("YOLO labels", None, YOLO)),
-    ((_MOT,), Look("tracks of the MOT challenge")),
+    ((_YOLO,), FormatGuess("YOLO labels", None, YOLO)),
+    ((_MOT,), FormatGuess("tracks of the MOT challenge")),
 )
 _CSV: _Kinds = (
     (
         (re.compile(rb"\A[^\n]*main_action"), re.compile(rb"\A[^\n]*ball_bbox")),
-        Look("soccernet-v3d", "soccernet-v3d"),
+        FormatGuess("soccernet-v3d", "soccernet-v3d"),
     ),
-    ((re.compile(rb"\A[^\n]*x_cam\d"),), Look("issia-3d", "issia-3d")),
+    ((re.compile(rb"\A[^\n]*x_cam\d"),), FormatGuess("issia-3d", "issia-3d")),
     (
         (re.compile(rb"\A[^\n]*(?:xmin|x_min|bbox)", re.IGNORECASE),),
-        Look("a table of boxes (CSV)"),
+        FormatGuess("a table of boxes (CSV)"),
     ),
 )
 _HEADS = {
@@ -208,7 +217,7 @@ _HEADS = {
 }  # fmt: skip
 
 
-def looks_like(path: Root, format_: str) -> Look | None:
+def guess_from_content(path: Root, format_: str) -> FormatGuess | None:
     """What the files at a path look like, other than the format for which they were given.
 
     Args:
@@ -217,35 +226,37 @@ def looks_like(path: Root, format_: str) -> Look | None:
     """
     try:
         with opened_tree(path, Report()) as tree:
-            found = None if tree is None else _of_tree(tree)
+            found = None if tree is None else _guess_of_tree(tree)
     except (*BROKEN, ReviewError, ValueError):
         found = None
     if found is not None:
         return None if found.format == format_ else found
     guess = guess_format(path)
-    return None if guess is None or guess == format_ else Look(guess, guess)
+    return None if guess is None or guess == format_ else FormatGuess(guess, guess)
 
 
-def _of_tree(tree: FileTree) -> Look | None:
+def _guess_of_tree(tree: FileTree) -> FormatGuess | None:
     """What most of the first files are."""
     names = tree.names()
     suffixes = Counter(PurePosixPath(name).suffix.lower() for name in names)
     if suffixes[".parquet"]:
-        return Look("parquet", "parquet")
+        return FormatGuess("parquet", "parquet")
     heads = [name for name in names if PurePosixPath(name).suffix.lower() in _HEADS]
     seen = Counter(
-        look for name in islice(heads, MAX_FILES) if (look := _of_head(tree, name)) is not None
+        look
+        for name in islice(heads, MAX_FILES)
+        if (look := _guess_of_file_start(tree, name)) is not None
     )
     if seen:
         return seen.most_common(1)[0][0]
     if not heads and any(suffixes[suffix] for suffix in VIDEO_SUFFIXES):
-        return Look("a video", None, "it has no annotations")
+        return FormatGuess("a video", None, "it has no annotations")
     if not heads and any(suffixes[suffix] for suffix in IMAGE_SUFFIXES):
-        return Look("pictures alone", None, "there are no annotations beside them")
+        return FormatGuess("pictures alone", None, "there are no annotations beside them")
     return None
 
 
-def _of_head(tree: FileTree, name: str) -> Look | None:
+def _guess_of_file_start(tree: FileTree, name: str) -> FormatGuess | None:
     try:
         with tree.open(name) as file:
             head = file.read(HEAD_BYTES)

@@ -33,7 +33,7 @@ class FramePersons:
     boxes: tuple[Mapping[str, Any], ...]
 
 
-def view_camera(group: Group, view: View) -> int:
+def camera_number_of_view(group: Group, view: View) -> int:
     """Number of the camera of a view of ISSIA.
 
     Raises:
@@ -41,36 +41,36 @@ def view_camera(group: Group, view: View) -> int:
     """
     found = _VIEW.fullmatch(view.key)
     if found is None:
-        raise _not_issia(group, view.key)
-    frame_number(group)
+        raise _not_issia_error(group, view.key)
+    frame_number_of_group(group)
     return int(found[1])
 
 
-def frame_number(group: Group) -> int:
+def frame_number_of_group(group: Group) -> int:
     """Number of the frame of a group of ISSIA.
 
     Raises:
         InputError: The group is from another kind of dataset.
     """
     if not _FRAME.fullmatch(group.key):
-        raise _not_issia(group, ", ".join(view.key for view in group.views))
+        raise _not_issia_error(group, ", ".join(view.key for view in group.views))
     return int(group.key)
 
 
-class FrameGroups:
+class IssiaNumberOwners:
     """Keeps whose the numbers of frames and cameras are, of which ISSIA's files have one each."""
 
     def __init__(self) -> None:
         self._groups: dict[int, str] = {}
         self._cameras: dict[int, tuple[str, object]] = {}
 
-    def frame(self, group: Group) -> int:
+    def claim_frame_number(self, group: Group) -> int:
         """Number of the frame of a group.
 
         Raises:
             InputError: It is not from ISSIA, or another group has its number.
         """
-        number = frame_number(group)
+        number = frame_number_of_group(group)
         first = self._groups.setdefault(number, group.key)
         if first != group.key:
             raise InputError(
@@ -79,7 +79,7 @@ class FrameGroups:
             )
         return number
 
-    def camera(self, group: Group, view: View, given: object) -> int:
+    def claim_camera_number(self, group: Group, view: View, given: object) -> int:
         """Number of the camera of a view.
 
         Args:
@@ -90,7 +90,7 @@ class FrameGroups:
         Raises:
             InputError: It is not from ISSIA, or a view has its number that says otherwise.
         """
-        number, whose = view_camera(group, view), f"{group.key}, {view.key}"
+        number, whose = camera_number_of_view(group, view), f"{group.key}, {view.key}"
         station = view.station.key if view.station.shared else given
         first, known = self._cameras.setdefault(number, (whose, station))
         if known != station:
@@ -102,7 +102,7 @@ class FrameGroups:
         return number
 
 
-def _not_issia(group: Group, view: str) -> InputError:
+def _not_issia_error(group: Group, view: str) -> InputError:
     return InputError(
         f"group {group.key}, view {view} is not from ISSIA (frame, cam1 to cam6)",
         hint="Export it as soccernet-v3d or cameras instead.",

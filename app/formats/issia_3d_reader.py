@@ -11,7 +11,12 @@ from app.formats import fields
 from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.issia import TABLE_3D
-from app.formats.issia_reader import IssiaFolder, IssiaOptions, complete, count
+from app.formats.issia_reader import (
+    IssiaFolder,
+    IssiaOptions,
+    add_stations_and_media,
+    count_annotations,
+)
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.formats.viper_reader import ViperTrack
@@ -44,8 +49,8 @@ def open_issia_3d(
             )
         for name in tables[:1]:
             _read_table(tree, name, found, report, limits)
-        complete(found, tree, names, options, report, limits)
-    count(found, report)
+        add_stations_and_media(found, tree, names, options, report, limits)
+    count_annotations(found, report)
     return found
 
 
@@ -57,7 +62,7 @@ def _read_table(
         for line, cells in read_rows(tree.read_bytes(name), shown, ("frame",), limits):
             record = f"line {line}"
             try:
-                frame = _frame(cells)
+                frame = _parse_frame_number(cells)
             except ValueError as error:
                 report.note(shown, record, "frame", str(error))
                 continue
@@ -65,14 +70,16 @@ def _read_table(
                 report.note(shown, record, "frame", f"is a second row of frame {frame}")
                 continue
             if not seen:
-                _report_halves(cells, shown, report)
+                _report_unpaired_columns(cells, shown, report)
             seen.add(frame)
-            _read_row(cells, frame, found, DatasetFormatError(shown, record, None, ""), report)
+            _read_ball_centers(
+                cells, frame, found, DatasetFormatError(shown, record, None, ""), report
+            )
     except DatasetFormatError as error:
         report.skip(error)
 
 
-def _report_halves(columns: Mapping[str, str], shown: str, report: Report) -> None:
+def _report_unpaired_columns(columns: Mapping[str, str], shown: str, report: Report) -> None:
     """Name each column of x without one of y, or the other way round: nothing is read of it."""
     there = {(found[1], found[2]) for name in columns if (found := _AXIS.fullmatch(name))}
     for axis, camera in sorted(there):
@@ -82,14 +89,14 @@ def _report_halves(columns: Mapping[str, str], shown: str, report: Report) -> No
             report.note(shown, None, f"{axis}_cam{camera}", problem)
 
 
-def _frame(cells: Mapping[str, str]) -> int:
-    frame = fields.whole(cells.get("frame", ""))
+def _parse_frame_number(cells: Mapping[str, str]) -> int:
+    frame = fields.whole_number(cells.get("frame", ""))
     if abs(frame) >= 10**9:
         raise ValueError("is too large")
     return frame
 
 
-def _read_row(
+def _read_ball_centers(
     cells: Mapping[str, str],
     frame: int,
     found: IssiaFolder,
@@ -102,7 +109,7 @@ def _read_row(
         if axis is None:
             continue
         try:
-            point = _point(cells, axis[1])
+            point = _parse_ball_center(cells, axis[1])
         except ValueError as error:
             report.note(place.path, place.record, f"cam{axis[1]}", f"{error}; left out")
             continue
@@ -111,8 +118,8 @@ def _read_row(
             track.balls.setdefault(frame, []).append(point)
 
 
-def _point(cells: Mapping[str, str], camera: str) -> ImagePoint | None:
+def _parse_ball_center(cells: Mapping[str, str], camera: str) -> ImagePoint | None:
     x, y = cells.get(f"x_cam{camera}"), cells.get(f"y_cam{camera}")
     if x is None or y is None or (is_missing(x) and is_missing(y)):
         return None
-    return ImagePoint(fields.pixel(x), fields.pixel(y))
+    return ImagePoint(fields.pixel_coordinate(x), fields.pixel_coordinate(y))

@@ -8,10 +8,16 @@ from pathlib import Path
 
 from app.finite import json_text
 from app.formats.camera_json import camera_to_json
-from app.formats.csv_text import CsvTable, Value, cell, plain_list
+from app.formats.csv_text import CsvTable, Value, csv_cell, list_text
 from app.formats.export_record import ExportRecord
-from app.formats.issia import CALIBRATION, TABLE_3D, FrameGroups, frame_number, view_camera
-from app.formats.spill import Spill, open_spill
+from app.formats.issia import (
+    CALIBRATION,
+    TABLE_3D,
+    IssiaNumberOwners,
+    camera_number_of_view,
+    frame_number_of_group,
+)
+from app.formats.spill import SortedSpill, open_spill
 from app.geometry.camera import Camera
 from app.soccer.group import View
 from app.soccer.solution import BallFit
@@ -46,15 +52,15 @@ def write_issia_3d(
         InputError: A group is not from ISSIA, or two have one frame or differ in a camera.
     """
     counts = {"groups": 0, "points": 0, "balls": 0}
-    cameras, known = dict[int, Camera](), FrameGroups()
+    cameras, known = dict[int, Camera](), IssiaNumberOwners()
     with open_spill() as spill:
         for record in records:
-            annotating = _annotating(record)
-            frame = known.frame(record.group)
+            annotating = _views_with_ball(record)
+            frame = known.claim_frame_number(record.group)
             _collect_cameras(record, cameras, known)
             if annotating:
                 verdict = (record.verdict_text,) if everything else ()
-                cells = [cell(value) for value in (*_row(record, annotating), *verdict)]
+                cells = [csv_cell(value) for value in (*_table_row(record, annotating), *verdict)]
                 spill.add((frame, 0, "", 0), json_text(cells))
                 counts["groups"] += 1
                 counts["points"] += record.point is not None
@@ -64,16 +70,16 @@ def write_issia_3d(
     return counts
 
 
-def _write_table(path: Path, spill: Spill, everything: bool) -> None:
+def _write_table(path: Path, spill: SortedSpill, everything: bool) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         table = CsvTable(file, (*COLUMNS, *(("verdict",) if everything else ())))
         for _, cells in spill.items():
             table.add_cells(json.loads(cells))
 
 
-def _annotating(record: ExportRecord) -> dict[int, View]:
+def _views_with_ball(record: ExportRecord) -> dict[int, View]:
     """Views that annotate the ball, by camera number."""
-    numbered = {view_camera(record.group, view): view for view in record.group.views}
+    numbered = {camera_number_of_view(record.group, view): view for view in record.group.views}
     return {
         camera: view
         for camera, view in sorted(numbered.items())
@@ -81,38 +87,40 @@ def _annotating(record: ExportRecord) -> dict[int, View]:
     }
 
 
-def _collect_cameras(record: ExportRecord, cameras: dict[int, Camera], known: FrameGroups) -> None:
+def _collect_cameras(
+    record: ExportRecord, cameras: dict[int, Camera], known: IssiaNumberOwners
+) -> None:
     for view in record.group.views:
         camera = record.camera(view)
         if camera is not None:
-            cameras.setdefault(known.camera(record.group, view, camera), camera)
+            cameras.setdefault(known.claim_camera_number(record.group, view, camera), camera)
 
 
-def _row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:
+def _table_row(record: ExportRecord, annotating: dict[int, View]) -> Iterator[Value]:
     # The published layout: a number for every camera that annotates, in a valid pair or not.
     solved = {camera: record.view_solution(view) for camera, view in annotating.items()}
     fits = {
         camera: item.ball if item is not None and record.point is not None else None
         for camera, item in solved.items()
     }
-    yield frame_number(record.group)
+    yield frame_number_of_group(record.group)
     for camera in CAMERAS:
-        yield from _center(annotating.get(camera))
+        yield from _ball_center(annotating.get(camera))
     yield len(annotating)
-    yield plain_list(record.point) if record.point else None
-    yield from (_of(fits.get(camera), "error_px") for camera in CAMERAS)
-    yield plain_list(list(annotating))
-    yield from (_of(fits.get(camera), "optimized_diameter_px") for camera in CAMERAS)
-    yield from (_of(fits.get(camera), "optimized_error_m") for camera in CAMERAS)
+    yield list_text(record.point) if record.point else None
+    yield from (_fit_value(fits.get(camera), "error_px") for camera in CAMERAS)
+    yield list_text(list(annotating))
+    yield from (_fit_value(fits.get(camera), "optimized_diameter_px") for camera in CAMERAS)
+    yield from (_fit_value(fits.get(camera), "optimized_error_m") for camera in CAMERAS)
 
 
-def _center(view: View | None) -> tuple[float | None, float | None]:
+def _ball_center(view: View | None) -> tuple[float | None, float | None]:
     if view is None or view.ball is None or view.ball.center is None:
         return None, None
     return view.ball.center.x, view.ball.center.y
 
 
-def _of(fit: BallFit | None, name: str) -> float | None:
+def _fit_value(fit: BallFit | None, name: str) -> float | None:
     value: float | None = getattr(fit, name) if fit is not None else None
     return value
 

@@ -47,7 +47,7 @@ def mirrored_people(
         name = PurePosixPath(track.source.replace("\\", "/")).stem
         if not track.persons:
             continue
-        apart = _median_distance(number, tracks, given, widths[number])
+        apart = _median_person_distances(number, tracks, given, widths[number])
         if len(apart) >= LEAST_PAIRS:
             written, turned = np.median(apart, axis=0)
             is_mirrored = bool(turned < written)
@@ -58,7 +58,7 @@ def mirrored_people(
     return found
 
 
-def turned(track: ViperTrack, width: int) -> ViperTrack:
+def turn_people(track: ViperTrack, width: int) -> ViperTrack:
     """The track with its people turned left to right.
 
     A box covers the columns from x to x + width - 1, as ViPER counts them: of a picture of W columns
@@ -73,19 +73,19 @@ def turned(track: ViperTrack, width: int) -> ViperTrack:
     )
 
 
-def _median_distance(
+def _median_person_distances(
     number: int, tracks: Mapping[int, ViperTrack], given: Mapping[int, Camera], width: int
 ) -> FloatArray:
     """How far the same person lies from where another camera puts it, as written and turned, metres,
     shape (N, 2)."""
     own, rows = tracks[number], []
-    back = turned(own, width)
+    back = turn_people(own, width)
     others = [other for other in given if other in tracks and other not in MIRRORED]
     for other in others if number in given else ():
         common = sorted(own.persons.keys() & tracks[other].persons.keys())
         for frame in common[:: len(common) // MOST_FRAMES + 1]:
-            there = on_grass(given[other], tracks[other], frame)
-            here, turn = (on_grass(given[number], one, frame) for one in (own, back))
+            there = people_on_grass(given[other], tracks[other], frame)
+            here, turn = (people_on_grass(given[number], one, frame) for one in (own, back))
             rows += [
                 [float(np.hypot(*(place[name] - there[name]))) for place in (here, turn)]
                 for name in here.keys() & turn.keys() & there.keys()
@@ -93,7 +93,7 @@ def _median_distance(
     return np.array(rows).reshape(-1, 2)
 
 
-def on_grass(camera: Camera, track: ViperTrack, frame: int) -> dict[str, FloatArray]:
+def people_on_grass(camera: Camera, track: ViperTrack, frame: int) -> dict[str, FloatArray]:
     """Where the people of a frame stand, metres from the centre mark, shape (2,) each, by id.
 
     That is where the camera sees the middle of the lower edge of their box on the grass; whose it

@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
 
-from app.formats.cameras_reader import cameras_of
+from app.formats.cameras_reader import read_camera_files
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.folder_tree import FolderTree
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
-from app.formats.issia_people import mirrored_people, turned
+from app.formats.issia_people import mirrored_people, turn_people
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
-from app.formats.sn_calibration_reader import line_files_of, read_line_files
+from app.formats.sn_calibration_reader import read_line_files, read_line_files_of_tree
 from app.formats.trees import opened_tree
 from app.formats.viper_reader import ViperTrack, is_viper, read_viper
 from app.geometry.camera import Camera
@@ -92,8 +92,8 @@ class IssiaFolder:
                 seen.setdefault(frame, []).append(camera)
         for frame in sorted(seen):
             cameras = seen[frame]
-            views = tuple(self._view(camera, frame) for camera in cameras)
-            split = _split(cameras)
+            views = tuple(self._make_view(camera, frame) for camera in cameras)
+            split = _split_of_cameras(cameras)
             yield Group(str(frame), views, match=MATCH, split=split, label=f"Frame {frame}")
 
     def persons(self) -> Iterator[FramePersons]:
@@ -105,7 +105,7 @@ class IssiaFolder:
                     boxes = _person_boxes(track, frame)
                     yield FramePersons(frame, f"cam{camera}", boxes)
 
-    def _view(self, camera: int, frame: int) -> View:
+    def _make_view(self, camera: int, frame: int) -> View:
         track = self.tracks[camera]
         balls = tuple(
             BallAnnotation(box=ball) if isinstance(ball, Box) else BallAnnotation(point=ball)
@@ -132,7 +132,7 @@ def _person_boxes(track: ViperTrack, frame: int) -> tuple[Mapping[str, Any], ...
     )
 
 
-def _split(cameras: list[int]) -> str:
+def _split_of_cameras(cameras: list[int]) -> str:
     """The split of a frame; empty where cameras of both see it."""
     sides = {"test" if f"cam{camera}" in TEST_CAMERAS else "train" for camera in cameras}
     return sides.pop() if len(sides) == 1 else ""
@@ -153,12 +153,12 @@ def open_issia(
             return found
         names = tree.names()
         _read_tracks(tree, names, options, found, report, limits)
-        complete(found, tree, names, options, report, limits)
-    count(found, report)
+        add_stations_and_media(found, tree, names, options, report, limits)
+    count_annotations(found, report)
     return found
 
 
-def complete(
+def add_stations_and_media(
     found: IssiaFolder,
     tree: FileTree,
     names: list[str],
@@ -167,7 +167,7 @@ def complete(
     limits: Limits,
 ) -> None:
     """Give each camera that has a track its station and its media."""
-    given = _read_given(tree, names, report)
+    given = _read_given_cameras(tree, names, report)
     _find_media(tree, names, found)
     sizes = {camera: options.size_of(track) for camera, track in found.tracks.items()}
     lines: dict[int, LineFile] = {}
@@ -176,18 +176,18 @@ def complete(
         # Each file is read for the size of its own camera; what is wrong with it is told once.
         own_report = Report() if index else report
         if options.lines is None:
-            read = _own_lines(tree, names, size, own_report)
+            read = _read_exported_lines(tree, names, size, own_report)
         else:
             read = _read_lines(options.lines, size, own_report, limits)
         drawn |= read.keys()
         lines |= {camera: file for camera, file in read.items() if sizes.get(camera) == size}
     for camera, size in sizes.items():
-        station = _station(camera, given.get(camera), lines.get(camera), options, size)
+        station = _make_station(camera, given.get(camera), lines.get(camera), options, size)
         found.stations[camera] = station
     widths = {camera: size.width for camera, size in sizes.items()}
     mirrored = mirrored_people(found.tracks, given, widths)
     for camera in mirrored:
-        found.tracks[camera] = turned(found.tracks[camera], widths[camera])
+        found.tracks[camera] = turn_people(found.tracks[camera], widths[camera])
     if mirrored:
         report.remark(
             f"People of {' and '.join(f'cam{camera}' for camera in mirrored)} are turned left to "
@@ -239,19 +239,21 @@ def _read_tracks(
         report.note(str(tree.path), None, None, "holds no XGTF file")
     for name in files:
         shown, stem = tree.shown(name), re.sub(r"(?i)\.\w+(\.gz)?$", "", PurePosixPath(name).name)
-        for camera, track in _cameras(stem, read_viper(tree, name, report, limits), shown, report):
+        for camera, track in _tracks_by_camera(
+            stem, read_viper(tree, name, report, limits), shown, report
+        ):
             if camera is None:
                 report.note(shown, None, None, "has no camera number in its name")
             elif camera in found.tracks:
                 report.note(shown, None, None, f"is a second file of camera {camera}")
             else:
-                found.tracks[camera] = _shifted(track, options.offset(camera))
+                found.tracks[camera] = _shift_frames(track, options.offset(camera))
                 _compare_sizes(camera, track, shown, options, report)
                 if not track.balls:
                     report.remark(f"{shown} brings no ball for camera {camera}.")
 
 
-def _cameras(
+def _tracks_by_camera(
     stem: str, tracks: list[ViperTrack], shown: str, report: Report
 ) -> Iterator[tuple[int | None, ViperTrack]]:
     """Each source of a file with the number of its camera.
@@ -259,7 +261,7 @@ def _cameras(
     One source is that of the file. Of several each must name its own camera; where they do not,
     the first is that of the file, and the others are reported.
     """
-    named = [camera_number(_stem(track.source), strict=True) for track in tracks]
+    named = [camera_number(_path_stem(track.source), strict=True) for track in tracks]
     if len(tracks) > 1 and None not in named and len(set(named)) == len(named):
         yield from zip(named, tracks, strict=True)
         return
@@ -275,7 +277,7 @@ def _cameras(
         )
 
 
-def _stem(name: str) -> str:
+def _path_stem(name: str) -> str:
     return PurePosixPath(name.replace("\\", "/")).stem
 
 
@@ -291,7 +293,7 @@ def _compare_sizes(
         )
 
 
-def _shifted(track: ViperTrack, offset: int) -> ViperTrack:
+def _shift_frames(track: ViperTrack, offset: int) -> ViperTrack:
     return ViperTrack(
         {frame - offset: points for frame, points in track.balls.items()},
         {frame - offset: boxes for frame, boxes in track.persons.items()},
@@ -301,14 +303,14 @@ def _shifted(track: ViperTrack, offset: int) -> ViperTrack:
     )
 
 
-def _read_given(tree: FileTree, names: list[str], report: Report) -> dict[int, Camera]:
+def _read_given_cameras(tree: FileTree, names: list[str], report: Report) -> dict[int, Camera]:
     files = [name for name in names if PurePosixPath(name).name == CALIBRATION]
     if not files:
         return {}
     for name in files[1:]:
         report.note(tree.shown(name), None, None, f"is a second {CALIBRATION}; {files[0]} is used")
     side = Report()
-    cameras = cameras_of(tree, files[:1], side)
+    cameras = read_camera_files(tree, files[:1], side)
     for problem in side.problems:
         report.skip(problem)
     shown, given = tree.shown(files[0]), dict[int, Camera]()
@@ -323,18 +325,20 @@ def _read_given(tree: FileTree, names: list[str], report: Report) -> dict[int, C
 
 def _read_lines(path: Root, size: ImageSize, report: Report, limits: Limits) -> dict[int, LineFile]:
     side = Report()
-    return _by_camera(read_line_files(path, size, side, limits), side, report)
+    return _line_files_by_camera(read_line_files(path, size, side, limits), side, report)
 
 
-def _own_lines(
+def _read_exported_lines(
     tree: FileTree, names: list[str], size: ImageSize, report: Report
 ) -> dict[int, LineFile]:
     """Lines that an export of this format laid beside the ground truth."""
     own, side = [name for name in names if _OWN_LINES.fullmatch(name)], Report()
-    return _by_camera(line_files_of(tree, own, size, side), side, report)
+    return _line_files_by_camera(read_line_files_of_tree(tree, own, size, side), side, report)
 
 
-def _by_camera(files: Iterator[LineFile], side: Report, report: Report) -> dict[int, LineFile]:
+def _line_files_by_camera(
+    files: Iterator[LineFile], side: Report, report: Report
+) -> dict[int, LineFile]:
     lines: dict[int, LineFile] = {}
     for file in files:
         number = camera_number(PurePosixPath(file.stem).name)
@@ -349,7 +353,7 @@ def _by_camera(files: Iterator[LineFile], side: Report, report: Report) -> dict[
     return lines
 
 
-def _station(
+def _make_station(
     camera: int,
     given: Camera | None,
     lines: LineFile | None,
@@ -389,7 +393,7 @@ def _find_media(tree: FileTree, names: list[str], found: IssiaFolder) -> None:
                 found.frames.setdefault((camera, int(number[1])), tree.media(name))
 
 
-def count(found: IssiaFolder, report: Report) -> None:
+def count_annotations(found: IssiaFolder, report: Report) -> None:
     """Note what a folder held."""
     balls = {frame for track in found.tracks.values() for frame in track.balls}
     persons = {frame for track in found.tracks.values() for frame in track.persons}

@@ -12,10 +12,10 @@ from xml.sax.saxutils import quoteattr
 from app.finite import json_text
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
-from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, FrameGroups, FramePersons
+from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, IssiaNumberOwners
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration_writer import line_file_text
-from app.formats.spill import Key, Spill, open_spill
+from app.formats.spill import Key, SortedSpill, open_spill
 from app.soccer.annotation import CORNERS
 from app.soccer.group import Group, Station, View
 
@@ -65,14 +65,14 @@ def write_issia(
         InputError: A group is not from ISSIA, or two have one frame or differ in a camera.
     """
     counts = {"groups": 0, "annotated_balls": 0, "persons": 0, "cameras": 0}
-    stations, known = dict[int, Station](), FrameGroups()
+    stations, known = dict[int, Station](), IssiaNumberOwners()
     with open_spill() as spill:
         for group in groups:
             counts["groups"] += 1
-            frame = known.frame(group) + DEFAULT_OFFSET
+            frame = known.claim_frame_number(group) + DEFAULT_OFFSET
             for view in group.views:
                 station = view.station
-                camera = known.camera(group, view, (station.given, station.lines))
+                camera = known.claim_camera_number(group, view, (station.given, station.lines))
                 stations.setdefault(camera, view.station)
                 _add_balls(spill, camera, frame, view, counts)
                 _add_persons(spill, camera, frame, view.extras.boxes, counts)
@@ -80,26 +80,28 @@ def write_issia(
             camera = int(item.camera.removeprefix("cam"))
             _add_persons(spill, camera, item.frame + DEFAULT_OFFSET, item.boxes, counts)
         for camera, items in groupby(spill.items(), key=lambda item: item[0][0]):
-            _write_file(root / f"ground_truth_{camera}.xgtf", camera, items)
+            _write_ground_truth(root / f"ground_truth_{camera}.xgtf", camera, items)
             counts["cameras"] += 1
-    _write_stations(root, stations)
+    _write_cameras_and_lines(root, stations)
     return counts
 
 
-def _add_balls(spill: Spill, camera: int, frame: int, view: View, counts: dict[str, int]) -> None:
+def _add_balls(
+    spill: SortedSpill, camera: int, frame: int, view: View, counts: dict[str, int]
+) -> None:
     for ball in view.balls:
         if ball.center is not None:
-            x, y = map(_number, ball.center)
-            spill.add((camera, _BALL, "", frame), f"<data:point {_span(frame)} x={x} y={y}/>")
+            x, y = map(_quoted_whole_number, ball.center)
+            spill.add((camera, _BALL, "", frame), f"<data:point {_framespan(frame)} x={x} y={y}/>")
             counts["annotated_balls"] += 1
     notes = view.extras.metadata.get("ball")
     for name, value in (notes if isinstance(notes, dict) else {}).items():
-        body = f"<data:svalue {_span(frame)} value={_quoted(value)}/>"
+        body = f"<data:svalue {_framespan(frame)} value={_quoted_attribute(value)}/>"
         spill.add((camera, _NOTE, str(name), frame), body)
 
 
 def _add_persons(
-    spill: Spill,
+    spill: SortedSpill,
     camera: int,
     frame: int,
     boxes: Iterable[Mapping[str, Any]],
@@ -114,7 +116,7 @@ def _add_persons(
         except ValueError:
             # Kept as it came from a file that said something else.
             continue
-        numbers = map(_number, (x, y, right - x, bottom - y))
+        numbers = map(_quoted_whole_number, (x, y, right - x, bottom - y))
         place = " ".join(
             f"{name}={number}"
             for name, number in zip(("x", "y", "width", "height"), numbers, strict=True)
@@ -122,25 +124,27 @@ def _add_persons(
         identity = str(box.get("ID"))
         # Numbers in their own order, so that people come back as they came.
         key = (camera, _PERSON, identity.zfill(_DIGITS), frame)
-        spill.add(key, f"{_quoted(identity)}{_BREAK}<data:bbox {_span(frame)} {place}/>")
+        spill.add(
+            key, f"{_quoted_attribute(identity)}{_BREAK}<data:bbox {_framespan(frame)} {place}/>"
+        )
         counts["persons"] += 1
 
 
-def _number(value: float) -> str:
+def _quoted_whole_number(value: float) -> str:
     """A quoted number; the ground truth has whole pixels."""
     number = float(value)
     return f'"{int(number) if number.is_integer() else repr(number)}"'
 
 
-def _span(frame: int) -> str:
+def _framespan(frame: int) -> str:
     return f'framespan="{frame}:{frame}"'
 
 
-def _quoted(value: Any) -> str:
+def _quoted_attribute(value: Any) -> str:
     return quoteattr(_NO_XML.sub("", str(value)).replace(_BREAK, " "))
 
 
-def _write_file(path: Path, camera: int, items: Iterable[tuple[Key, str]]) -> None:
+def _write_ground_truth(path: Path, camera: int, items: Iterable[tuple[Key, str]]) -> None:
     """One camera: an object for the ball, and one for each person."""
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_HEAD % quoteattr(f"cam{camera}.mp4"))
@@ -167,13 +171,13 @@ def _write_persons(file: IO[str], items: Iterator[tuple[Key, str]]) -> None:
 
 
 def _write_attribute(file: IO[str], name: str, items: Iterator[tuple[Key, str]]) -> None:
-    file.write(f"        <attribute name={_quoted(name)}>\n")
+    file.write(f"        <attribute name={_quoted_attribute(name)}>\n")
     for _, body in items:
         file.write(f"          {body.rpartition(_BREAK)[2]}\n")
     file.write("        </attribute>\n")
 
 
-def _write_stations(root: Path, stations: Mapping[int, Station]) -> None:
+def _write_cameras_and_lines(root: Path, stations: Mapping[int, Station]) -> None:
     given = {
         f"cam{number}": camera_to_json(station.given)
         for number, station in sorted(stations.items())

@@ -24,7 +24,7 @@ _KEYS = 4
 """Keys that are named of an object that is nothing known."""
 
 
-def json_kind(value: Any) -> str:
+def describe_document(value: Any) -> str:
     """What a document is, as the end of a sentence that begins with its name.
 
     Example:
@@ -37,10 +37,10 @@ def json_kind(value: Any) -> str:
             "Write K, R and t, or SoccerNet's camera JSON"
         )
     if isinstance(value, list):
-        return _kind_of_list(value)
+        return _describe_list(value)
     if not isinstance(value, dict):
         return f"is {quoted(value, 40) if isinstance(value, str) else value}, not an object"
-    return _kind_of_object(value)
+    return _describe_object(value)
 
 
 def is_camera(value: Any) -> bool:
@@ -57,7 +57,7 @@ def is_gamestate(annotations: Any) -> bool:
     return "bbox_image" in names and "bbox" not in names
 
 
-def _kind_of_list(value: list[Any]) -> str:
+def _describe_list(value: list[Any]) -> str:
     first = next((item for item in value if isinstance(item, dict)), None)
     if first is None:
         return f"is a list of {len(value)} values"
@@ -65,10 +65,10 @@ def _kind_of_list(value: list[Any]) -> str:
         return f"holds COCO results, boxes that a detector predicted: evaluate them ({EVALUATE})"
     if is_camera(first):
         return "holds cameras: import it as cameras"
-    return f"is a list of objects with {_names(first)}"
+    return f"is a list of objects with {_list_keys(first)}"
 
 
-def _kind_of_object(value: dict[str, Any]) -> str:
+def _describe_object(value: dict[str, Any]) -> str:
     if is_gamestate(value.get("annotations")):
         return "is a file of sn-gamestate: import it as gamestate"
     if "images" in value and ("annotations" in value or "categories" in value):
@@ -86,10 +86,10 @@ def _kind_of_object(value: dict[str, Any]) -> str:
         return "holds cameras: import it as cameras"
     if any(map(marking_like, value)):
         return "holds field lines: import it as sn-calibration"
-    return f"is an object with {_names(value)}" if value else "is an empty object"
+    return f"is an object with {_list_keys(value)}" if value else "is an empty object"
 
 
-def _names(value: dict[str, Any]) -> str:
+def _list_keys(value: dict[str, Any]) -> str:
     names = ", ".join(quoted(name, 30) for name in list(value)[:_KEYS])
     return f"{names} and {len(value) - _KEYS} more" if len(value) > _KEYS else names
 
@@ -141,9 +141,9 @@ def read_json(
         DatasetFormatError: Not JSON, too long, nested too deeply, or (without ``report``) with a
             number in it that is not finite.
     """
-    value = _read(content, path, record, max_bytes, nan, report)
+    value = _parse_json(content, path, record, max_bytes, nan, report)
     if double_encoded and isinstance(value, str):
-        return _read_inner(value, path, record, nan, report)
+        return _parse_inner_text(value, path, record, nan, report)
     return value
 
 
@@ -169,7 +169,7 @@ def read_json_lines(content: bytes, path: str, report: Report) -> list[Any] | No
     return found
 
 
-def _read(
+def _parse_json(
     content: bytes,
     path: str,
     record: str | None,
@@ -179,16 +179,18 @@ def _read(
 ) -> Any:
     if len(content) > max_bytes:
         raise DatasetFormatError(path, record, None, f"is longer than {max_bytes:,} bytes")
-    if _depth(content, _STRING) > MAX_DEPTH:
+    if _nesting_depth(content, _STRING) > MAX_DEPTH:
         raise DatasetFormatError(path, record, None, f"is nested deeper than {MAX_DEPTH} levels")
     try:
         text = content.decode("utf-8-sig")
         if report is None and nan == "refuse":
-            value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+            value = json.loads(
+                text, parse_constant=_refuse_constant, parse_float=_parse_finite_number
+            )
         else:
             value = json.loads(text)
         if report is not None and _INFINITE.search(content):
-            value = _null_infinite(value, path, report)
+            value = _replace_non_finite(value, path, report)
         if _SURROGATE.search(content):
             json.dumps(value, ensure_ascii=False).encode()
         return value
@@ -201,11 +203,11 @@ def _read(
         raise DatasetFormatError(path, record, None, str(error)) from error
 
 
-def _read_inner(
+def _parse_inner_text(
     text: str, path: str, record: str | None, nan: NanRule, report: Report | None
 ) -> Any:
     try:
-        return _read(text.encode(), path, record, MAX_LITERAL_CHARACTERS, nan, report)
+        return _parse_json(text.encode(), path, record, MAX_LITERAL_CHARACTERS, nan, report)
     except (DatasetFormatError, UnicodeEncodeError):
         # A literal has no number that is not finite: what is missing there is refused by its field.
         return parse_literal(text, path, record, Report() if nan == "keep" else report)
@@ -226,20 +228,20 @@ def parse_literal(
         raise DatasetFormatError(path, record, None, "is too long for a Python literal")
     problem = "is neither JSON nor a Python literal of plain values"
     try:
-        if _depth(text.encode(), _LITERAL_STRING) > MAX_DEPTH:
+        if _nesting_depth(text.encode(), _LITERAL_STRING) > MAX_DEPTH:
             problem = f"is nested deeper than {MAX_DEPTH} levels"
             raise ValueError(problem)
         if report is not None and _NO_NUMBER.search(text):
-            value = _literal_without_infinite(text.strip(), path, record, report)
+            value = _parse_literal_with_nulls(text.strip(), path, record, report)
         else:
             value = ast.literal_eval(text.strip())
-        _require_plain(value)
+        _require_plain_values(value)
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
         raise DatasetFormatError(path, record, None, problem) from error
     return value
 
 
-class _Missing(ast.NodeTransformer):
+class _NonFiniteToNone(ast.NodeTransformer):
     """Puts None for the names of numbers that are not finite."""
 
     def __init__(self) -> None:
@@ -256,16 +258,16 @@ class _Missing(ast.NodeTransformer):
         return self.visit(node.operand) if named else self.generic_visit(node)
 
 
-def _literal_without_infinite(text: str, path: str, record: str | None, report: Report) -> Any:
-    missing = _Missing()
+def _parse_literal_with_nulls(text: str, path: str, record: str | None, report: Report) -> Any:
+    missing = _NonFiniteToNone()
     value = ast.literal_eval(missing.visit(ast.parse(text, mode="eval")))
     if missing.count:
         numbers = plural(missing.count, "number is", "numbers are")
-        _remark(report, path, record, None, f"{numbers} not finite (nan, inf)")
+        _report_non_finite(report, path, record, None, f"{numbers} not finite (nan, inf)")
     return value
 
 
-def _require_plain(value: Any) -> None:
+def _require_plain_values(value: Any) -> None:
     pending = [value]
     while pending:
         item = pending.pop()
@@ -278,7 +280,7 @@ def _require_plain(value: Any) -> None:
             raise ValueError("not a plain value")
 
 
-def _depth(content: bytes, strings: re.Pattern[bytes]) -> int:
+def _nesting_depth(content: bytes, strings: re.Pattern[bytes]) -> int:
     """Deepest nesting of brackets outside strings."""
     if content.count(b"[") + content.count(b"{") + content.count(b"(") <= MAX_DEPTH:
         return 0
@@ -290,43 +292,50 @@ def _depth(content: bytes, strings: re.Pattern[bytes]) -> int:
     return int(np.cumsum(steps).max(initial=0))
 
 
-def _null_infinite(value: Any, path: str, report: Report) -> Any:
+def _replace_non_finite(value: Any, path: str, report: Report) -> Any:
     """The value with null for each number that is not finite, the first of which are reported."""
     found: list[tuple[tuple[str | int, ...], float]] = []
-    value = _cleared(value, (), found)
+    value = _copy_without_non_finite(value, (), found)
     for place, number in found[:MAX_NAMED]:
         what = (
             "is NaN, which is not a number" if math.isnan(number) else "is too large for a number"
         )
-        _remark(report, path, *_spelt(place), what)
+        _report_non_finite(report, path, *_record_and_field(place), what)
     if len(found) > MAX_NAMED:
         fields = Counter(str(place[-1]) for place, _ in found[MAX_NAMED:] if place)
         shown = ", ".join(f"{name} ({count:,})" for name, count in fields.most_common(5))
         problem = f"{len(found) - MAX_NAMED:,} more numbers are not finite: {shown}"
-        _remark(report, path, None, None, problem)
+        _report_non_finite(report, path, None, None, problem)
     return value
 
 
-def _remark(report: Report, path: str, record: str | None, field: str | None, what: str) -> None:
+def _report_non_finite(
+    report: Report, path: str, record: str | None, field: str | None, what: str
+) -> None:
     """Say what a file holds. Where it is of no use without that number, its reader leaves it out."""
     problem = DatasetFormatError(path, record, field, f"{what}; read as missing")
     report.remark(problem.message)
 
 
-def _cleared(
+def _copy_without_non_finite(
     value: Any, place: tuple[str | int, ...], found: list[tuple[tuple[str | int, ...], float]]
 ) -> Any:
     if isinstance(value, dict):
-        return {key: _cleared(item, (*place, key), found) for key, item in value.items()}
+        return {
+            key: _copy_without_non_finite(item, (*place, key), found) for key, item in value.items()
+        }
     if isinstance(value, list):
-        return [_cleared(item, (*place, index), found) for index, item in enumerate(value)]
+        return [
+            _copy_without_non_finite(item, (*place, index), found)
+            for index, item in enumerate(value)
+        ]
     if not isinstance(value, float) or math.isfinite(value):
         return value
     found.append((place, value))
     return None
 
 
-def _spelt(place: tuple[str | int, ...]) -> tuple[str | None, str | None]:
+def _record_and_field(place: tuple[str | int, ...]) -> tuple[str | None, str | None]:
     """Record and field of a place: ``("annotations", 3, "area")`` is annotations[3] and area."""
     parts = [f"[{name}]" if isinstance(name, int) else f".{name}"[:80] for name in place]
     head = 2 if len(parts) > 2 else 0
@@ -334,11 +343,11 @@ def _spelt(place: tuple[str | int, ...]) -> tuple[str | None, str | None]:
     return record or None, field or None
 
 
-def _refuse(name: str) -> NoReturn:
+def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"holds {name}, which is not a number")
 
 
-def _finite(text: str) -> float:
+def _parse_finite_number(text: str) -> float:
     number = float(text)
     if not math.isfinite(number):
         raise ValueError(f"holds {text[:20]}, which is too large for a number")

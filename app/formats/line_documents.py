@@ -10,7 +10,7 @@ from typing import Any
 from app.errors import DatasetFormatError
 from app.formats.fields import stated_size
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.json_text import json_kind, read_json, read_json_lines
+from app.formats.json_text import describe_document, read_json, read_json_lines
 from app.formats.report import Report
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like
@@ -67,51 +67,57 @@ def line_documents(value: Any, path: str, report: Report) -> list[LineDocument]:
     Raises:
         DatasetFormatError: It is something else; the sentence says what.
     """
-    alone = _document(value)
+    alone = _read_document(value)
     if alone is not None:
         return [alone]
     if isinstance(value, dict):
         items = [(str(name), item) for name, item in value.items()]
     elif isinstance(value, list):
-        items = [(_name(item) or "", item) for item in value]
+        items = [(_line_name(item) or "", item) for item in value]
     else:
         items = []
     found, problems = [], []
     for number, (name, item) in enumerate(items):
-        document = _document(item)
+        document = _read_document(item)
         if document is None or not name:
-            why = f"{json_kind(item)}; {MEANT}" if name else "has no name of its image (file_name)"
+            why = (
+                f"{describe_document(item)}; {MEANT}"
+                if name
+                else "has no name of its image (file_name)"
+            )
             problems.append(DatasetFormatError(path, name or f"image {number}", None, why))
         else:
-            found.append(LineDocument(document.lines, _stem(name), document.size))
+            found.append(LineDocument(document.lines, _image_stem(name), document.size))
     if not any(document.lines for document in found):
-        raise DatasetFormatError(path, None, None, f"{json_kind(value)}; {MEANT}")
+        raise DatasetFormatError(path, None, None, f"{describe_document(value)}; {MEANT}")
     for problem in problems:
         report.read += 1
         report.skip(problem)
     return found
 
 
-def _document(value: Any) -> LineDocument | None:
+def _read_document(value: Any) -> LineDocument | None:
     """The lines of one image; None where the value is something else."""
     if not isinstance(value, dict):
         return None
-    if not value or any(map(_is_line, value)):
+    if not value or any(map(_is_line_name, value)):
         return LineDocument(value)
     for name in _WITHIN:
         inner = value.get(name)
-        lines = _listed(inner) if isinstance(inner, list) else inner
-        if isinstance(lines, dict) and any(map(_is_line, lines)):
-            named = _name(value)
-            return LineDocument(lines, None if named is None else _stem(named), stated_size(value))
+        lines = _lines_of_list(inner) if isinstance(inner, list) else inner
+        if isinstance(lines, dict) and any(map(_is_line_name, lines)):
+            named = _line_name(value)
+            return LineDocument(
+                lines, None if named is None else _image_stem(named), stated_size(value)
+            )
     return None
 
 
-def _is_line(name: str) -> bool:
+def _is_line_name(name: str) -> bool:
     return marking_like(name) is not None or name.replace("_", " ").strip() in WITHOUT_GEOMETRY
 
 
-def _listed(items: list[Any]) -> dict[str, Any] | None:
+def _lines_of_list(items: list[Any]) -> dict[str, Any] | None:
     """Lines of a list of objects with a class and points, by name; None where it is another list."""
     found: dict[str, Any] = {}
     for item in items:
@@ -126,13 +132,13 @@ def _listed(items: list[Any]) -> dict[str, Any] | None:
     return found
 
 
-def _name(value: Any) -> str | None:
+def _line_name(value: Any) -> str | None:
     if not isinstance(value, dict):
         return None
     found = (value.get(name) for name in _NAMES)
     return next((str(name) for name in found if isinstance(name, (str, int)) and str(name)), None)
 
 
-def _stem(name: str) -> str:
+def _image_stem(name: str) -> str:
     place = PurePosixPath(name.replace("\\", "/"))
     return place.stem if place.suffix.lower() in IMAGE_SUFFIXES else place.name

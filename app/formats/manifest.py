@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from app.finite import json_text
-from app.formats.view_files import GatheredFiles
+from app.formats.view_files import FilesToPack
 from app.progress import ReportProgress, told
 
 MANIFEST = "manifest.json"
@@ -81,7 +81,7 @@ def write_manifest(root: Path, manifest: Manifest, progress: ReportProgress | No
         "settings": dict(manifest.settings),
         "software": {"name": SOFTWARE, "version": software_version()},
         "licence": manifest.licence,
-        "files": list(_files(root, progress)),
+        "files": list(_list_files_with_digests(root, progress)),
         "media": [dict(item) for item in manifest.media],
         "verdicts": dict(manifest.verdicts),
         "overrides": [dict(item) for item in manifest.overrides],
@@ -92,8 +92,10 @@ def write_manifest(root: Path, manifest: Manifest, progress: ReportProgress | No
     return path
 
 
-def _files(root: Path, progress: ReportProgress | None) -> Iterator[dict[str, Any]]:
-    files = GatheredFiles(root)
+def _list_files_with_digests(
+    root: Path, progress: ReportProgress | None
+) -> Iterator[dict[str, Any]]:
+    files = FilesToPack(root)
     for name, file in told(files, len(files), progress, "Reading the files' checksums."):
         if name == MANIFEST:
             continue

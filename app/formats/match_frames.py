@@ -34,9 +34,9 @@ class MatchFrames:
         self._loose = {name for name in names if _is_image(name)}
         self._members: dict[str, str] = {}
         if ARCHIVE in names:
-            self._open(report)
+            self._open_archive(report)
 
-    def _open(self, report: Report) -> None:
+    def _open_archive(self, report: Report) -> None:
         try:
             archive = self._tree.nested(self._match + ARCHIVE, report)
         except DatasetFormatError as error:
@@ -44,23 +44,23 @@ class MatchFrames:
             report.note(error.path, error.record, error.field, problem)
             return
         images = filter(_is_image, archive.names())
-        self._members = {name: archive.own_name(name) for name in images}
+        self._members = {name: archive.stored_name(name) for name in images}
         archive.close()
 
-    def _member(self, name: str) -> Media:
+    def _media_of_member(self, name: str) -> Media:
         """Where a member of the archive is."""
         return self._tree.media_in_zip(self._match + ARCHIVE, self._members[name])
 
     @property
-    def some(self) -> bool:
+    def has_frames(self) -> bool:
         """Whether there are frames at all."""
         return bool(self._members or self._loose)
 
-    def find(self, image: str) -> Media | None:
+    def find_frame(self, image: str) -> Media | None:
         """Where the frame of an image name (``7_1.png``) lies, or None."""
         for folder in FOLDERS:
             if folder + image in self._members:
-                return self._member(folder + image)
+                return self._media_of_member(folder + image)
         for folder in FOLDERS:
             if folder + image in self._loose:
                 return self._tree.media(self._match + folder + image)

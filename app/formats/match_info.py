@@ -11,7 +11,7 @@ from app.finite import json_text
 from app.formats.file_tree import FileTree
 from app.formats.json_text import read_json
 from app.formats.report import Report
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_record import IMAGE
 from app.soccer.group import Group, View
 
@@ -58,30 +58,30 @@ def read_match_info(
     return found
 
 
-def place_of(record: Mapping[str, Any]) -> str | None:
+def original_frame_path(record: Mapping[str, Any]) -> str | None:
     """Where the frame of one of our exports came from; None where nobody says so."""
     place = record.get(PLACE)
     if not isinstance(place, str):
         return None
     try:
-        return check_name(place)
+        return require_safe_path(place)
     except UnsafePathError:
         return None
 
 
-def match_of(record: Mapping[str, Any]) -> str:
+def match_of_record(record: Mapping[str, Any]) -> str:
     """``<league>/<season>/<match>`` of a record, or as much of it as is there."""
     parts = [record.get(name) for name in _PARTS]
     for text in ("/".join(map(str, parts)) if all(parts) else None, *map(record.get, _PATHS)):
         if isinstance(text, str) and text.strip("/ "):
             try:
-                return check_name(text.strip("/ "))
+                return require_safe_path(text.strip("/ "))
             except UnsafePathError:
                 continue
     return ""
 
 
-def record_of(group: Group, view: View) -> Mapping[str, Any]:
+def match_info_of_view(group: Group, view: View) -> Mapping[str, Any]:
     """The record of a view: what its source said, else what its dataset knows."""
     kept = view.extras.metadata.get(METADATA)
     if isinstance(kept, dict):

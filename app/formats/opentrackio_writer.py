@@ -36,7 +36,7 @@ def opentrackio_sample(
     """One sample of OpenTrackIO 1.0.
 
     Args:
-        camera: Of the frame, with a lens that ``why_not_opentrackio`` has nothing against.
+        camera: Of the frame, with a lens that ``opentrackio_problem`` has nothing against.
         size: Of its image.
         frame: Its number, which becomes the sequence number.
         source: Name of the recording; samples of one name have one source id.
@@ -88,7 +88,7 @@ def opentrackio_sample(
                 "x": pitch_x * (x0 + 0.5 - size.width / 2),
                 "y": pitch_y * (y0 + 0.5 - size.height / 2),
             },
-            "distortion": [_distortion(camera.distortion, focal)],
+            "distortion": [_opentrackio_distortion(camera.distortion, focal)],
         },
     }
     if status is not None:
@@ -96,7 +96,7 @@ def opentrackio_sample(
     return sample
 
 
-def why_not_opentrackio(camera: Camera) -> str | None:
+def opentrackio_problem(camera: Camera) -> str | None:
     """What of a camera OpenTrackIO cannot say; None where it can say all of it."""
     if camera.is_wide:
         return f"has the lens {camera.lens}, which OpenTrackIO does not know"
@@ -137,7 +137,7 @@ def frame_rate(times: Mapping[int, float]) -> Fraction | None:
     return Fraction(rate).limit_denominator(1001) or None
 
 
-def _distortion(coefficients: FloatArray, focal: float) -> dict[str, Any]:
+def _opentrackio_distortion(coefficients: FloatArray, focal: float) -> dict[str, Any]:
     """OpenCV's radial coefficients on the sensor in millimetres, numerator and denominator in turn."""
     k1, k2, _, _, k3, k4, k5, k6 = coefficients[:8].tolist()
     two, four, six = focal**2, focal**4, focal**6

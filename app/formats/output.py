@@ -15,7 +15,7 @@ from pathlib import Path
 from app.durable import PARTIAL, sync
 from app.errors import InputError, StorageError
 from app.formats.manifest import MANIFEST, SOFTWARE
-from app.formats.view_files import GatheredFiles
+from app.formats.view_files import FilesToPack
 from app.progress import ReportProgress, told
 
 MAX_MANIFEST = 1 << 30
@@ -48,7 +48,7 @@ def output_tree(
         StorageError: The disk refuses.
     """
     out = Path.cwd() / out
-    _check_free(out)
+    _require_free_output(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         prefix = f".{(beside or out).name}."
@@ -69,20 +69,20 @@ def output_tree(
         shutil.rmtree(staging, ignore_errors=True)
 
 
-def _check_free(out: Path) -> None:
+def _require_free_output(out: Path) -> None:
     if out.suffix.lower() == ".zip":
         if out.is_dir():
             raise InputError(f"{out} is a folder, not a zip file")
         if os.path.lexists(out) and not _is_earlier_zip(out):
-            raise foreign(f"{out} is there already and is no earlier export")
+            raise occupied_output_error(f"{out} is there already and is no earlier export")
         return
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; name a folder or a file that ends in .zip")
     if out.is_dir() and any(out.iterdir()) and not _is_earlier_export(out):
-        raise foreign(f"{out} holds other files and is no earlier export")
+        raise occupied_output_error(f"{out} holds other files and is no earlier export")
 
 
-def foreign(sentence: str) -> InputError:
+def occupied_output_error(sentence: str) -> InputError:
     """The refusal of a place that holds something else."""
     return InputError(sentence, hint="Name another place; an earlier export would be replaced.")
 
@@ -91,7 +91,7 @@ def _is_earlier_export(out: Path) -> bool:
     """Whether the folder holds what its manifest lists and nothing else."""
     present = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
     try:
-        return present <= listed((out / MANIFEST).read_bytes())
+        return present <= files_in_manifest((out / MANIFEST).read_bytes())
     except OSError:
         return False
 
@@ -102,13 +102,13 @@ def _is_earlier_zip(out: Path) -> bool:
         with zipfile.ZipFile(out) as archive:
             if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
                 return False
-            ours = listed(archive.read(MANIFEST))
+            ours = files_in_manifest(archive.read(MANIFEST))
             return not out.is_symlink() and set(archive.namelist()) <= ours
     except (OSError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return False
 
 
-def listed(manifest: bytes) -> set[str]:
+def files_in_manifest(manifest: bytes) -> set[str]:
     """The files that a manifest of ours lists; none where it is of somebody else."""
     try:
         value = json.loads(manifest)
@@ -136,11 +136,11 @@ def _publish_zip(staging: Path, out: Path, prefix: str, progress: ReportProgress
 
 def write_zip(root: Path, file: object, progress: ReportProgress | None = None) -> None:
     """All files of an export below ``root`` into a zip: sorted names, dated 1980-01-01."""
-    files = GatheredFiles(root)
-    zip_files(told(files, len(files), progress, "Packing the files."), file)
+    files = FilesToPack(root)
+    write_files_to_zip(told(files, len(files), progress, "Packing the files."), file)
 
 
-def zip_files(
+def write_files_to_zip(
     files: Iterable[tuple[str, Path | bytes]], file: object, stored: Collection[str] = ()
 ) -> None:
     """Files into a zip, in their order, dated 1980-01-01.

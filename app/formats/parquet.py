@@ -7,7 +7,7 @@ from typing import Any
 from app.errors import InputError
 
 
-def pyarrow_modules() -> tuple[Any, Any]:
+def import_pyarrow() -> tuple[Any, Any]:
     try:
         import pyarrow
         import pyarrow.parquet as parquet

@@ -11,11 +11,11 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.errors import DatasetFormatError
-from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, capped_chunks
+from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, limited_chunks
 from app.formats.folder_tree import FolderTree
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.json_text import read_json
-from app.formats.parquet import pyarrow_modules
+from app.formats.parquet import import_pyarrow
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.formats.view_groups import PlacedView, ViewGroups
@@ -64,34 +64,34 @@ def read_parquet(root: Root, report: Report, *, limits: Limits = DEFAULT_LIMITS)
             report.note(str(root), None, None, "holds no Parquet file")
         groups = ViewGroups(report)
         for name in tables:
-            for view in _views(tree, name, names, report, limits):
+            for view in _read_views(tree, name, names, report, limits):
                 yield from groups.add(view, tree.shown(name))
-        yield from groups.rest()
+        yield from groups.incomplete_groups()
 
 
-def _views(
+def _read_views(
     tree: FileTree, name: str, names: list[str], report: Report, limits: Limits
 ) -> Iterator[PlacedView]:
     shown, present, number = tree.shown(name), set(names), 0
     try:
-        for row in _rows(tree, name, limits):
+        for row in _read_rows(tree, name, limits):
             number += 1
             report.read += 1
             try:
-                placed = _view(row, shown, f"row {number}")
+                placed = _view_of_row(row, shown, f"row {number}")
             except DatasetFormatError as error:
                 report.skip(error)
                 continue
-            media = _media(tree, str(row.get("file_name") or ""), present)
+            media = _media_of_row(tree, str(row.get("file_name") or ""), present)
             yield replace(placed, view=replace(placed.view, media=media))
     except DatasetFormatError as error:
         report.skip(error)
 
 
-def _rows(tree: FileTree, name: str, limits: Limits) -> Iterator[Mapping[str, Any]]:
-    pyarrow, parquet = pyarrow_modules()
+def _read_rows(tree: FileTree, name: str, limits: Limits) -> Iterator[Mapping[str, Any]]:
+    pyarrow, parquet = import_pyarrow()
     shown = tree.shown(name)
-    with _on_disk(tree, name, limits) as path:
+    with _file_on_disk(tree, name, limits) as path:
         try:
             with parquet.ParquetFile(path) as file:
                 columns = file.schema_arrow.names
@@ -108,7 +108,7 @@ def _rows(tree: FileTree, name: str, limits: Limits) -> Iterator[Mapping[str, An
 
 
 @contextmanager
-def _on_disk(tree: FileTree, name: str, limits: Limits) -> Iterator[Path]:
+def _file_on_disk(tree: FileTree, name: str, limits: Limits) -> Iterator[Path]:
     """A file that can be read from its end; a member of a zip is unpacked for that."""
     if isinstance(tree, FolderTree):
         with tree.open(name) as source:
@@ -120,13 +120,13 @@ def _on_disk(tree: FileTree, name: str, limits: Limits) -> Iterator[Path]:
                 shutil.copyfileobj(source, file)
         else:
             with tree.open(name) as source:
-                for chunk in capped_chunks(source, limits.file_bytes, tree.shown(name)):
+                for chunk in limited_chunks(source, limits.file_bytes, tree.shown(name)):
                     file.write(chunk)
         file.flush()
         yield Path(file.name)
 
 
-def _view(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
+def _view_of_row(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
     parsed = {
         name: None
         if not isinstance(row.get(name), str)
@@ -143,7 +143,7 @@ def _view(row: Mapping[str, Any], path: str, record: str) -> PlacedView:
     return PlacedView(state.head(), state.count("position"), view)
 
 
-def _media(tree: FileTree, name: str, present: set[str]) -> Media | None:
+def _media_of_row(tree: FileTree, name: str, present: set[str]) -> Media | None:
     if name not in present or PurePosixPath(name).suffix.lower() not in IMAGE_SUFFIXES:
         return None
     return tree.media(name)

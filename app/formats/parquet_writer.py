@@ -13,7 +13,7 @@ from app.finite import json_text as finite_text
 from app.formats.camera_json import covariance_to_json
 from app.formats.export_record import ExportRecord, chosen_box, frame_name
 from app.formats.manifest import software_version
-from app.formats.parquet import pyarrow_modules
+from app.formats.parquet import import_pyarrow
 from app.formats.view_state import view_to_json
 from app.geometry.camera import Camera
 from app.soccer.frames import Box
@@ -44,7 +44,7 @@ class ViewRow:
         return view_to_json(self.view)
 
     @property
-    def solved(self) -> ViewSolution | None:
+    def view_solution(self) -> ViewSolution | None:
         """What was computed for the view."""
         return self.record.view_solution(self.view)
 
@@ -85,9 +85,9 @@ def write_parquet(
     Raises:
         InputError: pyarrow is not installed.
     """
-    pyarrow, parquet = pyarrow_modules()
+    pyarrow, parquet = import_pyarrow()
     counts = {"groups": 0, "views": 0, "boxes": 0, "balls": 0}
-    schema = pyarrow.schema([(name, _type(pyarrow, kind)) for name, kind, _ in COLUMNS])
+    schema = pyarrow.schema([(name, _arrow_type(pyarrow, kind)) for name, kind, _ in COLUMNS])
     waiting: list[dict[str, Any]] = []
     with parquet.ParquetWriter(root / TABLE, schema, compression="zstd") as writer:
         for record in records:
@@ -96,7 +96,7 @@ def write_parquet(
                 row = ViewRow(record, view, position, boxes, everything, provenance or {})
                 waiting.append(finite({name: get(row) for name, _, get in COLUMNS}))
                 counts["views"] += 1
-                counts["boxes"] += _chosen(row) is not None
+                counts["boxes"] += _exported_box(row) is not None
                 counts["balls"] += record.has_ball_3d(view)
             if len(waiting) >= ROWS:
                 writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
@@ -105,7 +105,7 @@ def write_parquet(
     return counts
 
 
-def _type(pyarrow: Any, kind: str) -> Any:
+def _arrow_type(pyarrow: Any, kind: str) -> Any:
     if kind == LIST:
         return pyarrow.list_(pyarrow.float64())
     return getattr(pyarrow, {"double": "float64", "bool": "bool_"}.get(kind, kind))()
@@ -116,7 +116,7 @@ def json_text(value: Any) -> str | None:
     return None if value is None else finite_text(value)
 
 
-def _camera(get: Callable[[Camera], Any]) -> Getter:
+def _camera_column(get: Callable[[Camera], Any]) -> Getter:
     return lambda row: None if row.camera is None else get(row.camera)
 
 
@@ -128,15 +128,15 @@ def _camera_covariance(row: ViewRow) -> list[float] | None:
     return [number for each in rows for number in each]
 
 
-def _fit(name: str) -> Getter:
+def _ball_fit_column(name: str) -> Getter:
     return lambda row: None if row.fit is None else getattr(row.fit, name)
 
 
-def _solved(get: Callable[[ViewSolution], Any]) -> Getter:
-    return lambda row: None if row.solved is None else get(row.solved)
+def _view_solution_column(get: Callable[[ViewSolution], Any]) -> Getter:
+    return lambda row: None if row.view_solution is None else get(row.view_solution)
 
 
-def _axis(number: int) -> Getter:
+def _ball_coordinate_column(number: int) -> Getter:
     def get(row: ViewRow) -> float | None:
         point = row.record.point
         return None if point is None or row.fit is None else float(point[number])
@@ -144,7 +144,7 @@ def _axis(number: int) -> Getter:
     return get
 
 
-def _ball(name: str) -> Getter:
+def _ball_column(name: str) -> Getter:
     def get(row: ViewRow) -> Any:
         ball = row.record.solution.ball if row.record.solution else None
         return None if ball is None or row.fit is None else getattr(ball, name)
@@ -152,25 +152,25 @@ def _ball(name: str) -> Getter:
     return get
 
 
-def _of_ball(get: Callable[[Solution], Any]) -> Getter:
+def _solution_column(get: Callable[[Solution], Any]) -> Getter:
     """Of the solution, in rows that have a 3D ball."""
 
     def value(row: ViewRow) -> Any:
         solution = row.record.solution
-        return None if solution is None or _ball("point")(row) is None else get(solution)
+        return None if solution is None or _ball_column("point")(row) is None else get(solution)
 
     return value
 
 
-def _sigma(ball: Ball3D | BestBall | None) -> float | None:
+def _sigma_of_ball(ball: Ball3D | BestBall | None) -> float | None:
     return None if ball is None else ball.sigma_m
 
 
-def _p_value(solution: Solution) -> float | None:
+def _p_value_of_solution(solution: Solution) -> float | None:
     return None if solution.chi_square is None else solution.chi_square.p_value
 
 
-def _box(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
+def _box_column(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
     def get(row: ViewRow) -> float | None:
         box = which(row)
         return None if box is None else float(getattr(box, name))
@@ -178,15 +178,15 @@ def _box(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
     return get
 
 
-def _annotated(row: ViewRow) -> Box | None:
+def _annotated_box(row: ViewRow) -> Box | None:
     return row.view.ball.box if row.view.ball else None
 
 
-def _chosen(row: ViewRow) -> Box | None:
+def _exported_box(row: ViewRow) -> Box | None:
     return chosen_box(row.record, row.view, row.boxes) if row.view.ball else None
 
 
-def _center(axis: int) -> Getter:
+def _center_coordinate_column(axis: int) -> Getter:
     def get(row: ViewRow) -> float | None:
         center = row.view.ball.center if row.view.ball else None
         return None if center is None else float(center[axis])
@@ -194,37 +194,37 @@ def _center(axis: int) -> Getter:
     return get
 
 
-def _jac(index: int) -> Getter:
+def _jac_column(index: int) -> Getter:
     def get(row: ViewRow) -> float | None:
-        jac = row.solved.calibration.jac if row.solved else None
+        jac = row.view_solution.calibration.jac if row.view_solution else None
         return None if jac is None else float(jac[index])
 
     return get
 
 
-def _failing(row: ViewRow) -> str | None:
+def _failing_gate(row: ViewRow) -> str | None:
     gate = row.record.solution.first_failing if row.record.solution else None
     return None if gate is None else gate.name
 
 
-def _fits_pixels(row: ViewRow) -> Any:
+def _reprojected_pixels(row: ViewRow) -> Any:
     point = row.fit.reprojected if row.fit else None
     return None if point is None else [float(point.x), float(point.y)]
 
 
-def _annotated_value(name: str) -> Getter:
+def _annotated_value_column(name: str) -> Getter:
     return lambda row: row.annotated[name]
 
 
-def _left_out(name: str) -> Getter:
+def _left_out_column(name: str) -> Getter:
     return lambda row: None if row.view.left_out is None else getattr(row.view.left_out, name)
 
 
-def _annotated_json(name: str) -> Getter:
+def _annotated_json_column(name: str) -> Getter:
     return lambda row: json_text(row.annotated[name])
 
 
-def _if_annotated(name: str) -> Getter:
+def _optional_annotated_column(name: str) -> Getter:
     return lambda row: json_text(row.annotated[name]) if name in row.annotated else None
 
 
@@ -247,78 +247,78 @@ COLUMNS: tuple[tuple[str, str, Getter], ...] = (
     ("frame_present", FLAG, lambda row: row.view.key in row.record.frames),
     ("width", WHOLE, lambda row: row.view.size.width),
     ("height", WHOLE, lambda row: row.view.size.height),
-    ("included", FLAG, _annotated_value("included")),
-    ("left_out_reason", TEXT, _left_out("reason")),
-    ("left_out_note", TEXT, _left_out("note")),
-    ("station", TEXT, _annotated_value("station")),
-    ("shared", FLAG, _annotated_value("shared")),
-    ("flipped", FLAG, _annotated_value("flipped")),
-    ("calibration", TEXT, _annotated_value("calibration")),
-    ("calibrated_by", TEXT, _solved(lambda solved: solved.calibration.source)),
-    ("pan_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[0])),
-    ("tilt_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[1])),
-    ("roll_degrees", NUMBER, _camera(lambda camera: camera.pan_tilt_roll_degrees[2])),
-    ("x_focal_length", NUMBER, _camera(lambda camera: float(camera.focal_length[0]))),
-    ("y_focal_length", NUMBER, _camera(lambda camera: float(camera.focal_length[1]))),
-    ("principal_point", LIST, _camera(lambda camera: [*map(float, camera.principal_point)])),
-    ("skew", NUMBER, _camera(lambda camera: float(camera.skew))),
-    ("position_meters", LIST, _camera(lambda camera: camera.position.tolist())),
-    ("rotation_matrix", LIST, _camera(lambda camera: camera.rotation.ravel().tolist())),
-    ("distortion", LIST, _camera(lambda camera: camera.distortion.tolist())),
-    ("lens", TEXT, _camera(lambda camera: camera.lens)),
+    ("included", FLAG, _annotated_value_column("included")),
+    ("left_out_reason", TEXT, _left_out_column("reason")),
+    ("left_out_note", TEXT, _left_out_column("note")),
+    ("station", TEXT, _annotated_value_column("station")),
+    ("shared", FLAG, _annotated_value_column("shared")),
+    ("flipped", FLAG, _annotated_value_column("flipped")),
+    ("calibration", TEXT, _annotated_value_column("calibration")),
+    ("calibrated_by", TEXT, _view_solution_column(lambda solved: solved.calibration.source)),
+    ("pan_degrees", NUMBER, _camera_column(lambda camera: camera.pan_tilt_roll_degrees[0])),
+    ("tilt_degrees", NUMBER, _camera_column(lambda camera: camera.pan_tilt_roll_degrees[1])),
+    ("roll_degrees", NUMBER, _camera_column(lambda camera: camera.pan_tilt_roll_degrees[2])),
+    ("x_focal_length", NUMBER, _camera_column(lambda camera: float(camera.focal_length[0]))),
+    ("y_focal_length", NUMBER, _camera_column(lambda camera: float(camera.focal_length[1]))),
+    ("principal_point", LIST, _camera_column(lambda camera: [*map(float, camera.principal_point)])),
+    ("skew", NUMBER, _camera_column(lambda camera: float(camera.skew))),
+    ("position_meters", LIST, _camera_column(lambda camera: camera.position.tolist())),
+    ("rotation_matrix", LIST, _camera_column(lambda camera: camera.rotation.ravel().tolist())),
+    ("distortion", LIST, _camera_column(lambda camera: camera.distortion.tolist())),
+    ("lens", TEXT, _camera_column(lambda camera: camera.lens)),
     ("camera_covariance", LIST, _camera_covariance),
-    ("jac_0.5", NUMBER, _jac(0)),
-    ("jac_1", NUMBER, _jac(1)),
-    ("jac_2", NUMBER, _jac(2)),
-    ("line_error_px", NUMBER, _solved(lambda solved: solved.calibration.error_px)),
-    ("agreement", NUMBER, _solved(lambda solved: solved.calibration.agreement)),
-    ("ball_x", NUMBER, _center(0)),
-    ("ball_y", NUMBER, _center(1)),
-    *((f"annotated_{side}", NUMBER, _box(_annotated, side)) for side in _SIDES),
-    *((f"box_{side}", NUMBER, _box(_chosen, side)) for side in _SIDES),
-    ("ball_3d_x", NUMBER, _axis(0)),
-    ("ball_3d_y", NUMBER, _axis(1)),
-    ("ball_3d_z", NUMBER, _axis(2)),
-    ("sigma_m", NUMBER, _ball("sigma_m")),
-    ("parallax_degrees", NUMBER, _ball("parallax_degrees")),
-    ("point", TEXT, _of_ball(lambda solution: solution.point)),
+    ("jac_0.5", NUMBER, _jac_column(0)),
+    ("jac_1", NUMBER, _jac_column(1)),
+    ("jac_2", NUMBER, _jac_column(2)),
+    ("line_error_px", NUMBER, _view_solution_column(lambda solved: solved.calibration.error_px)),
+    ("agreement", NUMBER, _view_solution_column(lambda solved: solved.calibration.agreement)),
+    ("ball_x", NUMBER, _center_coordinate_column(0)),
+    ("ball_y", NUMBER, _center_coordinate_column(1)),
+    *((f"annotated_{side}", NUMBER, _box_column(_annotated_box, side)) for side in _SIDES),
+    *((f"box_{side}", NUMBER, _box_column(_exported_box, side)) for side in _SIDES),
+    ("ball_3d_x", NUMBER, _ball_coordinate_column(0)),
+    ("ball_3d_y", NUMBER, _ball_coordinate_column(1)),
+    ("ball_3d_z", NUMBER, _ball_coordinate_column(2)),
+    ("sigma_m", NUMBER, _ball_column("sigma_m")),
+    ("parallax_degrees", NUMBER, _ball_column("parallax_degrees")),
+    ("point", TEXT, _solution_column(lambda solution: solution.point)),
     (
         "mean_sigma_m",
         NUMBER,
-        _of_ball(lambda solution: _sigma(solution.mean_ball or solution.ball)),
+        _solution_column(lambda solution: _sigma_of_ball(solution.mean_ball or solution.ball)),
     ),
-    ("best_sigma_m", NUMBER, _of_ball(lambda solution: _sigma(solution.best_ball))),
-    ("p_value", NUMBER, _of_ball(_p_value)),
-    ("covariance", LIST, lambda row: _listed(_ball("covariance")(row))),
-    ("reprojected", LIST, _fits_pixels),
-    ("error_px", NUMBER, _fit("error_px")),
-    ("error_percent", NUMBER, _fit("error_percent")),
-    ("optimized_diameter_px", NUMBER, _fit("optimized_diameter_px")),
-    ("optimized_error_m", NUMBER, _fit("optimized_error_m")),
-    ("size_ratio", NUMBER, _fit("size_ratio")),
-    ("depth_m", NUMBER, _fit("depth_m")),
-    ("in_valid_pair", FLAG, _solved(lambda solved: solved.included)),
-    ("view_failed", TEXT, _solved(lambda solved: solved.failed)),
-    ("group_failed", TEXT, _failing),
+    ("best_sigma_m", NUMBER, _solution_column(lambda solution: _sigma_of_ball(solution.best_ball))),
+    ("p_value", NUMBER, _solution_column(_p_value_of_solution)),
+    ("covariance", LIST, lambda row: _to_float_list(_ball_column("covariance")(row))),
+    ("reprojected", LIST, _reprojected_pixels),
+    ("error_px", NUMBER, _ball_fit_column("error_px")),
+    ("error_percent", NUMBER, _ball_fit_column("error_percent")),
+    ("optimized_diameter_px", NUMBER, _ball_fit_column("optimized_diameter_px")),
+    ("optimized_error_m", NUMBER, _ball_fit_column("optimized_error_m")),
+    ("size_ratio", NUMBER, _ball_fit_column("size_ratio")),
+    ("depth_m", NUMBER, _ball_fit_column("depth_m")),
+    ("in_valid_pair", FLAG, _view_solution_column(lambda solved: solved.included)),
+    ("view_failed", TEXT, _view_solution_column(lambda solved: solved.failed)),
+    ("group_failed", TEXT, _failing_gate),
     ("verdict", TEXT, lambda row: row.record.verdict),
     ("reason", TEXT, lambda row: row.record.reason),
-    ("lines", TEXT, _annotated_json("lines")),
-    ("balls", TEXT, _annotated_json("balls")),
-    ("given", TEXT, _annotated_json("given")),
+    ("lines", TEXT, _annotated_json_column("lines")),
+    ("balls", TEXT, _annotated_json_column("balls")),
+    ("given", TEXT, _annotated_json_column("given")),
     ("given_covariance", LIST, lambda row: row.annotated.get("given_covariance")),
-    ("picture", TEXT, _if_annotated("picture")),
-    ("proposed", TEXT, _if_annotated("proposed")),
+    ("picture", TEXT, _optional_annotated_column("picture")),
+    ("proposed", TEXT, _optional_annotated_column("proposed")),
     ("extras", TEXT, lambda row: json_text(row.view.extras.values())),
     *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
-    ("solver_version", TEXT, lambda row: _solver(row)),
+    ("solver_version", TEXT, lambda row: _solver_version(row)),
     ("software", TEXT, lambda row: software_version()),
 )
 """Name, type and value of every column; docs/formats.md explains them."""
 
 
-def _listed(values: tuple[float, ...] | None) -> list[float] | None:
+def _to_float_list(values: tuple[float, ...] | None) -> list[float] | None:
     return None if values is None else [*map(float, values)]
 
 
-def _solver(row: ViewRow) -> str | None:
+def _solver_version(row: ViewRow) -> str | None:
     return row.record.solution.solver_version if row.record.solution else None

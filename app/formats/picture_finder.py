@@ -17,7 +17,7 @@ _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]{1,20})://([^/\\]*)")
 _DRIVE = re.compile(r"[A-Za-z]:(?=[/\\]|$)")
 
 
-def picture_parts(name: str) -> tuple[str, ...]:
+def picture_name_parts(name: str) -> tuple[str, ...]:
     """Folders and file of a picture's name, in composed letters, without what no folder here has.
 
     Drives, roots, ``.``, ``..``, hosts and what follows a ``?`` of an address are left out.
@@ -43,7 +43,7 @@ _SPLIT = re.compile(r"(train|val|test|challenge)(?:ing|id|idation)?(?:[-_ ]?(?:s
 _WORDS = re.compile(r"[^a-z0-9]+")
 
 
-def split_of(name: str) -> str:
+def split_of_word(name: str) -> str:
     """The split that a name is; empty where it is none.
 
     Example:
@@ -54,14 +54,14 @@ def split_of(name: str) -> str:
     return "" if found is None else {"val": "valid"}.get(found[1], found[1])
 
 
-def split_in(name: str) -> str:
+def split_within_word(name: str) -> str:
     """The split that one word of a name says; empty where none does, or two contradict.
 
     Example:
         >>> split_in("instances_train2017"), split_in("train_or_test"), split_in("_annotations.coco")
         ('train', '', '')
     """
-    found = {split for word in _WORDS.split(name.lower()) if (split := split_of(word))}
+    found = {split for word in _WORDS.split(name.lower()) if (split := split_of_word(word))}
     return found.pop() if len(found) == 1 else ""
 
 
@@ -69,13 +69,13 @@ LABEL_FOLDERS = frozenset({"annotations", "annotation", "labels", "coco", "json"
 """Folders of labels: the pictures lie beside them, not in them."""
 PICTURE_FOLDERS = ("images", "data", "img", "frames")
 Name = tuple[str, ...]
-"""Of a picture, as ``picture_parts`` gives it."""
+"""Of a picture, as ``picture_name_parts`` gives it."""
 _MAX_RIVALS = 500
 """Pictures of one name that are compared."""
 
 
 @dataclass(frozen=True)
-class Home:
+class LabelLocation:
     """Where a file of labels lies, and which of several sets it is about.
 
     Attributes:
@@ -97,7 +97,7 @@ class Home:
         """The folder that has labels and pictures."""
         place = PurePosixPath(self.folder)
         inside = place.name.lower() in LABEL_FOLDERS
-        return _text(place.parent if inside else place)
+        return _path_text(place.parent if inside else place)
 
     def folders(self) -> Iterable[str]:
         """Folders in which tools put the pictures of such a file, the likeliest first."""
@@ -105,29 +105,29 @@ class Home:
         tops += [top for top in ("",) if top not in tops]
         if self.subset:
             for top in tops:
-                yield from (_join(top, inner, self.subset) for inner in (*PICTURE_FOLDERS, ""))
-                yield _join(top, self.subset, "images")
+                yield from (_join_path(top, inner, self.subset) for inner in (*PICTURE_FOLDERS, ""))
+                yield _join_path(top, self.subset, "images")
         for top in tops:
             yield top
-            yield from (_join(top, inner) for inner in PICTURE_FOLDERS)
-            yield _join(top, "images", "default")
+            yield from (_join_path(top, inner) for inner in PICTURE_FOLDERS)
+            yield _join_path(top, "images", "default")
 
-    def admits(self, place: str, wanted: Collection[str]) -> bool:
+    def can_hold_picture(self, place: str, wanted: Collection[str]) -> bool:
         """Whether a picture can be one of this file's, for all that its folders say."""
         own = {part.lower() for part in (*PurePosixPath(self.folder).parts, *wanted)}
-        if any(_is_below(place, other) for other in self.elsewhere):
+        if any(_is_below_folder(place, other) for other in self.elsewhere):
             return False
         for part in PurePosixPath(place).parts[:-1]:
             if part.lower() in own:
                 continue
-            split = split_of(part)
+            split = split_of_word(part)
             if part.lower() in self.strange or (self.split and split and split != self.split):
                 return False
         return True
 
 
 @dataclass(frozen=True)
-class Found:
+class PictureSearchResult:
     """What a search came to.
 
     Attributes:
@@ -166,31 +166,33 @@ class PictureFinder:
                 self._by_end.setdefault(f"?{end.casefold()}", []).append(name)
 
     @property
-    def some(self) -> bool:
+    def has_pictures(self) -> bool:
         """Whether there are pictures at all."""
         return bool(self._places)
 
-    def find(self, parts: Name, home: Home) -> Found:
+    def find_picture(self, parts: Name, home: LabelLocation) -> PictureSearchResult:
         """The picture of a name.
 
         Args:
-            parts: As ``picture_parts`` gives them.
+            parts: As ``picture_name_parts`` gives them.
             home: Of the file that names it.
         """
         if not parts:
-            return Found()
+            return PictureSearchResult()
         name = "/".join(parts)
         for folder in home.folders():
-            place = self._places.get(_join(folder, name))
-            if place is not None and home.admits(place, parts):
-                return Found(place, len(parts))
+            place = self._places.get(_join_path(folder, name))
+            if place is not None and home.can_hold_picture(place, parts):
+                return PictureSearchResult(place, len(parts))
         for fold in (False, True):
-            found = self._by_tail(parts, home, fold)
+            found = self._find_by_longest_common_end(parts, home, fold)
             if found.place is not None or found.rivals:
                 return found
-        return Found()
+        return PictureSearchResult()
 
-    def _by_tail(self, parts: Name, home: Home, fold: bool) -> Found:
+    def _find_by_longest_common_end(
+        self, parts: Name, home: LabelLocation, fold: bool
+    ) -> PictureSearchResult:
         """The picture with the longest common end, in the file's own folders before others."""
         places: list[str] = []
         for count in (2, 1):
@@ -199,25 +201,25 @@ class PictureFinder:
             if places and len(parts) >= count:
                 break
         if len(places) > _MAX_RIVALS:
-            return Found(rivals=tuple(places[:3]))
-        fitting = [place for place in places if home.admits(place, parts)]
+            return PictureSearchResult(rivals=tuple(places[:3]))
+        fitting = [place for place in places if home.can_hold_picture(place, parts)]
         ranks: dict[tuple[int, bool, bool], list[str]] = {}
         for place in fitting:
             rank = (
-                _common_end(parts, place, fold),
-                bool(home.folder) and _is_below(place, home.folder),
-                bool(home.root) and _is_below(place, home.root),
+                _count_common_parts(parts, place, fold),
+                bool(home.folder) and _is_below_folder(place, home.folder),
+                bool(home.root) and _is_below_folder(place, home.root),
             )
             ranks.setdefault(rank, []).append(place)
         if not ranks:
-            return Found()
+            return PictureSearchResult()
         best = max(ranks)
         if len(ranks[best]) > 1:
-            return Found(rivals=tuple(ranks[best][:3]))
-        return Found(ranks[best][0], best[0], folded=fold)
+            return PictureSearchResult(rivals=tuple(ranks[best][:3]))
+        return PictureSearchResult(ranks[best][0], best[0], folded=fold)
 
 
-def own_pictures(found: Mapping[Name, Found]) -> dict[Name, Found]:
+def assign_pictures(found: Mapping[Name, PictureSearchResult]) -> dict[Name, PictureSearchResult]:
     """What was found for each name, without pictures that fit another name better or as well.
 
     Two pictures of a file are two pictures: ``clip1/1.jpg`` is not ``clip2/1.jpg``, where that
@@ -234,11 +236,11 @@ def own_pictures(found: Mapping[Name, Found]) -> dict[Name, Found]:
         best = [name for name in names if ranks[name] == highest]
         for name in names:
             if len(names) > 1 and (len(best) > 1 or name not in best):
-                own[name] = Found(rivals=(place,))
+                own[name] = PictureSearchResult(rivals=(place,))
     return own
 
 
-def _common_end(parts: Name, place: str, fold: bool) -> int:
+def _count_common_parts(parts: Name, place: str, fold: bool) -> int:
     others = unicodedata.normalize("NFC", place).split("/")
     count = 0
     for one, other in zip(reversed(parts), reversed(others), strict=False):
@@ -248,13 +250,13 @@ def _common_end(parts: Name, place: str, fold: bool) -> int:
     return count
 
 
-def _is_below(place: str, folder: str) -> bool:
+def _is_below_folder(place: str, folder: str) -> bool:
     return not folder or place.startswith(f"{folder}/")
 
 
-def _join(*parts: str) -> str:
+def _join_path(*parts: str) -> str:
     return "/".join(part for part in parts if part)
 
 
-def _text(place: PurePosixPath) -> str:
+def _path_text(place: PurePosixPath) -> str:
     return "" if str(place) == "." else str(place)

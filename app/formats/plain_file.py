@@ -13,7 +13,7 @@ MAX_BYTES = 256 * 1024 * 1024
 """Longest file that is read whole."""
 
 
-def open_plain(path: Path, shown: str = "") -> IO[bytes]:
+def open_regular_file(path: Path, shown: str = "") -> IO[bytes]:
     """A file open for reading.
 
     Args:
@@ -24,25 +24,25 @@ def open_plain(path: Path, shown: str = "") -> IO[bytes]:
         DatasetFormatError: It is a pipe, a device, a socket or a folder.
         OSError: It cannot be opened.
     """
-    file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115 - who asked closes it
+    file = open(path, "rb", opener=_open_without_blocking)  # noqa: SIM115 - who asked closes it
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         return file
     file.close()
     raise DatasetFormatError(shown or str(path), None, None, "is not a plain file")
 
 
-def _without_waiting(path: str, flags: int) -> int:
+def _open_without_blocking(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NONBLOCK)
 
 
-def read_plain(path: Path, limit: int = MAX_BYTES) -> bytes:
+def read_regular_file(path: Path, limit: int = MAX_BYTES) -> bytes:
     """The whole content of a file that somebody named.
 
     Raises:
         DatasetFormatError: It cannot be read, is no plain file, or is longer than the limit.
     """
     try:
-        with open_plain(path) as file:
+        with open_regular_file(path) as file:
             content = file.read(limit + 1)
     except OSError as error:
         problem = f"cannot be read ({error.strerror})"

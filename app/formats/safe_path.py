@@ -18,15 +18,15 @@ MAX_PART = 255
 """Most bytes of the name of a file or folder; what is longer fits on no disk."""
 
 
-def check_name(path: str) -> str:
+def require_safe_path(path: str) -> str:
     """The relative path unchanged, when it stays inside whatever folder it is joined to.
 
     Raises:
         UnsafePathError: Empty, absolute, longer than disks take, with a drive letter, ``..``,
             backslash or control character; also when only its decoded or normalised spelling is so.
     """
-    for spelling in _spellings(path):
-        problem = _unsafe(spelling)
+    for spelling in _decoded_spellings(path):
+        problem = _path_problem(spelling)
         if problem:
             raise UnsafePathError(f"the path {quoted(path, 200)} {problem}")
     if any(len(part.encode()) > MAX_PART for part in path.split("/")):
@@ -46,7 +46,7 @@ def resolve_inside(root: Path, path: str) -> Path:
     Raises:
         UnsafePathError: The path would leave the folder.
     """
-    check_name(path)
+    require_safe_path(path)
     real_root = Path(os.path.realpath(root))
     real = Path(os.path.realpath(real_root / path))
     if real != real_root and real_root not in real.parents:
@@ -54,7 +54,7 @@ def resolve_inside(root: Path, path: str) -> Path:
     return real
 
 
-def _spellings(path: str) -> list[str]:
+def _decoded_spellings(path: str) -> list[str]:
     if path.isascii() and "%" not in path:
         return [path]
     spellings = [path, unicodedata.normalize("NFKC", path)]
@@ -65,7 +65,7 @@ def _spellings(path: str) -> list[str]:
     return spellings
 
 
-def _unsafe(path: str) -> str | None:
+def _path_problem(path: str) -> str | None:
     if not path:
         return "is empty"
     if _CONTROL.search(path):

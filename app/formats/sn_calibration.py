@@ -14,7 +14,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.formats.export_names import frame_claims
-from app.formats.frame_names import UNASSIGNED, match_frame, view_place
+from app.formats.frame_names import UNASSIGNED, frame_path_by_match, view_file_path
 from app.formats.soccernet_v3 import SPLITS
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -53,12 +53,12 @@ class LineFile:
     place: str = ""
 
 
-def spelling(marking: str) -> str:
+def soccernet_marking_name(marking: str) -> str:
     """A marking's name as SoccerNet files spell it."""
     return _SPELLING.get(marking, marking)
 
 
-def split_folder_of(split: str, size: ImageSize) -> str:
+def split_folder_name(split: str, size: ImageSize) -> str:
     """Folder of the frames of one split and one size: the evaluator takes one size at a time.
 
     Example:
@@ -69,7 +69,7 @@ def split_folder_of(split: str, size: ImageSize) -> str:
 
 
 def split_and_size(folder: str) -> tuple[str, ImageSize] | None:
-    """Back from ``split_folder_of``; None for any other folder."""
+    """Back from ``split_folder_name``; None for any other folder."""
     found = _FOLDER.fullmatch(folder)
     if found is None or min(int(found[2]), int(found[3])) < 2:
         return None
@@ -77,14 +77,14 @@ def split_and_size(folder: str) -> tuple[str, ImageSize] | None:
     return split, ImageSize(int(found[2]), int(found[3]))
 
 
-def flat_name(place: str, split: str) -> str:
+def flat_frame_name(place: str, split: str) -> str:
     """Name of a frame in the folder of its split, without ending.
 
     A frame that came from sn-calibration keeps its name. Any other has a digest of its place
     before it, so that no match meets another; the evaluator reads no name with a dot in it.
 
     Args:
-        place: Folders and stem of the frame (``frame_names.view_place``).
+        place: Folders and stem of the frame (``frame_names.view_file_path``).
         split: Split of the frame, or empty.
     """
     whole = PurePosixPath(place)
@@ -101,21 +101,21 @@ def line_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     The place of a frame is a name, too: what is read again has it for a key. A static camera has
     one file of lines for all its views.
     """
-    place = view_place(group, view)
-    name = f"{split_folder_of(split, view.size)}/{flat_name(place, split)}"
+    place = view_file_path(group, view)
+    name = f"{split_folder_name(split, view.size)}/{flat_frame_name(place, split)}"
     if not view.station.shared:
         return dict.fromkeys((place.encode().hex(), name), (group.key, view.key))
     own = dict.fromkeys((place.encode().hex(), name), view.station.key)
     return {**own, **frame_claims(group, view, split)}
 
 
-def line_frame(group: Group, view: View, split: str, suffix: str) -> str:
+def line_frame_path(group: Group, view: View, split: str, suffix: str) -> str:
     """Where the frame of a view lies in an export: beside its lines.
 
     Example: ``lines/test-1280x720/3f1c0a9b2d4e_7_1.png``. A static camera has one file of lines
     and many frames, which lie by its match.
     """
     if view.station.shared:
-        return match_frame(group, view, split, suffix)
-    name = flat_name(view_place(group, view), split)
-    return f"{LINES}/{split_folder_of(split, view.size)}/{name}{suffix}"
+        return frame_path_by_match(group, view, split, suffix)
+    name = flat_frame_name(view_file_path(group, view), split)
+    return f"{LINES}/{split_folder_name(split, view.size)}/{name}{suffix}"

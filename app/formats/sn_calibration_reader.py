@@ -15,7 +15,13 @@ from app.formats.corner_origin import HALF
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.line_documents import LineDocument, read_line_documents
-from app.formats.match_info import METADATA, PLACE, match_of, place_of, read_match_info
+from app.formats.match_info import (
+    METADATA,
+    PLACE,
+    match_of_record,
+    original_frame_path,
+    read_match_info,
+)
 from app.formats.report import Report
 from app.formats.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
 from app.formats.soccernet_v3 import SPLITS
@@ -58,14 +64,14 @@ def read_line_files(
         if tree is None:
             return
         names = tree.names()
-        places = _places(read_match_info(tree, names, Report()))
-        sizes = _sizes(map(_whole, names), path.stem) if by_folder else {}
-        ours = OwnExport(places, sizes, own_sizes=by_folder)
-        yield from line_files_of(tree, names, size, report, ours)
+        places = _original_frame_paths(read_match_info(tree, names, Report()))
+        sizes = _sizes_by_folder(map(_path_without_suffix, names), path.stem) if by_folder else {}
+        ours = OwnExportInfo(places, sizes, own_sizes=by_folder)
+        yield from read_line_files_of_tree(tree, names, size, report, ours)
 
 
 @dataclass(frozen=True)
-class OwnExport:
+class OwnExportInfo:
     """What one of our own exports says of its files, each by its path without the ending."""
 
     places: Mapping[str, str] = field(default_factory=dict)
@@ -75,19 +81,19 @@ class OwnExport:
     """Whether the size that a file says itself is that of its lines."""
 
 
-_NOTHING = OwnExport()
+_NOTHING = OwnExportInfo()
 
 
-def line_files_of(
+def read_line_files_of_tree(
     tree: FileTree,
     names: Sequence[str],
     size: ImageSize,
     report: Report,
-    ours: OwnExport = _NOTHING,
+    ours: OwnExportInfo = _NOTHING,
 ) -> Iterator[LineFile]:
     """The line files among some files of a tree, with the images that lie beside them."""
-    beside = _images(names)
-    wholes = {name: _whole(name) for name in names if _is_line_file(name)}
+    beside = _images_by_stem(names)
+    wholes = {name: _path_without_suffix(name) for name in names if _is_line_file(name)}
     places = {name: ours.places.get(whole, whole) for name, whole in wholes.items()}
     # Names of an export are in no order of a match's frames.
     ordered = sorted(places, key=places.__getitem__) if ours.places else list(places)
@@ -97,7 +103,7 @@ def line_files_of(
         whole, place = wholes[name], PurePosixPath(places[name])
         key = place.name if stems[place.name] == 1 else str(place)
         exported = ours.sizes.get(whole)
-        for document in _documents(tree, name, report):
+        for document in _read_line_documents(tree, name, report):
             named, where = key, whole
             if document.name is not None and document.name != place.name:
                 named, where = document.name, str(PurePosixPath(whole).parent / document.name)
@@ -115,25 +121,25 @@ def line_files_of(
             made = drawn if stays else size
             shown = tree.shown(name)
             lines, others = lines_from_json(document.lines, made, shown, report, drawn)
-            media = _media(tree, beside.get(where))
+            media = _media_of_image(tree, beside.get(where))
             report.imported += 1
             yield LineFile(named, made, lines, others, media, where)
 
 
-def _whole(name: str) -> str:
+def _path_without_suffix(name: str) -> str:
     return str(PurePosixPath(name).with_suffix(""))
 
 
-def _places(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    return {whole: place for whole, info in infos.items() if (place := place_of(info))}
+def _original_frame_paths(infos: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    return {whole: place for whole, info in infos.items() if (place := original_frame_path(info))}
 
 
-def _sizes(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
+def _sizes_by_folder(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
     by_folder = {whole: split_and_size(PurePosixPath(whole).parent.name or top) for whole in places}
     return {whole: found[1] for whole, found in by_folder.items() if found}
 
 
-def _documents(tree: FileTree, name: str, report: Report) -> list[LineDocument]:
+def _read_line_documents(tree: FileTree, name: str, report: Report) -> list[LineDocument]:
     try:
         return read_line_documents(tree.read_bytes(name), tree.shown(name), report)
     except DatasetFormatError as error:
@@ -149,7 +155,7 @@ def _is_line_file(name: str) -> bool:
     return last not in _OTHER_FILES and not last.startswith(_OTHER_PREFIXES)
 
 
-def _images(names: Iterable[str]) -> dict[str, str]:
+def _images_by_stem(names: Iterable[str]) -> dict[str, str]:
     places = (PurePosixPath(name) for name in names)
     return {
         str(place.with_suffix("")): str(place)
@@ -158,7 +164,7 @@ def _images(names: Iterable[str]) -> dict[str, str]:
     }
 
 
-def _media(tree: FileTree, image: str | None) -> Media | None:
+def _media_of_image(tree: FileTree, image: str | None) -> Media | None:
     return None if image is None else tree.media(image)
 
 
@@ -184,16 +190,16 @@ def lines_from_json(
         raise DatasetFormatError(path, None, None, "is not an object of lines")
     known: dict[str, list[ImagePoint]] = {}
     others = []
-    points = {name: _points(item, path, name, report) for name, item in value.items()}
+    points = {name: _read_points(item, path, name, report) for name, item in value.items()}
     every = [point for line in points.values() for _, point in line]
-    in_pixels = 2 * sum(map(_is_beyond, every)) >= max(len(every), 1)
+    in_pixels = 2 * sum(map(_is_far_outside, every)) >= max(len(every), 1)
     for name, numbered in points.items():
         line = [point for _, point in numbered]
         if not in_pixels:
-            line = _near(numbered, path, name, report)
-        to_pixel = partial(_resized, drawn or size, size) if in_pixels else size.unit_to_pixel
+            line = _points_near_image(numbered, path, name, report)
+        to_pixel = partial(_rescale_pixel, drawn or size, size) if in_pixels else size.unit_to_pixel
         pixels = [to_pixel(*point) for point in line]
-        marking = _marking(name, path, report)
+        marking = _read_marking_name(name, path, report)
         if marking is None:
             flat = [coordinate for point in pixels for coordinate in point]
             others.append({"class": name, "points": flat})
@@ -202,7 +208,7 @@ def lines_from_json(
     return make_lines(known), tuple(others)
 
 
-def _resized(drawn: ImageSize, size: ImageSize, x: float, y: float) -> ImagePoint:
+def _rescale_pixel(drawn: ImageSize, size: ImageSize, x: float, y: float) -> ImagePoint:
     """A pixel where its image has another size: images are resized about the first pixel's corner."""
     if drawn == size:
         return ImagePoint(x, y)
@@ -214,59 +220,61 @@ _Numbered = list[tuple[int, tuple[float, float]]]
 """Points of a line, each with its number in the file, from 1."""
 
 
-def _is_beyond(point: tuple[float, float]) -> bool:
+def _is_far_outside(point: tuple[float, float]) -> bool:
     return max(map(abs, point)) > LARGEST_UNIT
 
 
-def _near(line: _Numbered, path: str, name: str, report: Report) -> list[tuple[float, float]]:
+def _points_near_image(
+    line: _Numbered, path: str, name: str, report: Report
+) -> list[tuple[float, float]]:
     """The points of a line of a normalised file that can be normalised; others are reported."""
-    far = [number for number, point in line if _is_beyond(point)]
+    far = [number for number, point in line if _is_far_outside(point)]
     if far:
-        x, y = next(point for _, point in line if _is_beyond(point))
+        x, y = next(point for _, point in line if _is_far_outside(point))
         problem = f"({x:g}, {y:g}) is far outside the image, and the file is normalised"
-        report.note(path, None, name, f"{problem}; {_left_out(far)}")
-    return [point for _, point in line if not _is_beyond(point)]
+        report.note(path, None, name, f"{problem}; {_describe_left_out_points(far)}")
+    return [point for _, point in line if not _is_far_outside(point)]
 
 
-def _left_out(numbers: Sequence[int]) -> str:
+def _describe_left_out_points(numbers: Sequence[int]) -> str:
     listed = ", ".join(map(str, numbers[:10])) + (", ..." if len(numbers) > 10 else "")
     return f"points {listed} are left out" if len(numbers) > 1 else f"point {listed} is left out"
 
 
-def _points(value: Any, path: str, name: str, report: Report) -> _Numbered:
+def _read_points(value: Any, path: str, name: str, report: Report) -> _Numbered:
     """The sound points of a line; they are in no order, so that one less says nothing false."""
     points: _Numbered = []
     bad: list[int] = []
     first = ""
     try:
-        listed = fields.sequence(value)
+        listed = fields.require_list(value)
     except ValueError as error:
         report.note(path, None, name, f"{error}; the line is left out")
         return []
     for number, item in enumerate(listed, 1):
         try:
-            points.append((number, _point(item)))
+            points.append((number, _parse_point(item)))
         except ValueError as error:
             bad.append(number)
             first = first or str(error)
     if bad:
-        report.note(path, None, name, f"{first}; {_left_out(bad)}")
+        report.note(path, None, name, f"{first}; {_describe_left_out_points(bad)}")
     return points
 
 
-def _point(item: Any) -> tuple[float, float]:
+def _parse_point(item: Any) -> tuple[float, float]:
     """A point as ``{"x", "y"}`` or ``[x, y]``."""
     if isinstance(item, (list, tuple)):
-        x, y = fields.numbers(item, 2)
+        x, y = fields.number_list(item, 2)
     else:
-        point = fields.mapping(item)
+        point = fields.require_object(item)
         if "x" not in point or "y" not in point:
             raise ValueError("has a point without x or y")
         x, y = point["x"], point["y"]
-    return fields.pixel(x), fields.pixel(y)
+    return fields.pixel_coordinate(x), fields.pixel_coordinate(y)
 
 
-def _marking(name: str, path: str, report: Report) -> str | None:
+def _read_marking_name(name: str, path: str, report: Report) -> str | None:
     """The marking of that name; None (reported unless the format knows it) for any other."""
     found = marking_like(name)
     if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
@@ -301,32 +309,32 @@ def read_sn_calibration(
             return
         names = tree.names()
         infos = read_match_info(tree, names, report)
-        places = _places(infos)
-        ours = OwnExport(places, _sizes(places), own_sizes=True)
+        places = _original_frame_paths(infos)
+        ours = OwnExportInfo(places, _sizes_by_folder(places), own_sizes=True)
         unused = dict.fromkeys(infos)
-        for file in line_files_of(tree, names, size, report, ours):
+        for file in read_line_files_of_tree(tree, names, size, report, ours):
             unused.pop(file.place, None)
-            yield _group(file, infos.get(file.place, {}), calibration)
+            yield _make_group(file, infos.get(file.place, {}), calibration)
         if unused:
             count = plural(len(unused), "image")
             shown = ", ".join(list(unused)[:5]) + (", ..." if len(unused) > 5 else "")
             report.remark(f"{count} of match_info.json without a file of lines: {shown}")
 
 
-def _group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:
+def _make_group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:
     info = {name: value for name, value in record.items() if name != PLACE}
     station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
     extras = Extras(lines=file.others, metadata={METADATA: info} if info else {})
     view = View(file.stem, station, media=file.media, extras=extras)
-    match, folders = match_of(info), PurePosixPath(file.place).parts[:-1]
-    splits = (_split(folder) for folder in reversed(folders))
+    match, folders = match_of_record(info), PurePosixPath(file.place).parts[:-1]
+    splits = (_split_of_folder(folder) for folder in reversed(folders))
     split = next((split for split in splits if split), "")
     name = PurePosixPath(file.stem).name
     label = f"{PurePosixPath(match).name} · frame {name}" if match else f"Frame {file.stem}"
     return Group(file.stem, (view,), match=match, split=split, label=label)
 
 
-def _split(folder: str) -> str:
+def _split_of_folder(folder: str) -> str:
     """The split that a folder says, or nothing."""
     named = split_and_size(folder)
     return named[0] if named else folder if folder in SPLITS else ""

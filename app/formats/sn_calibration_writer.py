@@ -9,22 +9,22 @@ from typing import Any
 from app.errors import InputError
 from app.finite import json_text
 from app.formats import fields
-from app.formats.cameras_writer import camera_name, camera_owner, camera_text
-from app.formats.export_names import folded
+from app.formats.cameras_writer import camera_file_name, camera_file_text, camera_owner
+from app.formats.export_names import fold_file_name
 from app.formats.export_record import ExportRecord
 from app.formats.fields import exact_inverse
-from app.formats.frame_names import view_place
-from app.formats.match_info import PLACE, MatchInfoWriter, record_of
+from app.formats.frame_names import view_file_path
+from app.formats.match_info import PLACE, MatchInfoWriter, match_info_of_view
 from app.formats.sn_calibration import (
     CAMERAS,
     LARGEST_UNIT,
     LINES,
     LineFile,
-    flat_name,
-    spelling,
-    split_folder_of,
+    flat_frame_name,
+    soccernet_marking_name,
+    split_folder_name,
 )
-from app.formats.view_files import PutText, put_on_disk, write_below
+from app.formats.view_files import PutText, write_file_below, write_to_disk
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 
@@ -42,8 +42,8 @@ def lines_to_json(
     it would be taken for one. Not every pixel has a normalised number that gives it back to the
     last bit; numbers that came normalised have one.
     """
-    flat = [_flat(line) for line in others]
-    points = {spelling(marking): list(line) for marking, line in lines.items()}
+    flat = [_flat_coordinates(line) for line in others]
+    points = {soccernet_marking_name(marking): list(line) for marking, line in lines.items()}
     for line, numbers in zip(others, flat, strict=True):
         extra = [ImagePoint(x, y) for x, y in zip(numbers[::2], numbers[1::2], strict=False)]
         points.setdefault(str(line.get("class")), []).extend(extra)
@@ -56,8 +56,10 @@ def lines_to_json(
     return {
         name: [
             {
-                "x": unit if (unit := x / across) * across == x else _unit(x, across),
-                "y": unit if (unit := y / down) * down == y else _unit(y, down),
+                "x": unit
+                if (unit := x / across) * across == x
+                else _normalized_coordinate(x, across),
+                "y": unit if (unit := y / down) * down == y else _normalized_coordinate(y, down),
             }
             for x, y in line
         ]
@@ -65,7 +67,7 @@ def lines_to_json(
     }
 
 
-def _unit(pixel: float, extent: int) -> float:
+def _normalized_coordinate(pixel: float, extent: int) -> float:
     """The normalised number that is read as this pixel, where the nearest one is not."""
     return exact_inverse(pixel / extent, pixel, lambda unit: unit * extent)
 
@@ -81,7 +83,7 @@ def line_file_text(
     return json_text(lines_to_json(lines, size, others, pixels=pixels), ascii_=True) + "\n"
 
 
-def _flat(line: Mapping[str, Any]) -> list[float]:
+def _flat_coordinates(line: Mapping[str, Any]) -> list[float]:
     """Coordinates of a line that is no marking; none where they are not all numbers."""
     points = line.get("points")
     try:
@@ -97,7 +99,9 @@ def write_line_files(root: Path, files: Iterable[LineFile]) -> list[Path]:
         UnsafePathError: A stem that would leave the folder.
     """
     return [
-        write_below(root, f"{file.stem}.json", line_file_text(file.lines, file.size, file.others))
+        write_file_below(
+            root, f"{file.stem}.json", line_file_text(file.lines, file.size, file.others)
+        )
         for file in files
     ]
 
@@ -124,32 +128,32 @@ def write_sn_calibration(
         UnsafePathError: A key would leave ``root``.
     """
     counts = {"groups": 0, "frames": 0, "cameras": 0}
-    names, with_camera = _Names(), set[str]()
-    put = put or put_on_disk(root)
+    names, with_camera = _FrameNames(), set[str]()
+    put = put or write_to_disk(root)
     with MatchInfoWriter(root) as info:
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                place = view_place(record.group, record.named(view))
+                place = view_file_path(record.group, record.named(view))
                 camera = record.camera(view)
                 # A static camera that many groups share is written once.
                 known = place in names.of_place
                 owner = camera_owner(record.group, view)
-                name = names.of(place, record.split(view), view.size, owner)
+                name = names.name_frame(place, record.split(view), view.size, owner)
                 if not known:
                     lines, others = view.station.lines, view.extras.lines
                     put(f"{LINES}/{name}.json", line_file_text(lines, view.size, others))
-                    origin = {**record_of(record.group, view), PLACE: place}
+                    origin = {**match_info_of_view(record.group, view), PLACE: place}
                     info.add(f"{LINES}/{name}.jpg", origin)
                     counts["frames"] += 1
                 if camera is not None and name not in with_camera:
-                    text = camera_text(camera, record.covariance(view), view.size)
-                    put(camera_name(f"{CAMERAS}/{name}"), text)
+                    text = camera_file_text(camera, record.covariance(view), view.size)
+                    put(camera_file_name(f"{CAMERAS}/{name}"), text)
                     with_camera.add(name)
     return counts | {"cameras": len(with_camera)}
 
 
-class _Names:
+class _FrameNames:
     """Folder and name of each frame, by its place."""
 
     def __init__(self) -> None:
@@ -157,7 +161,7 @@ class _Names:
         self._place_of: dict[str, str] = {}
         self._owners: dict[str, tuple[str, ...]] = {}
 
-    def of(self, place: str, split: str, size: ImageSize, owner: tuple[str, ...]) -> str:
+    def name_frame(self, place: str, split: str, size: ImageSize, owner: tuple[str, ...]) -> str:
         """The name of a frame; that of a static camera stays what it was at first.
 
         Raises:
@@ -169,8 +173,8 @@ class _Names:
             raise InputError(f"two frames ({whose}) would both be called {place}")
         if place in self.of_place:
             return self.of_place[place]
-        name = f"{split_folder_of(split, size)}/{flat_name(place, split)}"
-        other = self._place_of.setdefault(folded(name), place)
+        name = f"{split_folder_name(split, size)}/{flat_frame_name(place, split)}"
+        other = self._place_of.setdefault(fold_file_name(name), place)
         if other != place:
             raise InputError(f"the frames {other} and {place} would both be called {name}")
         self.of_place[place] = name

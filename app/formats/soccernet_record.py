@@ -11,7 +11,7 @@ from app.formats import fields
 from app.formats.ball_names import is_ball
 from app.formats.fields import exact_inverse
 from app.formats.report import Report
-from app.formats.sn_calibration import spelling
+from app.formats.sn_calibration import soccernet_marking_name
 from app.soccer.annotation import CORNERS, BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import View
@@ -42,7 +42,7 @@ class ImageRecord:
 
 
 @dataclass
-class _Builder:
+class _RecordBuilder:
     """Collects one record; what is unsound is reported and kept for the way back."""
 
     path: str
@@ -54,7 +54,7 @@ class _Builder:
     boxes: list[Mapping[str, Any]] = field(default_factory=list)
     other_lines: list[Mapping[str, Any]] = field(default_factory=list)
 
-    def note(self, where: str, problem: str) -> None:
+    def report_problem(self, where: str, problem: str) -> None:
         self.report.note(self.path, self.record, where, problem)
 
 
@@ -72,18 +72,23 @@ def record_from_json(value: Any, path: str, record: str, report: Report) -> Imag
     metadata = value.get(IMAGE)
     if not isinstance(metadata, dict):
         raise DatasetFormatError(path, record, IMAGE, "is missing or not an object")
-    size = _size(metadata, path, record)
-    builder = _Builder(path, record, report)
-    for index, item in enumerate(_list(value, "bboxes", builder)):
+    size = _read_image_size(metadata, path, record)
+    builder = _RecordBuilder(path, record, report)
+    for index, item in enumerate(_read_list(value, "bboxes", builder)):
         _add_box(item, f"bboxes[{index}]", builder)
-    for index, item in enumerate(_list(value, "lines", builder)):
+    for index, item in enumerate(_read_list(value, "lines", builder)):
         _add_line(item, f"lines[{index}]", builder)
     return ImageRecord(
-        size, make_lines(builder.lines), tuple(builder.balls), _extras(value, metadata, builder)
+        size,
+        make_lines(builder.lines),
+        tuple(builder.balls),
+        _collect_extras(value, metadata, builder),
     )
 
 
-def _extras(value: Mapping[str, Any], metadata: Mapping[str, Any], builder: _Builder) -> Extras:
+def _collect_extras(
+    value: Mapping[str, Any], metadata: Mapping[str, Any], builder: _RecordBuilder
+) -> Extras:
     kept: dict[str, Any] = {IMAGE: dict(metadata)}
     rest = {name: item for name, item in value.items() if name not in _OURS}
     if rest:
@@ -93,14 +98,14 @@ def _extras(value: Mapping[str, Any], metadata: Mapping[str, Any], builder: _Bui
     return Extras(tuple(builder.boxes), tuple(builder.other_lines), kept)
 
 
-def _size(metadata: Mapping[str, Any], path: str, record: str) -> ImageSize:
+def _read_image_size(metadata: Mapping[str, Any], path: str, record: str) -> ImageSize:
     sides = []
     for name in ("width", "height"):
         where = f"{IMAGE}.{name}"
         if name not in metadata:
             raise DatasetFormatError(path, record, where, "is missing")
         try:
-            side = fields.whole(metadata[name])
+            side = fields.whole_number(metadata[name])
         except ValueError as error:
             raise DatasetFormatError(path, record, where, str(error)) from error
         if not 2 <= side <= MAX_SIDE:
@@ -109,30 +114,30 @@ def _size(metadata: Mapping[str, Any], path: str, record: str) -> ImageSize:
     return ImageSize(*sides)
 
 
-def _list(value: Mapping[str, Any], name: str, builder: _Builder) -> list[Any]:
+def _read_list(value: Mapping[str, Any], name: str, builder: _RecordBuilder) -> list[Any]:
     if value.get(name) is None:
         return []
     try:
-        return fields.sequence(value[name])
+        return fields.require_list(value[name])
     except ValueError as error:
-        builder.note(name, str(error))
+        builder.report_problem(name, str(error))
         return []
 
 
-def _add_box(item: Any, where: str, builder: _Builder) -> None:
+def _add_box(item: Any, where: str, builder: _RecordBuilder) -> None:
     if not isinstance(item, dict):
-        builder.note(where, "is not an object")
+        builder.report_problem(where, "is not an object")
         return
     name = item.get("class")
     if name is not None and not isinstance(name, str):
-        builder.note(f"{where}.class", "is neither text nor null")
+        builder.report_problem(f"{where}.class", "is neither text nor null")
     if not isinstance(name, str) or not is_ball(name):
         builder.boxes.append(item)
         return
     try:
-        builder.balls.append(_ball(item))
+        builder.balls.append(_ball_from_box(item))
     except ValueError as error:
-        builder.note(f"{where}.points", str(error))
+        builder.report_problem(f"{where}.points", str(error))
         builder.boxes.append(item)
         return
     known = ("class", "points", "occluded")
@@ -140,13 +145,13 @@ def _add_box(item: Any, where: str, builder: _Builder) -> None:
     builder.ball_fields.append({} if rest == {"ID": None} else rest)
 
 
-def _ball(item: Mapping[str, Any]) -> BallAnnotation:
+def _ball_from_box(item: Mapping[str, Any]) -> BallAnnotation:
     """The ball of a box; corners in any order; a box without area is its centre alone."""
-    points = fields.mapping(item.get("points"))
+    points = fields.require_object(item.get("points"))
     missing = [corner for corner in CORNERS if corner not in points]
     if missing:
         raise ValueError(f"has no {missing[0]}")
-    x1, y1, x2, y2 = (fields.pixel(points[corner]) for corner in CORNERS)
+    x1, y1, x2, y2 = (fields.pixel_coordinate(points[corner]) for corner in CORNERS)
     box = Box(min(x1, x2), min(y1, y2), abs(x2 - x1), abs(y2 - y1))
     occluded = item.get("occluded") is True
     if box.width == 0 or box.height == 0:
@@ -154,31 +159,33 @@ def _ball(item: Mapping[str, Any]) -> BallAnnotation:
     return BallAnnotation(box=box, occluded=occluded)
 
 
-def _add_line(item: Any, where: str, builder: _Builder) -> None:
+def _add_line(item: Any, where: str, builder: _RecordBuilder) -> None:
     if not isinstance(item, dict):
-        builder.note(where, "is not an object")
+        builder.report_problem(where, "is not an object")
         return
     name = item.get("class")
     try:
         marking = canonical_marking(name) if isinstance(name, str) else None
         if name is not None and marking is None:
-            builder.note(f"{where}.class", "is neither text nor null; kept without geometry")
-        points = _line_points(item.get("points")) if marking else []
+            builder.report_problem(
+                f"{where}.class", "is neither text nor null; kept without geometry"
+            )
+        points = _pair_coordinates(item.get("points")) if marking else []
     except UnknownMarkingError as error:
         marking, points = None, []
         if error.marking.strip() not in WITHOUT_GEOMETRY:
-            builder.note(f"{where}.class", f"{error.message}; kept without geometry")
+            builder.report_problem(f"{where}.class", f"{error.message}; kept without geometry")
     except ValueError as error:
         marking, points = None, []
-        builder.note(f"{where}.points", f"{error}; kept without geometry")
+        builder.report_problem(f"{where}.points", f"{error}; kept without geometry")
     if marking is None:
         builder.other_lines.append(item)
     elif points:
         builder.lines.setdefault(marking, []).extend(points)
 
 
-def _line_points(value: Any) -> list[ImagePoint]:
-    flat = [fields.pixel(item) for item in fields.sequence(value)]
+def _pair_coordinates(value: Any) -> list[ImagePoint]:
+    flat = [fields.pixel_coordinate(item) for item in fields.require_list(value)]
     if len(flat) % 2:
         raise ValueError(f"has {len(flat)} numbers, which make no pairs of x and y")
     return [ImagePoint(x, y) for x, y in zip(flat[::2], flat[1::2], strict=True)]
@@ -190,11 +197,11 @@ def record_to_json(view: View, split: str = "") -> dict[str, Any]:
     metadata = _image_metadata(kept)
     for name, side in (("width", view.size.width), ("height", view.size.height)):
         # The source's own spelling of the same number ("1280") stays.
-        metadata[name] = metadata[name] if _same(metadata.get(name), side) else side
+        metadata[name] = metadata[name] if _is_same_length(metadata.get(name), side) else side
     if split:
         metadata["set"] = split
     lines = [
-        {"class": spelling(marking), "points": [c for point in points for c in point]}
+        {"class": soccernet_marking_name(marking), "points": [c for point in points for c in point]}
         for marking, points in view.station.lines.items()
     ]
     return {
@@ -212,9 +219,9 @@ def _image_metadata(kept: Mapping[str, Any]) -> dict[str, Any]:
     return {name: item for name, item in kept.items() if name not in OTHERS}
 
 
-def _same(value: Any, side: int) -> bool:
+def _is_same_length(value: Any, side: int) -> bool:
     try:
-        return fields.whole(value) == side
+        return fields.whole_number(value) == side
     except ValueError:
         return False
 
@@ -223,7 +230,7 @@ def _balls_to_json(view: View) -> list[dict[str, Any]]:
     rest = view.extras.metadata.get(BALLS) or []
     written = []
     for index, ball in enumerate(view.balls):
-        points = _corners(ball)
+        points = _ball_corners(ball)
         if points is None:
             continue
         value: dict[str, Any] = {"class": BALL, "ID": None}
@@ -233,7 +240,7 @@ def _balls_to_json(view: View) -> list[dict[str, Any]]:
     return written
 
 
-def _corners(ball: BallAnnotation) -> dict[str, float] | None:
+def _ball_corners(ball: BallAnnotation) -> dict[str, float] | None:
     """Corners of the box; a centre alone is a box without area; None out of view."""
     if ball.out_of_view or ball.center is None:
         return None

@@ -12,7 +12,7 @@ from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_
 from app.formats.json_text import read_json
 from app.formats.match_frames import MatchFrames
 from app.formats.report import Report
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_record import GAME, IMAGE, REST, ImageRecord, record_from_json
 from app.formats.soccernet_v3 import (
     IMAGE_LISTS,
@@ -71,7 +71,7 @@ class MatchReader:
         """The groups of the labels in one folder (``""``, or with a slash at its end)."""
         path = self.tree.shown(folder + self.file)
         try:
-            labels = self._labels(folder, path)
+            labels = self._read_labels(folder, path)
             match = _match_key(self.tree.path, folder, labels.get(GAME))
             if match in self.seen:
                 problem = f"is a second file of match {match}; {self.seen[match]} is used"
@@ -82,9 +82,9 @@ class MatchReader:
         self.seen[match] = path
         inside = files_inside(self.names, folder)
         frames = MatchFrames(self.tree, folder, inside, self.report)
-        yield from _Match(match, labels, path, frames, self.report).groups()
+        yield from _MatchLabels(match, labels, path, frames, self.report).groups()
 
-    def _labels(self, folder: str, path: str) -> dict[str, Any]:
+    def _read_labels(self, folder: str, path: str) -> dict[str, Any]:
         content = self.tree.read_bytes(folder + self.file)
         limit = self.limits.file_bytes
         labels = read_json(content, path, double_encoded=True, max_bytes=limit, report=self.report)
@@ -99,46 +99,48 @@ def _match_key(root: Root, folder: str, game: Any) -> str:
     if len(parts) >= MATCH_DEPTH:
         return "/".join(parts[-MATCH_DEPTH:])
     local = game.get("UrlLocal") if isinstance(game, dict) else None
-    if isinstance(local, str) and len(_parts(local)) == MATCH_DEPTH:
-        return "/".join(_parts(local))
+    if isinstance(local, str) and len(_safe_path_parts(local)) == MATCH_DEPTH:
+        return "/".join(_safe_path_parts(local))
     whole = (*root.resolve().parts[1:], *parts) if root.is_dir() else parts
     return "/".join(whole[-MATCH_DEPTH:]) or root.stem
 
 
-def _parts(local: str) -> tuple[str, ...]:
+def _safe_path_parts(local: str) -> tuple[str, ...]:
     try:
-        return PurePosixPath(check_name(local.strip().strip("/"))).parts
+        return PurePosixPath(require_safe_path(local.strip().strip("/"))).parts
     except UnsafePathError:
         return ()
 
 
-class _Match:
+class _MatchLabels:
     """One Labels-v3.json on its way to groups."""
 
     def __init__(
         self, key: str, labels: dict[str, Any], path: str, frames: MatchFrames, report: Report
     ):
         self.key, self.path, self.frames, self.report = key, path, frames, report
-        self.actions = self._images(labels, "actions")
-        self.replays = self._images(labels, "replays")
-        self.game = self._game(labels)
+        self.actions = self._image_records(labels, "actions")
+        self.replays = self._image_records(labels, "replays")
+        self.game = self._game_fields(labels)
         self.missing: list[str] = []
 
-    def _images(self, labels: dict[str, Any], name: str) -> dict[str, Any]:
+    def _image_records(self, labels: dict[str, Any], name: str) -> dict[str, Any]:
         """The records by image name; what is no such mapping is reported and empty."""
         value = labels.get(name, {} if name == "replays" else None)
         if not isinstance(value, dict):
-            self.note(None, name, "is missing or not an object")
+            self.report_problem(None, name, "is missing or not an object")
             return {}
         sound = {}
         for image, record in value.items():
             if IMAGE_NAME.fullmatch(image):
                 sound[image] = record
             else:
-                self.note(image[:80], None, "is not an image name such as 7.png or 7_1.png")
+                self.report_problem(
+                    image[:80], None, "is not an image name such as 7.png or 7_1.png"
+                )
         return sound
 
-    def _game(self, labels: dict[str, Any]) -> dict[str, Any]:
+    def _game_fields(self, labels: dict[str, Any]) -> dict[str, Any]:
         """What else the file says about the game; the lists are made anew when it is written."""
         game = labels.get(GAME)
         rest = {k: v for k, v in labels.items() if k not in (GAME, "actions", "replays")}
@@ -148,39 +150,41 @@ class _Match:
             else {}
         )
         if game is not None and not isinstance(game, dict):
-            self.note(None, GAME, "is not an object")
+            self.report_problem(None, GAME, "is not an object")
         return {GAME: kept} | ({REST: rest} if rest else {})
 
-    def note(self, record: str | None, where: str | None, problem: str) -> None:
+    def report_problem(self, record: str | None, where: str | None, problem: str) -> None:
         self.report.note(self.path, record, where, problem)
 
     def groups(self) -> Iterator[Group]:
-        links = self._links()
+        links = self._replays_by_action()
         for action, record in self.actions.items():
             self.report.read += 1
-            group = self._group(action, record, links[action])
+            group = self._make_group(action, record, links[action])
             if group is not None:
                 self.report.imported += 1
                 yield group
         self._note_missing_frames()
 
-    def _links(self) -> dict[str, list[str]]:
+    def _replays_by_action(self) -> dict[str, list[str]]:
         """Replays of each action, in the file's order; each replay once."""
         links: dict[str, list[str]] = {action: [] for action in self.actions}
         owner: dict[str, str] = {}
         for action, record in self.actions.items():
             for replay in self._linked_replays(action, record):
                 if replay not in self.replays:
-                    self.note(action, "linked_replays", f"names {replay}, which is not there")
+                    self.report_problem(
+                        action, "linked_replays", f"names {replay}, which is not there"
+                    )
                 elif replay in owner:
                     where = f"names {replay}, which already belongs to {owner[replay]}"
-                    self.note(action, "linked_replays", where)
+                    self.report_problem(action, "linked_replays", where)
                 else:
                     owner[replay] = action
                     links[action].append(replay)
         for replay, record in self.replays.items():
             if replay not in owner:
-                self._adopt(replay, record, links)
+                self._link_unlisted_replay(replay, record, links)
         return links
 
     def _linked_replays(self, action: str, record: Any) -> list[str]:
@@ -189,46 +193,48 @@ class _Match:
             return []
         names = [item for item in value if isinstance(item, str)] if isinstance(value, list) else []
         if not isinstance(value, list) or len(names) < len(value):
-            self.note(action, "linked_replays", "is not a list of image names")
+            self.report_problem(action, "linked_replays", "is not a list of image names")
         return [name[:80] for name in names]
 
-    def _adopt(self, replay: str, record: Any, links: dict[str, list[str]]) -> None:
+    def _link_unlisted_replay(self, replay: str, record: Any, links: dict[str, list[str]]) -> None:
         """A replay that no action lists still says itself which action it shows."""
         action = record.get("linked_action") if isinstance(record, dict) else None
         if isinstance(action, str) and action in links:
             links[action].append(replay)
         elif isinstance(action, str):
-            self.note(replay, "linked_action", f"names {action[:80]}, which is not there")
+            self.report_problem(replay, "linked_action", f"names {action[:80]}, which is not there")
         else:
-            self.note(replay, "linked_action", "is missing, and no action links this replay")
+            self.report_problem(
+                replay, "linked_action", "is missing, and no action links this replay"
+            )
 
-    def _group(self, action: str, value: Any, replays: list[str]) -> Group | None:
-        main = self._record(action, value)
+    def _make_group(self, action: str, value: Any, replays: list[str]) -> Group | None:
+        main = self._read_record(action, value)
         if main is None:
             return None
         main.extras = replace(main.extras, metadata={**main.extras.metadata, **self.game})
-        others = [(replay, self._record(replay, self.replays[replay])) for replay in replays]
-        views = [self._view(action, main)]
-        views += [self._view(name, record) for name, record in others if record is not None]
+        others = [(replay, self._read_record(replay, self.replays[replay])) for replay in replays]
+        views = [self._make_view(action, main)]
+        views += [self._make_view(name, record) for name, record in others if record is not None]
         metadata = main.extras.metadata[IMAGE]
         return Group(
             key=f"{self.key}/{action}",
             views=tuple(views),
             match=self.key,
-            split=_split(metadata.get("set")),
+            split=_read_split(metadata.get("set")),
             label=group_label(self.key, action, metadata),
         )
 
-    def _record(self, image: str, value: Any) -> ImageRecord | None:
+    def _read_record(self, image: str, value: Any) -> ImageRecord | None:
         try:
             return record_from_json(value, self.path, image, self.report)
         except DatasetFormatError as error:
             self.report.skip(error)
             return None
 
-    def _view(self, image: str, record: ImageRecord) -> View:
+    def _make_view(self, image: str, record: ImageRecord) -> View:
         station = Station(f"{self.key}/{image}", record.size, lines=record.lines)
-        media = self.frames.find(image)
+        media = self.frames.find_frame(image)
         if media is None:
             self.report.counts["views without frame"] += 1
             self.missing.append(image)
@@ -236,11 +242,11 @@ class _Match:
 
     def _note_missing_frames(self) -> None:
         """One sentence a match; labels without any frames are a legitimate dataset."""
-        if self.missing and self.frames.some:
+        if self.missing and self.frames.has_frames:
             shown = ", ".join(self.missing[:5]) + (", ..." if len(self.missing) > 5 else "")
             images = plural(len(self.missing), "image has", "images have")
-            self.note(None, None, f"{images} no frame: {shown}")
+            self.report_problem(None, None, f"{images} no frame: {shown}")
 
 
-def _split(value: Any) -> str:
+def _read_split(value: Any) -> str:
     return value if isinstance(value, str) and value in SPLITS else ""

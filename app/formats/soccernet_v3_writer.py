@@ -11,8 +11,8 @@ from typing import Any
 
 from app.errors import InputError
 from app.finite import json_text
-from app.formats.export_names import folded
-from app.formats.frame_names import match_frame
+from app.formats.export_names import fold_file_name
+from app.formats.frame_names import frame_path_by_match
 from app.formats.safe_path import resolve_inside
 from app.formats.soccernet_record import GAME, REST, record_to_json
 from app.formats.soccernet_v3 import JOINED_LISTS, LABELS, MATCH_DEPTH, image_numbers
@@ -36,10 +36,10 @@ def split_key(group: Group) -> tuple[str, str, str]:
     return parts[0], parts[1], parts[2]
 
 
-def labels_frame(group: Group, view: View, split: str, suffix: str) -> str:
+def labels_frame_path(group: Group, view: View, split: str, suffix: str) -> str:
     """Where the frame of a view lies in an export: beside the labels of the group's match."""
     beside = replace(group, match="/".join(split_key(group)))
-    return match_frame(
+    return frame_path_by_match(
         beside, replace(view, station=replace(view.station, shared=False)), split, suffix
     )
 
@@ -63,7 +63,7 @@ def write_soccernet_v3(root: Path, groups: Iterable[Group]) -> list[Path]:
     writer = LabelsWriter(root, LABELS)
     for match, run in groupby(groups, key=lambda group: "/".join(split_key(group))):
         members = list(run)
-        writer.require_free(match, members)
+        writer.reserve_images(match, members)
         writer.write(match, labels_to_json(match, members))
     return list(writer.written)
 
@@ -77,13 +77,13 @@ class LabelsWriter:
         self._matches: dict[str, str] = {}
         self._images: dict[tuple[str, object], str] = {}
 
-    def require_free(self, match: str, groups: Iterable[Group]) -> None:
+    def reserve_images(self, match: str, groups: Iterable[Group]) -> None:
         """Keep the images of groups of a match, of which the format has one by each number.
 
         Raises:
             InputError: An image of another group, or another match, has the same name.
         """
-        other = self._matches.setdefault(folded(match), match)
+        other = self._matches.setdefault(fold_file_name(match), match)
         if other != match:
             raise InputError(f"the matches {other} and {match} differ in case only; rename one")
         for group in groups:
@@ -101,7 +101,7 @@ class LabelsWriter:
         """Write (or add to) the file of a match."""
         path = resolve_inside(self._root, f"{match}/{self._name}")
         if path in self.written:
-            labels = _joined(json.loads(path.read_text(encoding="utf-8")), labels)
+            labels = _join_labels(json.loads(path.read_text(encoding="utf-8")), labels)
         path.parent.mkdir(parents=True, exist_ok=True)
         # Without indentation: with it, writing would take ten times as long.
         text = json_text(labels)
@@ -109,7 +109,7 @@ class LabelsWriter:
         self.written[path] = None
 
 
-def _joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+def _join_labels(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
     game = {**first[GAME]}
     for name, value in second[GAME].items():
         joins = isinstance(value, list) and isinstance(game.get(name), list)

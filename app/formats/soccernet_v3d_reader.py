@@ -11,12 +11,12 @@ from app.errors import DatasetFormatError, UnsafePathError
 from app.finite import quoted
 from app.formats import fields
 from app.formats.camera_json import camera_from_json
-from app.formats.csv_text import is_missing, numbers_in, read_rows
+from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.formats.json_text import parse_literal
 from app.formats.match_frames import MatchFrames
 from app.formats.report import Report
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_record import GAME, IMAGE
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
 from app.formats.soccernet_v3 import SPLIT_FILES, TABLE, group_label
@@ -60,7 +60,7 @@ class TableRow:
         return f"{self.action}.png" if self.replay is None else f"{self.action}_{self.replay}.png"
 
     @property
-    def main(self) -> str:
+    def action_image(self) -> str:
         """Name of the action's image."""
         return f"{self.action}.png"
 
@@ -87,7 +87,7 @@ class SnTable:
         rows = self.rows.get(match, {}).get(main, {}).values()
         return next((row.split for row in rows if row.split), "")
 
-    def unused(self) -> list[str]:
+    def unused_split_entries(self) -> list[str]:
         """Actions of the split lists that no group is; replays are listed with their action."""
         known = {(match, stem.partition("_")[0]) for match, stem in self.asked}
         entries = ((match, stem.partition("_")[0]) for match, stem in self.lists)
@@ -114,7 +114,7 @@ def read_snv3d_table(tree: FileTree, names: list[str], report: Report, limits: L
         _read_table(tree, tables[0], rows, report, limits)
     except DatasetFormatError as error:
         report.skip(error)
-    return SnTable(folder, rows, _read_lists(tree, names, folder, report))
+    return SnTable(folder, rows, _read_split_lists(tree, names, folder, report))
 
 
 def _read_table(
@@ -127,89 +127,89 @@ def _read_table(
     shown = tree.shown(name)
     for line, cells in read_rows(tree.read_bytes(name), shown, REQUIRED, limits):
         try:
-            row = _Cells(cells, shown, f"line {line}", report).row()
+            row = _RowCells(cells, shown, f"line {line}", report).to_table_row()
         except DatasetFormatError as error:
             report.skip(error)
             continue
-        views = rows.setdefault(row.match, {}).setdefault(row.main, {})
+        views = rows.setdefault(row.match, {}).setdefault(row.action_image, {})
         if row.image in views:
             report.note(shown, f"line {line}", None, f"is a second row of {row.image}")
         views.setdefault(row.image, row)
 
 
-class _Cells:
+class _RowCells:
     """The cells of one row."""
 
     def __init__(self, cells: Mapping[str, str], path: str, line: str, report: Report):
         self._cells, self._path, self._line, self._report = cells, path, line, report
 
-    def row(self) -> TableRow:
+    def to_table_row(self) -> TableRow:
         """The row; raises DatasetFormatError where it does not say which image it is of."""
-        action, replay = self._whole("main_action"), None
-        if not self._flag("action"):
-            replay = self._whole("replay")
+        action, replay = self._whole_number("main_action"), None
+        if not self._truth_value("action"):
+            replay = self._whole_number("replay")
         return TableRow(
-            match="/".join(map(self._folder, ("league", "season", "match"))),
+            match="/".join(map(self._folder_name, ("league", "season", "match"))),
             action=action,
             replay=replay,
-            size=ImageSize(self._side("img_w"), self._side("img_h")),
-            ball=self._ball(),
-            camera=self._camera(),
-            split=self._optional("set"),
+            size=ImageSize(self._side_length("img_w"), self._side_length("img_h")),
+            ball=self._ball_annotation(),
+            camera=self._given_camera(),
+            split=self._optional_text("set"),
         )
 
-    def _optional(self, name: str) -> str:
+    def _optional_text(self, name: str) -> str:
         text = self._cells.get(name)
         return "" if text is None or is_missing(text) else text.strip()
 
-    def _error(self, name: str, problem: str) -> DatasetFormatError:
+    def _cell_error(self, name: str, problem: str) -> DatasetFormatError:
         return DatasetFormatError(self._path, self._line, name, problem)
 
-    def _folder(self, name: str) -> str:
+    def _folder_name(self, name: str) -> str:
         text = self._cells.get(name, "")
         try:
-            if "/" in check_name(text) or text.strip() in ("", "."):
-                raise self._error(name, "is not the name of a folder")
+            if "/" in require_safe_path(text) or text.strip() in ("", "."):
+                raise self._cell_error(name, "is not the name of a folder")
         except UnsafePathError as error:
-            raise self._error(name, error.message) from error
+            raise self._cell_error(name, error.message) from error
         return text
 
-    def _whole(self, name: str) -> int:
+    def _whole_number(self, name: str) -> int:
         try:
-            number = fields.whole(self._cells.get(name, ""))
+            number = fields.whole_number(self._cells.get(name, ""))
         except ValueError as error:
-            raise self._error(name, str(error)) from error
+            raise self._cell_error(name, str(error)) from error
         if number < 0:
-            raise self._error(name, "is negative")
+            raise self._cell_error(name, "is negative")
         return number
 
-    def _side(self, name: str) -> int:
-        side = self._whole(name)
+    def _side_length(self, name: str) -> int:
+        side = self._whole_number(name)
         if not 2 <= side <= MAX_SIDE:
-            raise self._error(name, f"is {side} pixels")
+            raise self._cell_error(name, f"is {side} pixels")
         return side
 
-    def _flag(self, name: str) -> bool:
+    def _truth_value(self, name: str) -> bool:
         text = self._cells.get(name, "").strip().lower()
         if text not in (*_TRUE, *_FALSE):
-            raise self._error(name, f"is {quoted(text, 20)}, neither True nor False")
+            raise self._cell_error(name, f"is {quoted(text, 20)}, neither True nor False")
         return text in _TRUE
 
-    def _ball(self) -> BallAnnotation | None:
-        text = self._optional("ball_bbox")
+    def _ball_annotation(self) -> BallAnnotation | None:
+        text = self._optional_text("ball_bbox")
         if not text:
             return None
         try:
-            x, y, width, height = map(fields.pixel, numbers_in(text, 4))
+            x, y, width, height = map(fields.pixel_coordinate, parse_number_list(text, 4))
             if width <= 0 or height <= 0:
                 raise ValueError("is a box without area")
         except ValueError as error:
-            self._report.skip(self._error("ball_bbox", f"{error}; left out"))
+            self._report.skip(self._cell_error("ball_bbox", f"{error}; left out"))
             return None
         return BallAnnotation(box=Box(x, y, width, height))
 
-    def _camera(self) -> Camera | None:
-        text = self._optional("calibration")
+    def _given_camera(self) -> Camera | None:
+        text = self._optional_text("calibration")
         if not text:
             return None
         try:
@@ -217,11 +217,11 @@ class _Cells:
             return camera_from_json(value, self._path, self._line)
         except DatasetFormatError as error:
             where = f"calibration, {error.field}" if error.field else "calibration"
-            self._report.skip(self._error(where, f"{error.problem}; left out"))
+            self._report.skip(self._cell_error(where, f"{error.problem}; left out"))
             return None
 
 
-def _read_lists(
+def _read_split_lists(
     tree: FileTree, names: list[str], folder: str, report: Report
 ) -> dict[tuple[str, str], str]:
     """Split by (match folder, stem of the image)."""
@@ -229,13 +229,13 @@ def _read_lists(
     for split, name in SPLIT_FILES.items():
         if folder + name in names:
             try:
-                _read_list(tree, folder + name, split, found, report)
+                _read_split_list(tree, folder + name, split, found, report)
             except DatasetFormatError as error:
                 report.skip(error)
     return found
 
 
-def _read_list(
+def _read_split_list(
     tree: FileTree,
     name: str,
     split: str,
@@ -290,44 +290,44 @@ def read_soccernet_v3d(
         folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
         if not folders and not table.rows:
             report.note(str(root), None, None, f"holds neither {LABELS} nor {TABLE}")
-        reader = _Reader(table, calibration, report)
+        reader = _DatasetReader(table, calibration, report)
         matches = MatchReader(tree, names, report, limits, LABELS)
         for folder in folders:
             for group in matches.read_match(folder):
-                yield reader.labelled(group, tree.shown(folder + LABELS))
-        yield from reader.tabled(tree, names, limits)
-        if unused := table.unused():
+                yield reader.add_table_to_group(group, tree.shown(folder + LABELS))
+        yield from reader.groups_in_table_only(tree, names, limits)
+        if unused := table.unused_split_entries():
             count = plural(len(unused), "action")
             shown = ", ".join(unused[:5]) + (", ..." if len(unused) > 5 else "")
             report.remark(f"{count} of the split lists did not come: {shown}")
 
 
-class _Reader:
+class _DatasetReader:
     """Brings labels and table together."""
 
     def __init__(self, table: SnTable, calibration: str, report: Report):
         self._table, self._calibration, self._report = table, calibration, report
         self._seen: set[tuple[str, str]] = set()
 
-    def labelled(self, group: Group, path: str) -> Group:
+    def add_table_to_group(self, group: Group, path: str) -> Group:
         """A group of Labels-v3D.json with its cameras, and what the table knows of it."""
         main = group.views[0].key
         self._seen.add((group.match, main))
         rows = self._table.rows.get(group.match, {}).get(main, {})
         for image in rows.keys() - {view.key for view in group.views}:
             self._report.note(path, image, None, f"is in {TABLE} and not here")
-        views = tuple(self._view(view, rows.get(view.key), path) for view in group.views)
+        views = tuple(self._add_row_to_view(view, rows.get(view.key), path) for view in group.views)
         split = self._table.split(group.match, main) or group.split
         return replace(group, views=views, split=split)
 
-    def _view(self, view: View, row: TableRow | None, path: str) -> View:
+    def _add_row_to_view(self, view: View, row: TableRow | None, path: str) -> View:
         metadata = dict(view.extras.metadata)
         image = metadata[IMAGE]
         metadata[IMAGE] = {name: item for name, item in image.items() if name not in COMPUTED}
         if GAME in metadata:
             kept = {k: v for k, v in metadata[GAME].items() if k != "reconstructions"}
             metadata[GAME] = kept
-        given = self._camera(image, view.key, path) or (row.camera if row else None)
+        given = self._released_camera(image, view.key, path) or (row.camera if row else None)
         station = replace(view.station, given=given, calibration=self._calibration)
         balls = view.balls
         # The labels may hold the optimised box; the table always has the annotated one.
@@ -337,7 +337,7 @@ class _Reader:
         extras = replace(view.extras, metadata=metadata)
         return replace(view, station=station, balls=balls, extras=extras)
 
-    def _camera(self, image: Mapping[str, Any], record: str, path: str) -> Any:
+    def _released_camera(self, image: Mapping[str, Any], record: str, path: str) -> Any:
         if image.get("calibration") is None:
             return None
         try:
@@ -347,7 +347,9 @@ class _Reader:
             self._report.note(path, record, where, f"{error.problem}; left out")
             return None
 
-    def tabled(self, tree: FileTree, names: list[str], limits: Limits) -> Iterator[Group]:
+    def groups_in_table_only(
+        self, tree: FileTree, names: list[str], limits: Limits
+    ) -> Iterator[Group]:
         """The groups that stand in the table alone: balls and cameras, no lines."""
         for match, actions in self._table.rows.items():
             new = [main for main in actions if (match, main) not in self._seen]
@@ -358,12 +360,12 @@ class _Reader:
             frames = MatchFrames(tree, folder, inside, self._report)
             for main in new:
                 self._report.read += 1
-                group = self._group(match, main, actions[main], frames)
+                group = self._group_of_rows(match, main, actions[main], frames)
                 if group is not None:
                     self._report.imported += 1
                     yield group
 
-    def _group(
+    def _group_of_rows(
         self, match: str, main: str, rows: Mapping[str, TableRow], frames: MatchFrames
     ) -> Group | None:
         if main not in rows:
@@ -377,7 +379,7 @@ class _Reader:
                 f"{match}/{row.image}", row.size, given=row.camera, calibration=self._calibration
             )
             balls = (row.ball,) if row.ball else ()
-            views.append(View(row.image, station, balls, frames.find(row.image)))
+            views.append(View(row.image, station, balls, frames.find_frame(row.image)))
         return Group(
             key=f"{match}/{main}",
             views=tuple(views),

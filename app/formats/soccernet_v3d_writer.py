@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 from app.finite import finite
 from app.formats.camera_json import camera_to_json
-from app.formats.csv_text import CsvTable, Value, plain_list
+from app.formats.csv_text import CsvTable, Value, list_text
 from app.formats.export_record import ExportRecord, chosen_box
 from app.formats.soccernet_record import GAME, IMAGE
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
@@ -85,8 +85,8 @@ def write_soccernet_v3d(
             for record in members:
                 _add_rows(table, lists, record, everything, counts)
             name = "/".join(match)
-            labels.require_free(name, (record.group for record in members))
-            labels.write(name, _labels(name, members, everything, boxes))
+            labels.reserve_images(name, (record.group for record in members))
+            labels.write(name, _match_labels(name, members, everything, boxes))
     return counts
 
 
@@ -102,14 +102,14 @@ def _add_rows(
     for view in record.group.views:
         fit = record.ball_fit(view, everything)
         verdict = (record.verdict_text,) if everything else ()
-        table.add((*_row(record, view, fit), *verdict))
+        table.add((*_row_values(record, view, fit), *verdict))
         counts["views"] += 1
         counts["balls"] += record.has_ball_3d(view)
         if record.split(view) in lists:
             lists[record.split(view)].write(f"{match}/{Path(view.key).stem}\n")
 
 
-def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
+def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
     numbers = image_numbers(view.key)
     assert numbers is not None, "split_key has checked it"
     action, replay = numbers
@@ -120,8 +120,8 @@ def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Valu
     yield from (view.size.width, view.size.height, view.ball is not None)
     yield box_text(box) if box else None
     yield repr(finite(camera_to_json(camera))) if camera else None
-    yield from _jac(record, view) or (None,) * len(JAC_NAMES)
-    yield f"[array({plain_list(record.point)})]" if fit and record.point else None
+    yield from _jac_of_view(record, view) or (None,) * len(JAC_NAMES)
+    yield f"[array({list_text(record.point)})]" if fit and record.point else None
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)
     yield fit.optimized_diameter_px if fit else None
     yield record.split(view) or None
@@ -129,23 +129,23 @@ def _row(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Valu
 
 def box_text(box: Box) -> str:
     """``[x, y, w, h]`` with every digit."""
-    return plain_list((box.x, box.y, box.width, box.height))
+    return list_text((box.x, box.y, box.width, box.height))
 
 
-def _jac(record: ExportRecord, view: View) -> tuple[float, ...] | None:
+def _jac_of_view(record: ExportRecord, view: View) -> tuple[float, ...] | None:
     solved = record.view_solution(view)
     return solved.calibration.jac if solved else None
 
 
-def _labels(
+def _match_labels(
     match: str, records: list[ExportRecord], everything: bool, boxes: str
 ) -> dict[str, Any]:
-    labels = labels_to_json(match, [_with_boxes(record, boxes) for record in records])
+    labels = labels_to_json(match, [_with_exported_boxes(record, boxes) for record in records])
     for record in records:
         main, *replays = record.group.views
         for view in record.group.views:
             images = labels["actions"] if view is main else labels["replays"]
-            images[view.key][IMAGE] |= _computed(record, view, everything)
+            images[view.key][IMAGE] |= _computed_fields(record, view, everything)
         calibrated = [view.key for view in replays if record.is_calibrated(view)]
         labels["actions"][main.key][IMAGE]["calibrated_replays"] = calibrated
     labels[GAME]["reconstructions"] = [
@@ -156,7 +156,7 @@ def _labels(
     return labels
 
 
-def _with_boxes(record: ExportRecord, kind: str) -> Group:
+def _with_exported_boxes(record: ExportRecord, kind: str) -> Group:
     """The group with the chosen ball box in the views that the 3D ball comes from."""
     group = record.group
     for view in group.views:
@@ -171,10 +171,14 @@ def _with_boxes(record: ExportRecord, kind: str) -> Group:
     return group
 
 
-def _computed(record: ExportRecord, view: View, everything: bool) -> dict[str, Any]:
+def _computed_fields(record: ExportRecord, view: View, everything: bool) -> dict[str, Any]:
     """What stands beside the source's own metadata of an image."""
     values: dict[str, Any] = {}
-    camera, jac, fit = record.camera(view), _jac(record, view), record.ball_fit(view, everything)
+    camera, jac, fit = (
+        record.camera(view),
+        _jac_of_view(record, view),
+        record.ball_fit(view, everything),
+    )
     if camera is not None:
         values["calibration"] = camera_to_json(camera)
     if jac is not None:

@@ -14,7 +14,7 @@ Key = tuple[int, int, str, int]
 _BATCH = 1000
 
 
-class Spill:
+class SortedSpill:
     """Takes items in any order."""
 
     def __init__(self, connection: sqlite3.Connection):
@@ -26,23 +26,23 @@ class Spill:
         """Keep an item; equal keys keep the order in which they came."""
         self._waiting.append((*key, body))
         if len(self._waiting) >= _BATCH:
-            self._flush()
+            self._flush_to_disk()
 
     def items(self) -> Iterator[tuple[Key, str]]:
         """Everything, by key."""
-        self._flush()
+        self._flush_to_disk()
         rows = self._connection.execute("SELECT * FROM item ORDER BY a, b, c, d, rowid")
         for a, b, c, d, body in rows:
             yield (a, b, c, d), body
 
-    def _flush(self) -> None:
-        with disk_errors():
+    def _flush_to_disk(self) -> None:
+        with translate_disk_errors():
             self._connection.executemany("INSERT INTO item VALUES (?, ?, ?, ?, ?)", self._waiting)
         self._waiting.clear()
 
 
 @contextmanager
-def disk_errors() -> Iterator[None]:
+def translate_disk_errors() -> Iterator[None]:
     """For a database in the place of files: what the disk refuses is told as it is of a file.
 
     Raises:
@@ -55,7 +55,7 @@ def disk_errors() -> Iterator[None]:
 
 
 @contextmanager
-def open_spill() -> Iterator[Spill]:
+def open_spill() -> Iterator[SortedSpill]:
     """A spill in a temporary file, which goes when the block ends."""
     with tempfile.TemporaryDirectory(prefix="touchline-") as folder:
         path = Path(folder) / "spill.db"
@@ -64,4 +64,4 @@ def open_spill() -> Iterator[Spill]:
             connection.execute("PRAGMA journal_mode = OFF")
             connection.execute("PRAGMA synchronous = OFF")
             connection.execute("BEGIN")
-            yield Spill(connection)
+            yield SortedSpill(connection)

@@ -18,7 +18,13 @@ from app.durable import PARTIAL
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
 from app.formats.file_tree import Root
 from app.formats.manifest import MANIFEST
-from app.formats.output import MAX_MANIFEST, foreign, listed, output_tree, write_zip
+from app.formats.output import (
+    MAX_MANIFEST,
+    files_in_manifest,
+    occupied_output_error,
+    output_tree,
+    write_zip,
+)
 from app.object_store.path import StoredPath
 from app.progress import ReportProgress, told
 from app.zip_file import open_zip
@@ -27,7 +33,7 @@ _CHUNK = 1024 * 1024
 
 
 @contextmanager
-def stored_output(
+def output_in_store(
     out: StoredPath, beside: Path, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
     """A folder to write into, which becomes ``out`` when the block ends without an error.
@@ -42,7 +48,7 @@ def stored_output(
         InputError: Exports may not be written there, or something else is there.
         StorageError: The store or the disk refuses.
     """
-    require_free(out)
+    require_free_output(out)
     try:
         beside.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         prefix = f".{beside.name}."
@@ -64,7 +70,7 @@ def stored_output(
 def output_anywhere(
     out: Root, exports: Path, beside: Path | None = None, progress: ReportProgress | None = None
 ) -> Iterator[Path]:
-    """``output_tree`` on a disk, ``stored_output`` in an object store.
+    """``output_tree`` on a disk, ``output_in_store`` in an object store.
 
     Args:
         out: Where it goes.
@@ -73,7 +79,7 @@ def output_anywhere(
         progress: See there.
     """
     if isinstance(out, StoredPath):
-        opened = stored_output(out, beside or exports / "stored", progress)
+        opened = output_in_store(out, beside or exports / "stored", progress)
     else:
         opened = output_tree(out, beside, progress)
     with opened as folder:
@@ -89,13 +95,13 @@ def require_absent(out: StoredPath) -> None:
     """
     if not _is_zip(out):
         raise InputError("an export over REST goes into a store as a zip: let its name end in .zip")
-    require_free(out)
+    require_free_output(out)
     with suppress(NotFoundError):
         out.store.head(out.key)
-        raise foreign(f"{out} is there already")
+        raise occupied_output_error(f"{out} is there already")
 
 
-def require_free(out: StoredPath) -> None:
+def require_free_output(out: StoredPath) -> None:
     """Refuse, before anything is written, a place that an export may not take.
 
     Raises:
@@ -111,7 +117,7 @@ def require_free(out: StoredPath) -> None:
         raise InputError(f"name a folder or a zip in the store, such as {out}league.zip")
     is_ours = _is_earlier_zip(out) if _is_zip(out) else _is_earlier_export(out)
     if not is_ours:
-        raise foreign(f"{out} is there already and is no earlier export")
+        raise occupied_output_error(f"{out} is there already and is no earlier export")
 
 
 def _is_zip(out: StoredPath) -> bool:
@@ -128,7 +134,7 @@ def _is_earlier_zip(out: StoredPath) -> bool:
         with open_zip(present) as archive:
             if archive.getinfo(MANIFEST).file_size > MAX_MANIFEST:
                 return False
-            return set(archive.namelist()) <= listed(archive.read(MANIFEST))
+            return set(archive.namelist()) <= files_in_manifest(archive.read(MANIFEST))
     except (OSError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, zlib.error):
         return False
 
@@ -139,7 +145,9 @@ def _is_earlier_export(out: StoredPath) -> bool:
     if not present:
         return True
     try:
-        return present <= listed(out.store.read_whole((out / MANIFEST).key, MAX_MANIFEST)[0])
+        return present <= files_in_manifest(
+            out.store.read_whole((out / MANIFEST).key, MAX_MANIFEST)[0]
+        )
     except (NotFoundError, TooLargeError):
         return False
 
@@ -155,14 +163,14 @@ def _publish_folder(staging: Path, out: StoredPath, progress: ReportProgress | N
     files.sort(key=lambda path: path == staging / MANIFEST)
     for path in told(files, len(files), progress, "Sending the files to the store."):
         key = (out / path.relative_to(staging).as_posix()).key
-        with store.writing(key, _kind(path)) as target, path.open("rb") as source:
+        with store.writing(key, _content_type(path)) as target, path.open("rb") as source:
             shutil.copyfileobj(source, target, _CHUNK)
         earlier.discard(key)
     for key in earlier - {manifest}:
         store.delete(key)
 
 
-def _kind(path: Path) -> str:
+def _content_type(path: Path) -> str:
     return {".json": "application/json", ".csv": "text/csv", ".jpg": "image/jpeg"}.get(
         path.suffix.lower(), "application/octet-stream"
     )

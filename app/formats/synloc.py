@@ -34,7 +34,7 @@ def is_synloc(value: Any) -> bool:
     return isinstance(value, dict) and MATRIX in value and POLYNOMIAL in value
 
 
-def images_of(value: Mapping[str, Any]) -> dict[str, Any] | None:
+def image_records_by_stem(value: Mapping[str, Any]) -> dict[str, Any] | None:
     """The records of a COCO file by stem; None where it has no cameras."""
     images = value.get("images")
     if not isinstance(images, list) or not any(map(is_synloc, images)):
@@ -59,14 +59,14 @@ def camera_from_synloc(value: Mapping[str, Any], path: str, record: str | None) 
     """
     name = MATRIX
     try:
-        matrix = np.array([fields.numbers(row, 4) for row in _rows(value.get(MATRIX))])
-        rotation, position = _pose(matrix)
+        matrix = np.array([fields.number_list(row, 4) for row in _three_rows(value.get(MATRIX))])
+        rotation, position = _rotation_and_position(matrix)
         name = POLYNOMIAL
-        terms = _terms(value.get(POLYNOMIAL))
+        terms = _polynomial_terms(value.get(POLYNOMIAL))
         name = "width"
-        width = _side(value.get(name))
+        width = _read_side_length(value.get(name))
         name = "height"
-        height = _side(value.get(name))
+        height = _read_side_length(value.get(name))
     except ValueError as error:
         raise DatasetFormatError(path, record, name, str(error)) from error
     try:
@@ -82,14 +82,14 @@ def camera_from_synloc(value: Mapping[str, Any], path: str, record: str | None) 
         raise DatasetFormatError(path, record, POLYNOMIAL, error.message) from error
 
 
-def _rows(value: Any) -> list[Any]:
-    rows = fields.sequence(value)
+def _three_rows(value: Any) -> list[Any]:
+    rows = fields.require_list(value)
     if len(rows) != 3:
         raise ValueError(f"has {len(rows)} rows, not 3")
     return rows
 
 
-def _pose(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _rotation_and_position(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotation, pitch to camera, and position in our pitch frame of ``s [R | -R C]``."""
     scale = np.cbrt(np.linalg.det(matrix[:, :3]))
     if not np.isfinite(scale) or scale == 0:
@@ -103,18 +103,18 @@ def _pose(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rotation @ _TO_PITCH.T, _TO_PITCH @ position
 
 
-def _terms(value: Any) -> FloatArray:
+def _polynomial_terms(value: Any) -> FloatArray:
     """The polynomial's terms, the constant one first."""
-    listed = fields.sequence(value)
+    listed = fields.require_list(value)
     if not 2 <= len(listed) <= TERMS:
         raise ValueError(f"has {len(listed)} terms, not 2 to {TERMS}")
     terms = np.zeros(TERMS)
-    terms[: len(listed)] = fields.numbers(listed, len(listed))[::-1]
+    terms[: len(listed)] = fields.number_list(listed, len(listed))[::-1]
     return terms
 
 
-def _side(value: Any) -> int:
-    side = fields.whole(value)
+def _read_side_length(value: Any) -> int:
+    side = fields.whole_number(value)
     if not 2 <= side <= MAX_SIDE:
         raise ValueError(f"is {side} pixels")
     return side

@@ -36,12 +36,12 @@ def write_tracab(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     for folder, record in track_folders(root, records):
         track, lines = record.track, []
         speed = np.linalg.norm(track.velocity, axis=1)
-        for row in np.flatnonzero(record.there).tolist():
+        for row in np.flatnonzero(record.has_position).tolist():
             x, y, z = np.rint(100 * track.position[row] * (1, -1, -1)).astype(int).tolist()
             alive = "Dead" if track.mode[row] == "out" else "Alive"
             lines.append(f"{track.frames[row]}::{x},{y},{z},{speed[row]:.2f},H,{alive};:\n")
         (folder / DATA).write_text("".join(lines), encoding="ascii")
-        (folder / METADATA).write_text(_metadata(record), encoding="utf-8")
+        (folder / METADATA).write_text(_tracab_metadata(record), encoding="utf-8")
         counts["tracks"] += 1
         counts["frames"] += len(track.frames)
         counts["balls"] += len(lines)
@@ -71,7 +71,7 @@ def write_cdf(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     return counts
 
 
-def _metadata(record: TrackRecord) -> str:
+def _tracab_metadata(record: TrackRecord) -> str:
     pitch, frames = record.pitch, record.track.frames
     return (
         '<?xml version="1.0" encoding="utf-8"?>\n'
@@ -90,7 +90,9 @@ def _metadata(record: TrackRecord) -> str:
 def _cdf_lines(record: TrackRecord) -> Iterator[dict[str, Any]]:
     track = record.track
     nobody = {side: {"id": side, "players": list[Any]()} for side in ("home", "away")}
-    there = record.there & (np.abs(np.nan_to_num(track.position[:, :2])) <= CDF_LIMITS).all(axis=1)
+    there = record.has_position & (np.abs(np.nan_to_num(track.position[:, :2])) <= CDF_LIMITS).all(
+        axis=1
+    )
     rows = np.flatnonzero(there).tolist()
     for row in rows:
         x, y, z = (track.position[row] * (1, -1, -1)).tolist()

@@ -12,9 +12,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from app.errors import InputError
-from app.formats.camera_arrays import arrays_of_cameras
+from app.formats.camera_arrays import camera_arrays
 from app.formats.csv_text import csv_line
-from app.formats.parquet import pyarrow_modules
+from app.formats.parquet import import_pyarrow
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
@@ -105,7 +105,7 @@ class TrackRecord:
     verdict: str = "unreviewed"
 
     @property
-    def there(self) -> BoolArray:
+    def has_position(self) -> BoolArray:
         """Frames in which the track has a place, shape (N,)."""
         return np.asarray(np.isfinite(self.track.position).all(axis=1))
 
@@ -138,7 +138,7 @@ def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     counts = {"tracks": 0, "frames": 0, "balls": 0, "events": 0}
     for folder, record in track_folders(root, records):
         track = record.track
-        lines = [csv_line(COLUMNS), *map(csv_line, _rows(record))]
+        lines = [csv_line(COLUMNS), *map(csv_line, _track_rows(record))]
         (folder / BALL).write_text("".join(lines), encoding="utf-8")
         lines = [csv_line(EVENT_COLUMNS), *map(csv_line, _event_rows(record))]
         (folder / EVENTS).write_text("".join(lines), encoding="utf-8")
@@ -146,7 +146,7 @@ def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
             _write_parquet(folder / "ball.parquet", record)
         counts["tracks"] += 1
         counts["frames"] += len(track.frames)
-        counts["balls"] += int(record.there.sum())
+        counts["balls"] += int(record.has_position.sum())
         counts["events"] += len(track.events)
     return counts
 
@@ -174,7 +174,7 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
         }
         for view, cameras in sorted(record.cameras.items()):
             placed = {rows[frame]: camera for frame, camera in cameras.items() if frame in rows}
-            found = arrays_of_cameras(placed, f"{NPZ}/{view}")
+            found = camera_arrays(placed, f"{NPZ}/{view}")
             for name, values in found.items():
                 whole = np.full((len(rows), *values.shape[1:]), np.nan)
                 whole[: len(values)] = values
@@ -184,7 +184,7 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
             np.savez_compressed(file, **arrays)
         counts["tracks"] += 1
         counts["frames"] += len(rows)
-        counts["balls"] += int(record.there.sum())
+        counts["balls"] += int(record.has_position.sum())
     return counts
 
 
@@ -207,7 +207,7 @@ def track_folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[
         yield root / name, record
 
 
-def _rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
+def _track_rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
     track, sigmas = record.track, position_sigma(record.track.covariance)
     for row, (frame, time) in enumerate(zip(track.frames, track.times, strict=True)):
         place = track.position[row].tolist()
@@ -222,16 +222,16 @@ def _event_rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
 
 
 def _write_parquet(path: Path, record: TrackRecord) -> None:
-    pyarrow, parquet = pyarrow_modules()
+    pyarrow, parquet = import_pyarrow()
     track = record.track
     numbers, whole, text = pyarrow.float64(), pyarrow.int32(), pyarrow.string()
 
-    def missing(values: FloatArray) -> Any:
+    def nullable_numbers(values: FloatArray) -> Any:
         return pyarrow.array(
             [None if value != value else value for value in values.tolist()], numbers
         )
 
-    def lists(values: FloatArray, length: int) -> Any:
+    def nullable_lists(values: FloatArray, length: int) -> Any:
         flat = values.reshape(len(values), length)
         known = np.asarray(np.isfinite(flat).all(axis=1))
         rows = [row if there else None for row, there in zip(flat.tolist(), known, strict=True)]
@@ -242,15 +242,15 @@ def _write_parquet(path: Path, record: TrackRecord) -> None:
             "frame": pyarrow.array(track.frames.tolist(), whole),
             "time_s": pyarrow.array(track.times.tolist(), numbers),
             **{
-                name: missing(track.position[:, axis])
+                name: nullable_numbers(track.position[:, axis])
                 for axis, name in enumerate(("x_m", "y_m", "z_m"))
             },
-            "sigma_m": missing(position_sigma(track.covariance)),
+            "sigma_m": nullable_numbers(position_sigma(track.covariance)),
             **{
-                name: missing(track.velocity[:, axis])
+                name: nullable_numbers(track.velocity[:, axis])
                 for axis, name in enumerate(("vx_m_s", "vy_m_s", "vz_m_s"))
             },
-            "covariance": lists(track.covariance, 36),
+            "covariance": nullable_lists(track.covariance, 36),
             "state": pyarrow.array(list(track.state), text),
             "mode": pyarrow.array([mode or None for mode in track.mode], text),
             "cameras": pyarrow.array([list(names) for names in track.views], pyarrow.list_(text)),

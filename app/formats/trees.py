@@ -9,10 +9,10 @@ from typing import IO
 
 from app.errors import DatasetFormatError, TooLargeError, UnsafePathError
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
-from app.formats.folder_tree import FileAlone, FolderTree
-from app.formats.plain_file import open_plain
+from app.formats.folder_tree import FolderTree, SingleFileTree
+from app.formats.plain_file import open_regular_file
 from app.formats.report import Report
-from app.formats.safe_path import check_name, is_hidden
+from app.formats.safe_path import is_hidden, require_safe_path
 from app.formats.zip_tree import ZipTree
 from app.object_store.path import StoredPath
 from app.object_store.store import Stored
@@ -38,14 +38,14 @@ class StoreTree:
         found = self.path.store.below(self.path.key) if path.stored is None else [path.stored]
         for stored in found:
             name = stored.key[start:]
-            if self._is_sound(name, report):
+            if self._is_readable_name(name, report):
                 self._found[name] = stored
 
-    def _is_sound(self, name: str, report: Report) -> bool:
+    def _is_readable_name(self, name: str, report: Report) -> bool:
         if any(map(is_hidden, name.split("/"))):
             return False
         try:
-            return bool(check_name(name))
+            return bool(require_safe_path(name))
         except UnsafePathError as error:
             report.note(str(self.path), name[:200], None, error.message)
             return False
@@ -56,7 +56,7 @@ class StoreTree:
 
     def read_bytes(self, name: str) -> bytes:
         """The whole content of one object."""
-        stored, limit = self._get(name), self._limits.file_bytes
+        stored, limit = self._stored_object(name), self._limits.file_bytes
         try:
             return self.path.store.read_whole(stored.key, limit, stored.etag)[0]
         except TooLargeError as error:
@@ -65,7 +65,7 @@ class StoreTree:
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
-        path = self.path.of(self._get(name))
+        path = self.path.of(self._stored_object(name))
         return io.BufferedReader(FilePart(path.reads(STREAM).pread, 0, path.size))
 
     def shown(self, name: str) -> str:
@@ -74,20 +74,20 @@ class StoreTree:
 
     def media(self, name: str) -> Media:
         """Where an object can be read later, as long as it is this one."""
-        return Media(self.path.of(self._get(name)).sealed())
+        return Media(self.path.of(self._stored_object(name)).sealed())
 
     def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file in the store can be read later."""
-        return Media(self.path.of(self._get(name)).sealed(), member)
+        return Media(self.path.of(self._stored_object(name)).sealed(), member)
 
     def nested(self, name: str, report: Report) -> ZipTree:
         """The members of a zip file in the store, of which no more than its list is fetched."""
-        return ZipTree(self.path.of(self._get(name)), report, self._limits)
+        return ZipTree(self.path.of(self._stored_object(name)), report, self._limits)
 
     def close(self) -> None:
         """Nothing to release."""
 
-    def _get(self, name: str) -> Stored:
+    def _stored_object(self, name: str) -> Stored:
         stored = self._found.get(name)
         if stored is None:
             raise DatasetFormatError(self.shown(name), None, None, "is not in the store")
@@ -100,19 +100,19 @@ def open_tree(path: Root, report: Report, limits: Limits = DEFAULT_LIMITS) -> Fi
     Members of an archive that are unsafe are left out, with a problem each.
     """
     if isinstance(path, StoredPath):
-        return _open_stored(path, report, limits)
+        return _open_store_tree(path, report, limits)
     if path.is_dir():
         return FolderTree(path, report, limits)
     if not path.exists():
         report.note(str(path), None, None, "does not exist")
         return None
     try:
-        with open_plain(path) as file:
+        with open_regular_file(path) as file:
             # Arrays of numpy are a zip, too, and one file to whoever reads them.
             is_zip = path.suffix.lower() != ".npz" and (
                 file.read(2) == b"PK" or path.suffix.lower() == ".zip"
             )
-        return ZipTree(path, report, limits) if is_zip else FileAlone(path, report, limits)
+        return ZipTree(path, report, limits) if is_zip else SingleFileTree(path, report, limits)
     except DatasetFormatError as error:
         report.skip(error)
     except OSError as error:
@@ -130,7 +130,7 @@ def opened_tree(
         yield tree
 
 
-def _open_stored(path: StoredPath, report: Report, limits: Limits) -> FileTree | None:
+def _open_store_tree(path: StoredPath, report: Report, limits: Limits) -> FileTree | None:
     if path.is_dir() or path.suffix.lower() != ".zip":
         return StoreTree(path, report, limits)
     try:

@@ -13,8 +13,8 @@ from heapq import merge
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 
-from app.formats.safe_path import check_name, resolve_inside
-from app.formats.spill import disk_errors
+from app.formats.safe_path import require_safe_path, resolve_inside
+from app.formats.spill import translate_disk_errors
 
 PutText = Callable[[str, str], None]
 """Takes a relative path, and the text of the file there."""
@@ -25,7 +25,7 @@ Gathered: TypeAlias = tuple[str, Path | bytes]
 """A file's relative path; where it lies, or its content."""
 
 
-def put_on_disk(root: Path) -> PutText:
+def write_to_disk(root: Path) -> PutText:
     """Writes each file at once below a folder.
 
     Raises (the result):
@@ -33,12 +33,12 @@ def put_on_disk(root: Path) -> PutText:
     """
 
     def put(path: str, text: str) -> None:
-        write_below(root, path, text)
+        write_file_below(root, path, text)
 
     return put
 
 
-def write_below(root: Path, path: str, text: str) -> Path:
+def write_file_below(root: Path, path: str, text: str) -> Path:
     """Write a file below a folder, and the folders that it lies in; its path.
 
     Raises:
@@ -58,7 +58,7 @@ class ViewFiles:
 
     def __init__(self, root: Path):
         self._waiting: list[tuple[str, bytes]] = []
-        with disk_errors():
+        with translate_disk_errors():
             self._connection = sqlite3.connect(root / HELD, isolation_level=None)
             # Nothing in it outlives the export, so nothing needs to survive a power cut.
             self._connection.execute("PRAGMA journal_mode = OFF")
@@ -72,8 +72,8 @@ class ViewFiles:
     def __exit__(self, kind: object, *_: object) -> None:
         with closing(self._connection):
             if kind is None:
-                self._flush()
-                with disk_errors():
+                self._flush_to_database()
+                with translate_disk_errors():
                     self._connection.execute("COMMIT")
 
     def put(self, path: str, text: str) -> None:
@@ -83,17 +83,17 @@ class ViewFiles:
             OSError: The disk refuses, also where the context ends.
             UnsafePathError: The path would leave a folder.
         """
-        self._waiting.append((str(PurePosixPath(check_name(path))), text.encode()))
+        self._waiting.append((str(PurePosixPath(require_safe_path(path))), text.encode()))
         if len(self._waiting) >= _BATCH:
-            self._flush()
+            self._flush_to_database()
 
-    def _flush(self) -> None:
-        with disk_errors():
+    def _flush_to_database(self) -> None:
+        with translate_disk_errors():
             self._connection.executemany("INSERT OR REPLACE INTO file VALUES (?, ?)", self._waiting)
         self._waiting.clear()
 
 
-class GatheredFiles:
+class FilesToPack:
     """All files below a folder, those that wait among them, in the order of their paths.
 
     Raises (each method):
@@ -104,22 +104,22 @@ class GatheredFiles:
         self._held = root / HELD
         paths = (path for path in root.rglob("*") if path != self._held and path.is_file())
         names: dict[str, Path | bytes] = {path.relative_to(root).as_posix(): path for path in paths}
-        self._on_disk = sorted(names.items(), key=_name)
+        self._on_disk = sorted(names.items(), key=_path_of_file)
 
     def __len__(self) -> int:
-        waiting = self._ask("SELECT count(*) FROM file")
+        waiting = self._run_query("SELECT count(*) FROM file")
         count: int = sum(number for (number,) in waiting)
         return len(self._on_disk) + count
 
     def __iter__(self) -> Iterator[Gathered]:
-        waiting = self._ask("SELECT path, body FROM file ORDER BY path")
-        return merge(self._on_disk, waiting, key=_name)
+        waiting = self._run_query("SELECT path, body FROM file ORDER BY path")
+        return merge(self._on_disk, waiting, key=_path_of_file)
 
-    def _ask(self, question: str) -> Iterator[Any]:
+    def _run_query(self, question: str) -> Iterator[Any]:
         if self._held.exists():
-            with disk_errors(), closing(sqlite3.connect(self._held)) as connection:
+            with translate_disk_errors(), closing(sqlite3.connect(self._held)) as connection:
                 yield from connection.execute(question)
 
 
-def _name(item: Gathered) -> str:
+def _path_of_file(item: Gathered) -> str:
     return item[0]

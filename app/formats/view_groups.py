@@ -44,9 +44,9 @@ class ViewGroups:
         waiting.append(item)
         if len(waiting) == item.head.views:
             self._done.add(key)
-            yield self._group(self._waiting.pop(key))
+            yield self._make_group(self._waiting.pop(key))
 
-    def rest(self) -> Iterator[Group]:
+    def incomplete_groups(self) -> Iterator[Group]:
         """Groups that have fewer views than they say, as they are, which is said."""
         lacking = [
             f"{key} ({len(items)} of {items[0].head.views})"
@@ -58,14 +58,14 @@ class ViewGroups:
             shown = ", ".join(lacking[:5]) + (", ..." if len(lacking) > 5 else "")
             self._report.remark(f"{count} fewer views than when it was written: {shown}")
         for key in list(self._waiting):
-            yield self._group(self._waiting.pop(key))
+            yield self._make_group(self._waiting.pop(key))
 
-    def _group(self, items: list[PlacedView]) -> Group:
+    def _make_group(self, items: list[PlacedView]) -> Group:
         self._report.imported += len(items)
         items.sort(key=lambda item: item.position)
-        return items[0].head.group(tuple(self._with_station(item.view) for item in items))
+        return items[0].head.group(tuple(self._with_shared_station(item.view) for item in items))
 
-    def _with_station(self, view: View) -> View:
+    def _with_shared_station(self, view: View) -> View:
         station = view.station
         if not station.shared:
             return view

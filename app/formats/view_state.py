@@ -13,7 +13,7 @@ from typing import Any
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
 from app.formats import fields
 from app.formats.camera_json import camera_from_json, camera_to_json
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_record import BALLS, GAME, IMAGE, RECORD, REST
 from app.geometry.camera import camera_covariance
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
@@ -134,7 +134,7 @@ class StateReader:
         """A text that may become part of a path."""
         found = self.text(name)
         try:
-            return check_name(found)
+            return require_safe_path(found)
         except UnsafePathError as error:
             raise self.error(name, error.message) from error
 
@@ -148,7 +148,7 @@ class StateReader:
         sides = []
         for name in ("width", "height"):
             try:
-                side = fields.whole(self.value.get(name))
+                side = fields.whole_number(self.value.get(name))
             except ValueError as error:
                 raise self.error(name, str(error)) from error
             if not 2 <= side <= MAX_SIDE:
@@ -159,7 +159,7 @@ class StateReader:
     def head(self) -> GroupHead:
         """Back from ``head_to_json``."""
         try:
-            length, width = fields.numbers(self.value.get("pitch") or [105.0, 68.0], 2)
+            length, width = fields.number_list(self.value.get("pitch") or [105.0, 68.0], 2)
             pitch = Pitch(length, width)
         except (ValueError, InputError) as error:
             raise self.error("pitch", str(error)) from error
@@ -176,7 +176,7 @@ class StateReader:
     def count(self, name: str) -> int:
         """A whole number from 0; 0 where there is none."""
         try:
-            return max(fields.whole(self.value.get(name) or 0), 0)
+            return max(fields.whole_number(self.value.get(name) or 0), 0)
         except ValueError as error:
             raise self.error(name, str(error)) from error
 
@@ -215,7 +215,7 @@ class StateReader:
         try:
             if self.value.get("given") is None:
                 raise ValueError("has no given camera")
-            return camera_covariance(fields.numbers(found, 64))
+            return camera_covariance(fields.number_list(found, 64))
         except ValueError as error:
             raise self.error("given_covariance", str(error)) from error
 
@@ -225,10 +225,10 @@ class StateReader:
         if found is None:
             return None
         try:
-            value = fields.mapping(found)
-            aspect = fields.numbers([value.get("aspect")], 1)[0]
-            right, down = fields.numbers(value.get("shift"), 2)
-            sigma = fields.numbers(value.get("sigma"), 3)
+            value = fields.require_object(found)
+            aspect = fields.number_list([value.get("aspect")], 1)[0]
+            right, down = fields.number_list(value.get("shift"), 2)
+            sigma = fields.number_list(value.get("sigma"), 3)
             return PictureGeometry(aspect, (right, down), (sigma[0], sigma[1], sigma[2]))
         except (ValueError, InputError) as error:
             raise self.error("picture", str(error)) from error
@@ -239,7 +239,7 @@ class StateReader:
         if found is None:
             return None
         try:
-            value = fields.mapping(found)
+            value = fields.require_object(found)
             reason, note = value.get("reason"), value.get("note")
             if not isinstance(reason, str) or not isinstance(note, str | None):
                 raise ValueError("needs a reason, and a note that is a text or null")
@@ -251,8 +251,10 @@ class StateReader:
         """Back from ``lines_to_json``: the lines, and what is said not to be visible."""
         lines = {}
         try:
-            for name, points in fields.mapping(self.value.get("lines") or {}).items():
-                lines[canonical_marking(name)] = [self._point(p) for p in fields.sequence(points)]
+            for name, points in fields.require_object(self.value.get("lines") or {}).items():
+                lines[canonical_marking(name)] = [
+                    self._read_point(p) for p in fields.require_list(points)
+                ]
         except UnknownMarkingError as error:
             raise self.error("lines", error.message) from error
         except ValueError as error:
@@ -262,7 +264,7 @@ class StateReader:
     def proposed(self, lines: Lines) -> tuple[str, ...]:
         """Names of the lines that were accepted as they were proposed."""
         try:
-            found = set(fields.sequence(self.value.get("proposed") or []))
+            found = set(fields.require_list(self.value.get("proposed") or []))
         except (TypeError, ValueError) as error:
             raise self.error("proposed", "is no list of markings") from error
         return tuple(name for name in lines if name in found)
@@ -270,19 +272,19 @@ class StateReader:
     def balls(self) -> tuple[BallAnnotation, ...]:
         """Back from ``ball_to_json``."""
         try:
-            values = fields.sequence(self.value.get("balls") or [])
-            return tuple(self._ball(fields.mapping(item)) for item in values)
+            values = fields.require_list(self.value.get("balls") or [])
+            return tuple(self._read_ball(fields.require_object(item)) for item in values)
         except ValueError as error:
             raise self.error("balls", str(error)) from error
 
-    def _ball(self, value: Mapping[str, Any]) -> BallAnnotation:
+    def _read_ball(self, value: Mapping[str, Any]) -> BallAnnotation:
         box, point = value.get("box"), value.get("point")
         out_of_view = value.get("out_of_view") is True
         if (box is None) == (point is None) and not out_of_view:
             raise ValueError("has a ball with both a box and a point, or with neither")
         return BallAnnotation(
             box=None if box is None else self.box(box),
-            point=None if point is None else self._point(point),
+            point=None if point is None else self._read_point(point),
             occluded=value.get("occluded") is True,
             out_of_view=out_of_view,
             predicted_by=str(value.get("predicted_by") or ""),
@@ -296,14 +298,16 @@ class StateReader:
         Raises:
             ValueError: Anything else, or a box without area.
         """
-        x, y, width, height = (fields.pixel(item) for item in fields.numbers(value, 4))
+        x, y, width, height = (
+            fields.pixel_coordinate(item) for item in fields.number_list(value, 4)
+        )
         if width <= 0 or height <= 0:
             raise ValueError("has a box without area")
         return Box(x, y, width, height)
 
     @staticmethod
-    def _point(value: Any) -> ImagePoint:
-        x, y = (fields.pixel(item) for item in fields.numbers(value, 2))
+    def _read_point(value: Any) -> ImagePoint:
+        x, y = (fields.pixel_coordinate(item) for item in fields.number_list(value, 2))
         return ImagePoint(x, y)
 
 
@@ -312,13 +316,13 @@ def extras_from_json(value: Any) -> Extras:
     if not isinstance(value, dict):
         return Extras()
     boxes, lines = (
-        tuple(item for item in _listed(value.get(name)) if isinstance(item, dict))
+        tuple(item for item in _objects_of_list(value.get(name)) if isinstance(item, dict))
         for name in ("boxes", "lines")
     )
-    return Extras(boxes, lines, _metadata(value.get("metadata")))
+    return Extras(boxes, lines, _read_metadata(value.get("metadata")))
 
 
-def _metadata(value: Any) -> dict[str, Any]:
+def _read_metadata(value: Any) -> dict[str, Any]:
     """What a source said of an image; what has a name of ours and another shape is left out."""
     if not isinstance(value, dict):
         return {}
@@ -330,5 +334,5 @@ def _metadata(value: Any) -> dict[str, Any]:
     return fit
 
 
-def _listed(value: Any) -> list[Any]:
+def _objects_of_list(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []

@@ -99,27 +99,27 @@ def read_viper(
     whatever namespace.
     """
     shown = tree.shown(name)
-    reader = _Reader(shown, report)
+    reader = _ViperFileReader(shown, report)
     try:
         with tree.open(name) as stream:
             packed = name.lower().endswith(".gz")
             opened = gzip.GzipFile(fileobj=stream) if packed else stream
-            reader.read(_Capped(opened, limits.file_bytes, shown))
+            reader.read_elements(_LimitedStream(opened, limits.file_bytes, shown))
     except DatasetFormatError as error:
         report.skip(error)
     except DefusedXmlException:
         report.note(shown, None, None, "holds a DTD or an entity, which is refused")
     except ParseError as error:
         place = f"line {error.position[0]}"
-        report.note(shown, None, place, f"is not sound XML from here on; {reader.so_far}")
+        report.note(shown, None, place, f"is not sound XML from here on; {reader.describe_kept}")
     except (LookupError, ValueError) as error:
         report.note(shown, None, None, f"is in an encoding that cannot be read ({error})")
     except _BROKEN:
-        report.note(shown, None, None, f"is damaged or cut off; {reader.so_far}")
-    return reader.finish()
+        report.note(shown, None, None, f"is damaged or cut off; {reader.describe_kept}")
+    return reader.finish_tracks()
 
 
-class _Capped:
+class _LimitedStream:
     """A stream that counts real bytes, in all and since the last element.
 
     Expat before 2.6 looks at an unfinished tag again from its beginning with each piece of it.
@@ -143,7 +143,7 @@ class _Capped:
         return content
 
 
-class _Reader:
+class _ViperFileReader:
     """One file on its way to tracks."""
 
     def __init__(self, shown: str, report: Report):
@@ -153,30 +153,30 @@ class _Reader:
         self._left_out: Counter[tuple[str, str]] = Counter()
 
     @property
-    def so_far(self) -> str:
+    def describe_kept(self) -> str:
         """What is kept of a file that goes no further, in words."""
         balls = sum(track.ball_points for track in self.tracks)
         persons = sum(track.person_boxes for track in self.tracks)
         return f"{balls} ball points and {persons} persons before it are kept"
 
-    def read(self, stream: _Capped) -> None:
+    def read_elements(self, stream: _LimitedStream) -> None:
         """Element by element."""
         open_elements: list[Element] = []
         for event, element in iterparse(stream, events=("start", "end"), forbid_dtd=True):
             stream.quiet = 0
             if event == "start":
-                if _local(element) == "sourcefile":
+                if _local_name(element) == "sourcefile":
                     self._begin_source(element.get("filename", "")[:200])
                 open_elements.append(element)
                 continue
             open_elements.pop()
-            if len(open_elements) > 1 and _local(open_elements[-1]) == "attribute":
+            if len(open_elements) > 1 and _local_name(open_elements[-1]) == "attribute":
                 self._read_entry(element, open_elements[-1], open_elements[-2])
             if open_elements:
                 # What was read is let go, or a long file would stay in memory.
                 del open_elements[-1][:]
 
-    def finish(self) -> list[ViperTrack]:
+    def finish_tracks(self) -> list[ViperTrack]:
         """The tracks; reports what was not read, a line for each kind of object and shape."""
         for (name, what), count in self._left_out.items():
             entries = plural(count, "entry is", "entries are")
@@ -196,40 +196,40 @@ class _Reader:
     def _read_entry(self, item: Element, attribute: Element, owner: Element) -> None:
         """One ``data:...`` element of an attribute of an object, or of the file itself."""
         name = attribute.get("name", "")
-        if _local(owner) == "file" and name in _SIZES:
-            self._read_side(name, item)
-        if _local(owner) != "object":
+        if _local_name(owner) == "file" and name in _SIZES:
+            self._read_side_length(name, item)
+        if _local_name(owner) != "object":
             return
         kind, identity = owner.get("name", "").strip()[:80], owner.get("id", "?")[:20]
-        ball, shape = _is_ball(kind), _local(item)
+        ball, shape = _is_ball(kind), _local_name(item)
         # What has no framespan of its own holds as long as its object does.
         span = item.get("framespan", owner.get("framespan"))
         try:
             if ball and shape in ("point", "bbox", "circle"):
-                self._add_ball(_ball(item, shape), self._counted(span))
+                self._add_ball(_parse_ball(item, shape), self._parse_counted_frames(span))
             elif ball and "value" in item.attrib:
-                for frame in self._counted(span):
+                for frame in self._parse_counted_frames(span):
                     notes = self.tracks[-1].ball_notes.setdefault(frame, {})
                     notes[name[:80]] = item.get("value", "")[:200]
-            elif _letters(kind) in _PERSONS and shape == "bbox":
-                box, frames = _box(item), self._counted(span)
+            elif _lowercase_letters(kind) in _PERSONS and shape == "bbox":
+                box, frames = _parse_box(item), self._parse_counted_frames(span)
                 for frame in frames:
                     self.tracks[-1].persons.setdefault(frame, []).append((identity, *box))
             else:
-                self._leave_out(kind, f"{name[:80]}, {shape[:20]}")
+                self._count_left_out(kind, f"{name[:80]}, {shape[:20]}")
         except ValueError as error:
             where = f"framespan {(span or '')[:40]}"
             self._report.note(self._shown, f"{kind.title()} {identity}", where, str(error))
 
-    def _leave_out(self, kind: str, what: str) -> None:
+    def _count_left_out(self, kind: str, what: str) -> None:
         key = (kind, what)
         if key not in self._left_out and len(self._left_out) >= _MAX_KINDS:
             key = ("of other names", "")
         self._left_out[key] += 1
 
-    def _counted(self, span: str | None) -> list[int]:
+    def _parse_counted_frames(self, span: str | None) -> list[int]:
         """Frames of a framespan, counted against the limit of a file."""
-        frames = _frames(span)
+        frames = _parse_framespan(span)
         self._entries += len(frames)
         if self._entries > MAX_ENTRIES:
             problem = f"holds more than {MAX_ENTRIES:,} entries"
@@ -243,14 +243,14 @@ class _Reader:
             raise ValueError(f"is beyond {MAX_FRAMES:,} frames with a ball")
         self._frames += fresh
         for frame in frames:
-            _put_ball(balls.setdefault(frame, []), ball)
+            _add_distinct_ball(balls.setdefault(frame, []), ball)
 
-    def _read_side(self, name: str, item: Element) -> None:
+    def _read_side_length(self, name: str, item: Element) -> None:
         text = item.get("value", "").strip()
         if not text:
             return
         try:
-            side = fields.whole(text)
+            side = fields.whole_number(text)
         except ValueError:
             side = 0
         if not 1 <= side <= _MAX_SIDE:
@@ -263,17 +263,17 @@ class _Reader:
         self.tracks[-1].size = replace(size, **{"width" if is_width else "height": side})
 
 
-def _local(element: Element) -> str:
+def _local_name(element: Element) -> str:
     """Name of an element without its namespace."""
     return element.tag.rpartition("}")[2]
 
 
 @lru_cache(maxsize=100)
-def _letters(name: str) -> str:
+def _lowercase_letters(name: str) -> str:
     return re.sub(r"[^a-z]", "", name.lower())
 
 
-def _put_ball(balls: list[ImagePoint | Box], ball: ImagePoint | Box) -> None:
+def _add_distinct_ball(balls: list[ImagePoint | Box], ball: ImagePoint | Box) -> None:
     """Add a ball to those of its frame, unless it is there: a centre inside a box is that ball's,
     and says where it is more exactly."""
     for index, known in enumerate(balls):
@@ -291,37 +291,37 @@ def _is_inside(point: ImagePoint | Box, box: ImagePoint | Box) -> bool:
     return 0 <= point.x - box.x <= box.width and 0 <= point.y - box.y <= box.height
 
 
-def _ball(item: Element, shape: str) -> ImagePoint | Box:
+def _parse_ball(item: Element, shape: str) -> ImagePoint | Box:
     if shape == "bbox":
-        box = Box(*_box(item))
+        box = Box(*_parse_box(item))
         # A box without area is the ball's centre alone.
         return box if box.width > 0 and box.height > 0 else box.center
-    point = ImagePoint(_pixel(item, "x"), _pixel(item, "y"))
+    point = ImagePoint(_parse_pixel(item, "x"), _parse_pixel(item, "y"))
     if shape == "point":
         return point
-    radius = _pixel(item, "radius")
+    radius = _parse_pixel(item, "radius")
     if radius < 0:
         raise ValueError("has a negative radius")
     return Box.square(point, 2 * radius) if radius > 0 else point
 
 
-def _box(item: Element) -> tuple[float, float, float, float]:
-    x, y, width, height = (_pixel(item, name) for name in ("x", "y", "width", "height"))
+def _parse_box(item: Element) -> tuple[float, float, float, float]:
+    x, y, width, height = (_parse_pixel(item, name) for name in ("x", "y", "width", "height"))
     if width < 0 or height < 0:
         raise ValueError("has a negative width or height")
     return x, y, width, height
 
 
-def _pixel(item: Element, name: str) -> float:
+def _parse_pixel(item: Element, name: str) -> float:
     if name not in item.attrib:
         raise ValueError(f"{name} is missing")
     try:
-        return fields.pixel(item.get(name))
+        return fields.pixel_coordinate(item.get(name))
     except ValueError as error:
         raise ValueError(f"{name} {error}") from error
 
 
-def _frames(span: Any) -> list[int]:
+def _parse_framespan(span: Any) -> list[int]:
     """Frames of a framespan: ``1182:1182``, a range, or several separated by spaces or commas."""
     if not span or not span.strip():
         raise ValueError("has no framespan")

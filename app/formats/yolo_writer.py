@@ -15,8 +15,8 @@ from app.finite import json_text
 from app.formats.corner_origin import box_to_corner
 from app.formats.csv_text import CsvTable
 from app.formats.export_record import ExportRecord, chosen_box
-from app.formats.frame_names import flat_frame, likely_suffix, split_folder
-from app.formats.view_files import PutText, put_on_disk
+from app.formats.frame_names import expected_frame_suffix, frame_path_in_split, split_folder
+from app.formats.view_files import PutText, write_to_disk
 from app.plural import plural
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
@@ -50,16 +50,17 @@ class ImageLists:
     def __enter__(self) -> ImageLists:
         with ExitStack() as stack:
             self._others = {
-                name: stack.enter_context(_create(self._root / f"{name}.txt")) for name in LISTS[1:]
+                name: stack.enter_context(_create_text_file(self._root / f"{name}.txt"))
+                for name in LISTS[1:]
             }
-            self._waiting = stack.enter_context(_create(self._root / _PART))
+            self._waiting = stack.enter_context(_create_text_file(self._root / _PART))
             self._stack = stack.pop_all()
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
         self._stack.close()
         if kind is None:
-            self._finish()
+            self._write_lists()
 
     def add(self, split: str, match: str, group: str, image: str) -> None:
         """One image of one of ``LISTS``."""
@@ -73,21 +74,21 @@ class ImageLists:
         # Which of them train is known once all have been seen.
         self._waiting.write(json_text([match, self._groups, image]) + "\n")
 
-    def _finish(self) -> None:
-        held_out = self._held_out()
+    def _write_lists(self) -> None:
+        held_out = self._validation_rule()
         part = self._root / _PART
         with (
             part.open(encoding="utf-8") as waiting,
-            _create(self._root / "train.txt") as train,
+            _create_text_file(self._root / "train.txt") as train,
             (self._root / "val.txt").open("a", encoding="utf-8", newline="\n") as val,
         ):
-            for match, group, image in _rows(waiting):
+            for match, group, image in _read_listed_images(waiting):
                 (val if held_out(match, group) else train).write(f"./{image}\n")
         part.unlink()
         for name in set(LISTS) - self.used - {"train"}:
             (self._root / f"{name}.txt").unlink()
 
-    def _held_out(self) -> Callable[[str, int], bool]:
+    def _validation_rule(self) -> Callable[[str, int], bool]:
         """Which training images validate, by their match and the number of their group."""
         if "val" in self.used:
             self.sentence = "val.txt holds the validation split."
@@ -100,7 +101,7 @@ class ImageLists:
             self.sentence = (
                 "No split validates: val.txt holds whole matches that were meant for training."
             )
-            chosen = _some_matches(self._matches)
+            chosen = _choose_validation_matches(self._matches)
             return lambda match, group: match in chosen
         # Neighbours in time look alike: one piece at the end is better than every tenth group.
         last = self._groups - max(round(self._groups / HELD_OUT), 1)
@@ -111,7 +112,7 @@ class ImageLists:
         return lambda match, group: group > last
 
 
-def _some_matches(images: Counter[str]) -> set[str]:
+def _choose_validation_matches(images: Counter[str]) -> set[str]:
     """About one in ``HELD_OUT`` images by whole matches: the same ones for the same matches."""
     chosen: set[str] = set()
     count = 0
@@ -123,11 +124,11 @@ def _some_matches(images: Counter[str]) -> set[str]:
     return chosen
 
 
-def _create(path: Path) -> IO[str]:
+def _create_text_file(path: Path) -> IO[str]:
     return path.open("w", encoding="utf-8", newline="\n")
 
 
-def _rows(file: IO[str]) -> Iterator[tuple[str, int, str]]:
+def _read_listed_images(file: IO[str]) -> Iterator[tuple[str, int, str]]:
     for line in file:
         match, group, image = json.loads(line)
         yield match, group, image
@@ -172,7 +173,7 @@ def write_yolo(
     """
     names = ("groups", "labels", "boxes", "balls", "images", "images_missing")
     counts = dict.fromkeys(names, 0)
-    put = put or put_on_disk(root)
+    put = put or write_to_disk(root)
     with ExitStack() as stack:
         lists = stack.enter_context(ImageLists(root))
         file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
@@ -180,14 +181,14 @@ def write_yolo(
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                image = _add(put, record, view, table, boxes, counts)
+                image = _write_label_file(put, record, view, table, boxes, counts)
                 split, group = split_folder(record.split(view)), record.group
                 lists.add(split, group.match, group.key, image)
-    _write_data(root, lists, counts)
+    _write_data_yaml(root, lists, counts)
     return counts
 
 
-def _add(
+def _write_label_file(
     put: PutText,
     record: ExportRecord,
     view: View,
@@ -197,10 +198,12 @@ def _add(
 ) -> str:
     """Write the label file of a view; returns the name of its image."""
     group, present, split = record.group, view.key in record.frames, record.split(view)
-    image = record.frames.get(view.key) or flat_frame(group, view, split, likely_suffix(view))
+    image = record.frames.get(view.key) or frame_path_in_split(
+        group, view, split, expected_frame_suffix(view)
+    )
     label = PurePosixPath("labels", *PurePosixPath(image).parts[1:]).with_suffix(".txt")
     box = chosen_box(record, view, boxes) if view.ball else None
-    line = None if box is None else label_line(box_to_corner(box), view.size)
+    line = None if box is None else yolo_label_line(box_to_corner(box), view.size)
     put(str(label), "" if line is None else f"{line}\n")
     cells: tuple[Any, ...] = (image, present, group.key, view.key, split)
     table.add((*cells, view.size.width, view.size.height, record.verdict_text))
@@ -211,7 +214,7 @@ def _add(
     return image
 
 
-def label_line(box: Box, size: ImageSize) -> str | None:
+def yolo_label_line(box: Box, size: ImageSize) -> str | None:
     """``0 cx cy w h`` in parts of the image; None where the box lies outside.
 
     Args:
@@ -235,7 +238,7 @@ def label_line(box: Box, size: ImageSize) -> str | None:
     return "0 " + " ".join(f"{number:.9g}" for number in numbers)
 
 
-def _write_data(root: Path, lists: ImageLists, counts: dict[str, int]) -> None:
+def _write_data_yaml(root: Path, lists: ImageLists, counts: dict[str, int]) -> None:
     missing = counts["images_missing"]
     sentence = (
         f"{plural(missing, 'image is', 'images are')} not in this export: put each where {TABLE} names it."

@@ -10,9 +10,9 @@ from dataclasses import replace
 from typing import IO
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.formats.file_tree import BROKEN, Limits, Root, read_capped
+from app.formats.file_tree import BROKEN, Limits, Root, read_limited
 from app.formats.report import Report
-from app.formats.safe_path import check_name, is_hidden
+from app.formats.safe_path import is_hidden, require_safe_path
 from app.object_store.path import StoredPath
 from app.soccer.media import Media
 from app.zip_file import UNREADABLE, count_truncated, open_nested, open_zip
@@ -37,7 +37,7 @@ class ZipTree:
         self._archive = _open_zip(path) if archive is None else archive
         self._count = self._total = 0
         try:
-            self._members = self._checked(report)
+            self._members = self._checked_members(report)
         except DatasetFormatError:
             self._archive.close()
             raise
@@ -79,7 +79,7 @@ class ZipTree:
     def read_bytes(self, name: str) -> bytes:
         """The whole content of one member."""
         with self.open(name) as file:
-            return read_capped(file, self._limits.file_bytes, self.shown(name))
+            return read_limited(file, self._limits.file_bytes, self.shown(name))
 
     def open(self, name: str) -> IO[bytes]:
         """The content as a stream."""
@@ -98,18 +98,18 @@ class ZipTree:
 
     def media(self, name: str) -> Media:
         """Where a member can be read later."""
-        return self._media(self.own_name(name))
+        return self._media_of_member(self.stored_name(name))
 
     def media_in_zip(self, name: str, member: str) -> Media:
         """Where a member of a zip file that is a member can be read later."""
-        return self._media(f"{self.own_name(name)}/{member}")
+        return self._media_of_member(f"{self.stored_name(name)}/{member}")
 
-    def own_name(self, name: str) -> str:
+    def stored_name(self, name: str) -> str:
         """The name of a member as the zip file itself spells it, by which it is opened later."""
         found = self._members.get(name)
         return name if found is None else found.filename
 
-    def _media(self, member: str) -> Media:
+    def _media_of_member(self, member: str) -> Media:
         if isinstance(self.path, StoredPath):
             return Media(self.path.sealed(), member)
         return Media(str(self.path), member)
@@ -118,7 +118,7 @@ class ZipTree:
         """Close the zip file."""
         self._archive.close()
 
-    def _checked(self, report: Report) -> dict[str, zipfile.ZipInfo]:
+    def _checked_members(self, report: Report) -> dict[str, zipfile.ZipInfo]:
         members = self._archive.infolist()
         self._check_totals(members)
         if lost := count_truncated(self._archive):
@@ -135,7 +135,7 @@ class ZipTree:
             # A name that begins with NUL is empty, which ``is_dir`` does not survive.
             if name.endswith("/") or any(map(is_hidden, name.split("/"))):
                 continue
-            problem = self._problem(member, name, folded)
+            problem = self._member_problem(member, name, folded)
             if problem is None:
                 checked[name] = member
             else:
@@ -155,7 +155,9 @@ class ZipTree:
             raise DatasetFormatError(shown, None, None, problem)
         self._count, self._total = len(members), total
 
-    def _problem(self, member: zipfile.ZipInfo, name: str, folded: Counter[str]) -> str | None:
+    def _member_problem(
+        self, member: zipfile.ZipInfo, name: str, folded: Counter[str]
+    ) -> str | None:
         kind = stat.S_IFMT(member.external_attr >> 16)
         if kind not in (0, stat.S_IFREG):
             return "is a link or device, not a plain file"
@@ -169,7 +171,7 @@ class ZipTree:
             return f"grows more than {self._limits.ratio} times when it is unpacked"
         try:
             # ZipInfo itself cuts a name at NUL; look at the original.
-            check_name(member.orig_filename.replace("\\", "/"))
+            require_safe_path(member.orig_filename.replace("\\", "/"))
         except UnsafePathError as error:
             return error.message
         return None

@@ -13,7 +13,7 @@ from typing import IO, Any
 from app.errors import DatasetFormatError
 from app.finite import json_text
 from app.formats.camera_json import camera_from_json, camera_to_json
-from app.formats.fields import whole
+from app.formats.fields import whole_number
 from app.formats.json_text import read_json
 from app.sample.scene import PRACTICE_KINDS, PlantedFault, SceneTruth, ViewTruth
 from app.soccer.frames import Box
@@ -107,7 +107,7 @@ def _fault_from_json(value: dict[str, Any]) -> PlantedFault:
         view=value["view"],
         marking=value.get("marking"),
         true_marking=value.get("true_marking"),
-        index=None if index is None else whole(index),
+        index=None if index is None else whole_number(index),
         amount=None if amount is None else float(amount),
     )
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.errors import InputError, NotFoundError
-from app.formats.output import zip_files
+from app.formats.output import write_files_to_zip
 from app.formats.safe_path import resolve_inside
 from app.object_store.address import is_address
 from app.progress import ReportProgress
@@ -211,7 +211,7 @@ def as_one_file(path: Path) -> Iterator[Path]:
         packed = Path(held) / f"{path.resolve().name}.zip"
         files = (file for file in sorted(path.rglob("*")) if file.is_file())
         named = ((file.relative_to(path).as_posix(), file) for file in files)
-        zip_files(named, packed, COMPRESSED)
+        write_files_to_zip(named, packed, COMPRESSED)
         yield packed
 
 

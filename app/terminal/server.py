@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from app.durable import is_open_to_others
 from app.errors import InputError, ReviewError
-from app.formats.plain_file import open_plain
+from app.formats.plain_file import open_regular_file
 
 if TYPE_CHECKING:
     from touchline.client import Client
@@ -101,7 +101,7 @@ def read_token(path: Path) -> str:
     from app.features.people.access_tokens import has_valid_checksum
 
     try:
-        with open_plain(path) as file:
+        with open_regular_file(path) as file:
             found = os.fstat(file.fileno())
             text = file.read(MAX_TOKEN).decode("ascii", "replace").strip()
     except OSError as error:

@@ -179,9 +179,9 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
     print_values(values, as_json)
     if as_json:
         return
-    from app.formats.export_formats import lacking
+    from app.formats.export_formats import missing_for_use
 
-    absent = lacking(values.get("format", ""), values["counts"])
+    absent = missing_for_use(values.get("format", ""), values["counts"])
     if absent is not None:
         say(f"Not complete: {absent}. --images copy puts them there.")
     missing = values["missing_images"]

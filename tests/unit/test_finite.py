@@ -34,7 +34,7 @@ from app.finite import finite, json_text
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.parquet import pyarrow_modules
+from app.formats.parquet import import_pyarrow
 from app.geometry.camera import Camera
 from app.log import only_finite
 from app.soccer.finding import Finding, Fix
@@ -254,7 +254,7 @@ class TestFiles:
 def require_finite(path: Path) -> None:
     """Raise where a file of an export holds a number that is not finite."""
     if path.suffix == ".parquet":
-        rows = pyarrow_modules()[1].read_table(path).to_pylist()
+        rows = import_pyarrow()[1].read_table(path).to_pylist()
         strict(json.dumps(rows))
     elif path.suffix == ".json":
         strict(path.read_text(encoding="utf-8"))

@@ -19,7 +19,7 @@ from app.durable import PARTIAL, replace_file
 from app.errors import NotFoundError
 from app.features.exports.service import ExportReport
 from app.finite import json_text
-from app.formats.export_formats import lacking
+from app.formats.export_formats import missing_for_use
 from app.object_store.path import StoredPath
 
 _ID = re.compile(r"[0-9a-f]{32}|[1-9][0-9]{0,18}")
@@ -52,7 +52,7 @@ class ExportEntry:
     @property
     def incomplete(self) -> str | None:
         """What the files still lack before they can be used; None: nothing."""
-        return lacking(self.request["format"], self.counts)
+        return missing_for_use(self.request["format"], self.counts)
 
 
 class ExportFolder:

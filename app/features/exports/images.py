@@ -8,8 +8,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
-from app.formats.export_names import folded, frame_of, named
-from app.formats.frame_names import FrameName, match_frame
+from app.formats.export_names import fold_file_name, frame_identity, with_export_key
+from app.formats.frame_names import FrameName, frame_path_by_match
 from app.formats.safe_path import resolve_inside
 from app.media.files import media_facts, picture_header
 from app.media.frames import SentPicture
@@ -40,7 +40,9 @@ class ExportImages:
         placed: Where the frames of the newest group are, by view; relative to the export.
     """
 
-    def __init__(self, root: Path, images: str, read: ReadPicture, layout: FrameName = match_frame):
+    def __init__(
+        self, root: Path, images: str, read: ReadPicture, layout: FrameName = frame_path_by_match
+    ):
         self.media: list[Mapping[str, Any]] = []
         self.missing: list[str] = []
         self.placed: dict[str, str] = {}
@@ -131,11 +133,11 @@ class ExportImages:
         Raises:
             InputError: Another frame has its name.
         """
-        called = named(view, self._names.get(view.key))
+        called = with_export_key(view, self._names.get(view.key))
         path = self._layout(group, called, self._splits.get(view.key, group.split), suffix)
         whose = f"{group.key}, {view.key}"
-        first = self._written.get(folded(path))
-        if first is not None and (first.frame, first.path) != (frame_of(group, view), path):
+        first = self._written.get(fold_file_name(path))
+        if first is not None and (first.frame, first.path) != (frame_identity(group, view), path):
             raise InputError(
                 f"the pictures of two frames ({first.whose} and {whose}) would both be called {path}",
                 hint="Export without pictures, or rename one of the views in the source.",
@@ -144,6 +146,6 @@ class ExportImages:
         if first is not None:
             return None
         target = resolve_inside(self._root, path)
-        self._written[folded(path)] = _Written(path, frame_of(group, view), whose)
+        self._written[fold_file_name(path)] = _Written(path, frame_identity(group, view), whose)
         target.parent.mkdir(parents=True, exist_ok=True)
         return target

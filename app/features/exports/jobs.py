@@ -18,7 +18,7 @@ from app.features.jobs.queries import EXPORT, Job
 from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.formats.file_tree import Root
-from app.formats.safe_path import check_name
+from app.formats.safe_path import require_safe_path
 from app.formats.store_output import require_absent
 from app.media.frames import Frames, SentPicture
 from app.object_store.address import SCHEME
@@ -162,7 +162,7 @@ def _target(store: Store, address: str) -> StoredPath:
         NotFoundError: There is no such store.
     """
     try:
-        check_name(address.removeprefix(SCHEME))
+        require_safe_path(address.removeprefix(SCHEME))
         return target_path(store.settings, address)
     except (InputError, NotFoundError) as error:
         raise type(error)(error.message, hint=error.hint, pointer="/to") from error

@@ -25,7 +25,7 @@ from app.features.exports.service import possible_formats
 from app.features.jobs.queries import Job
 from app.features.jobs.routes import Cursor, DatasetFilter, Limit
 from app.features.jobs.schemas import JobDocument
-from app.formats.export_formats import used_options
+from app.formats.export_formats import options_used_by
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
 from app.http.job_responses import ACCEPTED, job_address
@@ -70,7 +70,7 @@ def list_formats(
     return FormatList(
         items=[
             FormatDocument(
-                **vars(one), possible=one.reason is None, options=used_options(one.format)
+                **vars(one), possible=one.reason is None, options=options_used_by(one.format)
             )
             for one in answers
         ]

@@ -22,7 +22,7 @@ from app.features.file_tools.matches import (
     shares_of,
 )
 from app.finite import json_text
-from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.cameras_writer import camera_file_name, camera_file_text
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
@@ -224,7 +224,7 @@ def _frame(
         stem=stem,
         camera=None
         if camera is None
-        else camera_text(camera, as_lone(calibration, lone).known_covariance, size),
+        else camera_file_text(camera, as_lone(calibration, lone).known_covariance, size),
         reason=calibration.reason,
         findings=tuple(findings),
         left_out=left_out,
@@ -243,7 +243,7 @@ def _in_picture(
     if picture is None or camera is None:
         return frame
     known = as_lone(frame.alone, frame.lone).known_covariance
-    return replace(frame, camera=camera_text(picture.done(camera, size), known, size))
+    return replace(frame, camera=camera_file_text(picture.done(camera, size), known, size))
 
 
 def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:
@@ -270,7 +270,7 @@ def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> d
 def _write(
     out: Path, frames: list[CalibratedFrame], summary: dict[str, Any], with_leave_one_out: bool
 ) -> None:
-    texts = {camera_name(frame.stem): frame.camera for frame in frames if frame.camera}
+    texts = {camera_file_name(frame.stem): frame.camera for frame in frames if frame.camera}
     findings = [
         {"frame": frame.stem, **asdict(finding)} for frame in frames for finding in frame.findings
     ]

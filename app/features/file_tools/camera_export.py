@@ -14,9 +14,9 @@ import numpy as np
 from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
 from app.finite import json_text
-from app.formats.camera_arrays import arrays_of_cameras
+from app.formats.camera_arrays import camera_arrays
 from app.formats.cameras_reader import read_cameras
-from app.formats.opentrackio_writer import frame_rate, opentrackio_sample, why_not_opentrackio
+from app.formats.opentrackio_writer import frame_rate, opentrackio_problem, opentrackio_sample
 from app.formats.report import Report
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize
@@ -50,7 +50,7 @@ def export_cameras(
         raise report.refusal(f"{source} holds no camera_<frame>.json")
     if kind == "npz":
         content = io.BytesIO()
-        arrays: dict[str, Any] = dict(arrays_of_cameras(cameras, str(source)))
+        arrays: dict[str, Any] = dict(camera_arrays(cameras, str(source)))
         np.savez_compressed(content, **arrays)
         out.parent.mkdir(parents=True, exist_ok=True)
         replace_file(out, content.getvalue())
@@ -94,7 +94,7 @@ def _write_samples(
                 f"the camera of frame {frame} does not say the size of its image, which OpenTrackIO "
                 "needs: give it as --size 1280x720"
             )
-        if problem := why_not_opentrackio(camera):
+        if problem := opentrackio_problem(camera):
             raise DatasetFormatError(str(source), f"frame {frame}", None, problem)
         outcome = rows.get(frame, {}).get("outcome")
         samples[f"sample_{frame:0{width}d}.json"] = opentrackio_sample(

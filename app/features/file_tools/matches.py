@@ -15,7 +15,7 @@ from app.errors import DatasetFormatError, GeometryError
 from app.formats.csv_text import read_rows
 from app.formats.file_tree import Limits
 from app.formats.json_text import read_json
-from app.formats.plain_file import read_plain
+from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
@@ -152,7 +152,7 @@ def read_picture(path: Path) -> PictureGeometry:
     Raises:
         DatasetFormatError: The file holds something else.
     """
-    value = read_json(read_plain(path), str(path))
+    value = read_json(read_regular_file(path), str(path))
     try:
         assert isinstance(value, dict)
         right, down = value.get("shift", (0.0, 0.0))

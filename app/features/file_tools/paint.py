@@ -18,7 +18,7 @@ from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
 from app.finite import json_text
 from app.formats.cameras_reader import read_cameras
-from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.cameras_writer import camera_file_name, camera_file_text
 from app.formats.file_tree import Limits
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.line_documents import read_line_documents
@@ -28,7 +28,7 @@ from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.sn_calibration_writer import write_line_files
 from app.formats.trees import opened_tree
-from app.formats.view_files import write_below
+from app.formats.view_files import write_file_below
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
@@ -277,7 +277,7 @@ def _snap_picture(
     clicked = calibrate(lines, Pitch(), size, CLICKED)
     if clicked.camera is None:
         return _row(frame, NOTHING, reason=clicked.reason), None, None
-    kept = camera_text(clicked.camera, clicked.known_covariance, size)
+    kept = camera_file_text(clicked.camera, clicked.known_covariance, size)
     field = field_of_play(picture.image)
     reason = why_no_field(picture.image, field)
     if reason is not None:
@@ -303,7 +303,7 @@ def _snap_picture(
     known = snapped.covariance
     if snapped.reason is not None or known is None:
         return row, kept, None
-    return row, camera_text(snapped.camera, row_by_row(known), size), snapped
+    return row, camera_file_text(snapped.camera, row_by_row(known), size), snapped
 
 
 def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> SnappedCamera:
@@ -343,7 +343,7 @@ def _row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
 def _keep(out: Path, stem: str, text: str | None, snapped: SnappedCamera | None) -> None:
     """Write the camera of a frame and the points that were snapped; what an earlier run left
     there goes where there is nothing to write."""
-    old = resolve_inside(out, camera_name(stem))
+    old = resolve_inside(out, camera_file_name(stem))
     old_lines = resolve_inside(out, f"lines/{stem}.json")
     try:
         if snapped is None:
@@ -352,7 +352,7 @@ def _keep(out: Path, stem: str, text: str | None, snapped: SnappedCamera | None)
             old.unlink(missing_ok=True)
             return
         out.mkdir(parents=True, exist_ok=True)
-        write_below(out, camera_name(stem), text)
+        write_file_below(out, camera_file_name(stem), text)
         if snapped is not None:
             (out / "lines").mkdir(exist_ok=True)
             height, width = snapped.size

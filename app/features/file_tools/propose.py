@@ -17,7 +17,7 @@ from app.errors import GeometryError, InputError
 from app.features.file_tools.paint import PictureFile, UniqueNames, read_pictures
 from app.finite import json_text
 from app.formats.cameras_reader import read_cameras
-from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.cameras_writer import camera_file_name, camera_file_text
 from app.formats.report import Report
 from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import row_by_row
@@ -150,7 +150,7 @@ def _propose_one(
         except (GeometryError, np.linalg.LinAlgError) as error:
             found = FrameProposal("nothing", f"the picture cannot be solved ({error})")
     milliseconds = 1000 * (time.perf_counter() - began)
-    file, row = resolve_inside(out, camera_name(frame)), _row(frame, found, milliseconds)
+    file, row = resolve_inside(out, camera_file_name(frame)), _row(frame, found, milliseconds)
     if pitch != Pitch():
         row["pitch"] = {"length": pitch.length, "width": pitch.width}
     agrees = 0.0 if found.agreement is None else found.agreement.product
@@ -163,7 +163,7 @@ def _propose_one(
             camera = camera.scaled(size.width / width, size.height / height)
         spread = None if found.snapped is None else found.snapped.covariance
         covariance = None if spread is None else row_by_row(spread)
-        _write(file, camera_text(camera, covariance, size or ImageSize(width, height)))
+        _write(file, camera_file_text(camera, covariance, size or ImageSize(width, height)))
         return row, _Proposed(found.camera, agrees, pitch_frame(picture.image, found.camera, pitch))
     file.unlink(missing_ok=True)
     if found.camera is None or picture.image is None or not _is_likely(found):

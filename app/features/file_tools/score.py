@@ -10,7 +10,7 @@ from typing import Any
 from app.errors import DatasetFormatError, InputError
 from app.formats.cameras_reader import read_cameras
 from app.formats.json_text import read_json
-from app.formats.plain_file import read_plain
+from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.camera import Camera
@@ -94,7 +94,7 @@ def _by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
 
 def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
     """Frame and marking of each finding ``wrong_label``."""
-    value = read_json(read_plain(findings), str(findings))
+    value = read_json(read_regular_file(findings), str(findings))
     if not isinstance(value, list):
         raise DatasetFormatError(str(findings), None, None, "is not a list of findings")
     rows = [item for item in value if isinstance(item, dict) and item.get("kind") == "wrong_label"]

@@ -14,7 +14,7 @@ import numpy as np
 from app.durable import replace_file
 from app.errors import InputError, UnsafePathError
 from app.finite import json_text
-from app.formats.cameras_writer import camera_name, camera_text
+from app.formats.cameras_writer import camera_file_name, camera_file_text
 from app.formats.line_documents import read_line_documents
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import lines_from_json
@@ -229,11 +229,11 @@ def write_cameras(out: Path, found: Sequence[FrameCamera], result: Mapping[str, 
     try:
         out.mkdir(parents=True, exist_ok=True)
         for frame in found:
-            file = out / camera_name(str(frame.number))
+            file = out / camera_file_name(str(frame.number))
             if frame.camera is None:
                 file.unlink(missing_ok=True)
                 continue
-            text = camera_text(frame.camera, frame.covariance, frame.size)
+            text = camera_file_text(frame.camera, frame.covariance, frame.size)
             replace_file(file, text.encode(), durable=False, private=False)
         text = json_text(result, indent=1) + "\n"
         replace_file(out / RESULT, text.encode(), durable=False, private=False)

@@ -29,8 +29,8 @@ from app.features.imports.upload_quota import quota_of as quota_of
 from app.features.imports.upload_quota import used_bytes as used_bytes
 from app.features.people.visibility_queries import Visibility
 from app.formats.file_tree import Root
-from app.formats.guess_format import guess_format, guess_of_names
-from app.formats.safe_path import MAX_PART, check_name, resolve_inside
+from app.formats.guess_format import guess_format, guess_format_of_names
+from app.formats.safe_path import MAX_PART, require_safe_path, resolve_inside
 from app.object_store.address import SCHEME, is_address
 from app.object_store.path import StoredPath, find_path
 
@@ -93,7 +93,7 @@ def resolve_folder(settings: Settings, path: str) -> Root:
         )
     if any(len(part.encode(errors="replace")) > MAX_PART for part in path.split("/")):
         raise NotFoundError("there is no folder of so long a name to import from")
-    root, _, inside = check_name(path.rstrip("/")).partition("/")
+    root, _, inside = require_safe_path(path.rstrip("/")).partition("/")
     if root not in folders:
         names = ", ".join(sorted(folders))
         raise NotFoundError(
@@ -106,7 +106,7 @@ def resolve_folder(settings: Settings, path: str) -> Root:
 
 
 def _resolve_address(settings: Settings, address: str) -> StoredPath:
-    check_name(address.removeprefix(SCHEME).strip("/"))
+    require_safe_path(address.removeprefix(SCHEME).strip("/"))
     return find_path(settings, address)
 
 
@@ -131,7 +131,7 @@ def list_folder(settings: Settings, path: str = "") -> FolderListing:
 def _list_stored(found: StoredPath) -> FolderListing:
     """What is in a folder of a store; one request, so that the format is guessed of this level."""
     if not found.is_dir():
-        return FolderListing(str(found), guess_of_names([found.name]), (), False)
+        return FolderListing(str(found), guess_format_of_names([found.name]), (), False)
     folders, objects = found.store.folder(found.key)
     at = str(found).rstrip("/")
     items = [FolderItem(f"{at}/{name}", name, True) for name in folders]
@@ -140,7 +140,7 @@ def _list_stored(found: StoredPath) -> FolderListing:
     items = [item for item in items if not item.name.startswith(".") and _is_name(item.name)]
     items.sort(key=lambda item: (not item.folder, item.name))
     shown, more = tuple(items[:MAX_ITEMS]), len(items) > MAX_ITEMS
-    return FolderListing(at, guess_of_names(names), shown, more)
+    return FolderListing(at, guess_format_of_names(names), shown, more)
 
 
 def _items(folder: Path, path: str) -> Iterator[FolderItem]:
@@ -156,7 +156,7 @@ def _items(folder: Path, path: str) -> Iterator[FolderItem]:
 
 def _is_name(name: str) -> bool:
     try:
-        return bool(check_name(name))
+        return bool(require_safe_path(name))
     except InputError:
         return False
 

@@ -22,7 +22,7 @@ from app.formats.format_names import ImportFormat
 from app.formats.frame_list import read_frame_list
 from app.formats.frames_reader import check_grouping, read_frames
 from app.formats.gamestate_reader import read_gamestate
-from app.formats.guess_format import guess_format, holds_videos_alone, looks_like
+from app.formats.guess_format import guess_format, guess_from_content, holds_only_videos
 from app.formats.issia_3d_reader import open_issia_3d
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.parquet_reader import read_parquet
@@ -216,8 +216,8 @@ class Imported:
             first = source.shown(problems[0])
             sentence += f". The first of {len(problems)} problems: " if problems[1:] else ": "
             sentence += first
-        look = looks_like(source.path, source.format)
-        if look is not None and not (problems and look.is_said(problems[0])):
+        look = guess_from_content(source.path, source.format)
+        if look is not None and not (problems and look.is_stated_by(problems[0])):
             return sentence, look.sentence
         if self.report.read:
             return sentence, "Every record was left out; the report names each with its reason."
@@ -230,7 +230,7 @@ class Imported:
         """What a source is that nothing was read of, where it has no annotations; what to do."""
         if self.imported_anything:
             return None
-        if holds_videos_alone(self.source.path):
+        if holds_only_videos(self.source.path):
             return "holds a video, which is a recording", RECORDING_HINT
         if self.source.format != "frames" and guess_format(self.source.path) == "frames":
             return "holds pictures and no annotations", FRAMES_HINT
@@ -341,7 +341,9 @@ def import_source(
     folder = _static(source, report, limits) if source.format in STATIC else None
     groups = _groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
-        groups = read_frame_list(source.frames, settings, report, limits).placed(iter(groups))
+        groups = read_frame_list(source.frames, settings, report, limits).with_listed_frames(
+            iter(groups)
+        )
     counts, check = BallCounter(), PictureCheck(report, settings, progress)
     result = ingest(
         store,

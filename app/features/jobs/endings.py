@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from app.db.json_columns import Json
-from app.formats.export_formats import lacking
+from app.formats.export_formats import missing_for_use
 from app.plural import counted, plural
 
 
@@ -60,7 +60,7 @@ def _imported(result: Json) -> str:
 def _exported(result: Json) -> str:
     counts = result["counts"]
     written = ", ".join(counted(count, name) for name, count in counts.items())
-    missing = lacking(result.get("format", ""), counts)
+    missing = missing_for_use(result.get("format", ""), counts)
     return f"Written: {written}." + ("" if missing is None else f" {missing}.")
 
 

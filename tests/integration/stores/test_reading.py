@@ -179,7 +179,7 @@ class TestFrameLists:
         file.write_text(json.dumps({"frames": entries}))
         report = Report()
         found = read_frame_list(file, settings, report)
-        groups = [*found.placed(read_soccernet_v3(labels, Report()))]
+        groups = [*found.with_listed_frames(read_soccernet_v3(labels, Report()))]
         assert [problem.record for problem in report.problems] == [
             "frames/3",
             "frames/4",

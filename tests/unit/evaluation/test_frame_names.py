@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from app.evaluation.frame_names import FrameNames, NamedFrame
-from app.formats.frame_names import flat_frame, match_frame
-from app.formats.gamestate import sequence_frame
-from app.formats.sn_calibration import line_frame
+from app.formats.frame_names import frame_path_by_match, frame_path_in_split
+from app.formats.gamestate import sequence_frame_path
+from app.formats.sn_calibration import line_frame_path
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
@@ -67,9 +67,14 @@ class TestFind:
 
     def test_knows_what_exports_call_it(self, names) -> None:
         group, view = Group(f"{ALDER}/7.png", (), match=ALDER), View("7_1.png", Station("x", SIZE))
-        for place in (match_frame, flat_frame, line_frame, sequence_frame):
+        for place in (
+            frame_path_by_match,
+            frame_path_in_split,
+            line_frame_path,
+            sequence_frame_path,
+        ):
             assert names.find(place(group, view, "test", ".jpg")).id == 2
-        label = flat_frame(group, view, "test", ".jpg").replace("images/", "labels/")
+        label = frame_path_in_split(group, view, "test", ".jpg").replace("images/", "labels/")
         assert names.find(label.rsplit(".", 1)[0] + ".txt").id == 2
 
     def test_a_name_that_fits_several_is_none_of_them(self, names) -> None:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.formats.ball_names import is_ball, same_name
+from app.formats.ball_names import is_ball, is_same_name
 
 BALLS = [
     "ball",
@@ -76,6 +76,6 @@ class TestIsBall:
 
 class TestSameName:
     def test_case_separators_and_accents_do_not_matter(self) -> None:
-        assert same_name("Object_1", "object-1")
-        assert same_name("Balón", "balon")
-        assert not same_name("object1", "object2")
+        assert is_same_name("Object_1", "object-1")
+        assert is_same_name("Balón", "balon")
+        assert not is_same_name("object1", "object2")

@@ -82,7 +82,7 @@ class TestCamerasOfArrays:
         one = {"K": K, "R": camera.rotation, "t": np.zeros(3)}
         np.savez_compressed(tmp_path / "a.npz", **(one | arrays))
         monkeypatch.setattr(
-            cameras_reader, "_camera", lambda *_: pytest.fail("a camera was made of it")
+            cameras_reader, "_parse_camera", lambda *_: pytest.fail("a camera was made of it")
         )
         assert read_cameras(tmp_path, report) == {}
         (said,) = map(str, report.problems)

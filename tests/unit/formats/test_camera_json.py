@@ -15,7 +15,7 @@ from app.formats.camera_json import (
     covariance_from_json,
     covariance_to_json,
 )
-from app.formats.cameras_writer import camera_text
+from app.formats.cameras_writer import camera_file_text
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.geometry.resection import camera_from_parameters, parameters_from_camera
@@ -64,7 +64,7 @@ class TestCameraToJson:
     @pytest.mark.parametrize("lens", WIDE_LENSES)
     def test_a_wide_lens_is_named_and_never_looks_like_a_pinhole(self, lens: str) -> None:
         camera = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), lens)
-        value = json.loads(camera_text(camera))
+        value = json.loads(camera_file_text(camera))
         assert value["lens"] == lens
         assert tuple(value["lens_coefficients"]) == WIDE_LENSES[lens]
         # A reader of SoccerNet's own fields finds none of them, rather than zeros.
@@ -76,7 +76,7 @@ class TestCameraToJson:
 
     @given(cameras())
     def test_what_is_written_comes_back_exactly(self, camera: Camera) -> None:
-        again = camera_from_json(json.loads(camera_text(camera)), "f")
+        again = camera_from_json(json.loads(camera_file_text(camera)), "f")
         assert again == camera
 
 
@@ -106,7 +106,7 @@ class TestCovariance:
         assert np.corrcoef(np.transpose(drawn)) == pytest.approx(shares, abs=0.05)
 
     def test_a_file_brings_it_back(self) -> None:
-        value = json.loads(camera_text(MAIN, SPREAD, SIZE))
+        value = json.loads(camera_file_text(MAIN, SPREAD, SIZE))
         assert np.shape(value["covariance"]) == (8, 8)
         assert camera_from_json(value, "f") == MAIN
         assert covariance_from_json(value, MAIN, SIZE) == pytest.approx(SPREAD, rel=1e-9)

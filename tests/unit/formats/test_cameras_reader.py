@@ -10,7 +10,7 @@ import pytest
 
 from app.formats.camera_json import camera_to_json
 from app.formats.cameras_reader import read_cameras
-from app.formats.cameras_writer import camera_text
+from app.formats.cameras_writer import camera_file_text
 from app.formats.report import Report
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
@@ -36,15 +36,15 @@ class TestReadCameras:
     def test_equal_stems_in_two_folders_keep_their_folders(
         self, make_zip: Callable[..., Path], camera: Camera, report: Report
     ) -> None:
-        text = camera_text(camera)
+        text = camera_file_text(camera)
         path = make_zip({"a/camera_1.json": text, "b/camera_1.json": text})
         assert list(read_cameras(path, report)) == ["a/1", "b/1"]
 
     def test_a_bad_camera_is_reported_and_the_rest_imported(
         self, make_zip: Callable[..., Path], camera: Camera, report: Report
     ) -> None:
-        bad = camera_text(camera).replace("2100.5", "NaN")
-        path = make_zip({"camera_1.json": bad, "camera_2.json": camera_text(camera)})
+        bad = camera_file_text(camera).replace("2100.5", "NaN")
+        path = make_zip({"camera_1.json": bad, "camera_2.json": camera_file_text(camera)})
         assert list(read_cameras(path, report)) == ["2"]
         assert (report.read, report.imported) == (2, 1)
         assert "camera_1.json, x_focal_length: is nan, not a finite number" in str(
@@ -56,11 +56,15 @@ class TestReadCameras:
     ) -> None:
         known = row_by_row(np.eye(8) * 1e-4)
         camera = looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 1500.0)
-        text = camera_text(camera, known, SIZE)
+        text = camera_file_text(camera, known, SIZE)
         value = json.loads(text)
         broken = json.dumps({**value, "covariance": [[1.0]]})
         path = make_zip(
-            {"camera_1.json": text, "camera_2.json": camera_text(camera), "camera_3.json": broken}
+            {
+                "camera_1.json": text,
+                "camera_2.json": camera_file_text(camera),
+                "camera_3.json": broken,
+            }
         )
         covariances: dict[str, Any] = {}
         assert list(read_cameras(path, report, covariances=covariances)) == ["1", "2"]

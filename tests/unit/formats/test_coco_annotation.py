@@ -4,7 +4,12 @@ from typing import Any
 
 import pytest
 
-from app.formats.coco_annotation import NoPlaceError, ball_of, box_of, is_occluded
+from app.formats.coco_annotation import (
+    MissingPositionError,
+    ball_from_annotation,
+    box_from_annotation,
+    is_occluded,
+)
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 
@@ -14,7 +19,7 @@ CENTRE = ImagePoint(99.5, 49.5)
 
 class TestBallOf:
     def test_a_box_is_half_a_pixel_nearer_to_the_first_one(self) -> None:
-        ball = ball_of({"bbox": [90, 40, 20, 20]})
+        ball = ball_from_annotation({"bbox": [90, 40, 20, 20]})
         assert ball == BallAnnotation(box=Box(89.5, 39.5, 20, 20))
         assert ball.center == CENTRE
 
@@ -32,22 +37,24 @@ class TestBallOf:
         ],
     )
     def test_a_ball_without_area_is_a_point(self, item: dict[str, Any]) -> None:
-        assert ball_of(item) == BallAnnotation(point=CENTRE)
+        assert ball_from_annotation(item) == BallAnnotation(point=CENTRE)
 
     def test_a_box_with_area_goes_before_its_keypoints(self) -> None:
         item = {"bbox": [90, 40, 20, 20], "keypoints": [None, 3, 2]}
-        assert ball_of(item).box == Box(89.5, 39.5, 20, 20)
+        assert ball_from_annotation(item).box == Box(89.5, 39.5, 20, 20)
 
     def test_a_keypoint_that_is_labelled_as_not_visible_is_an_occluded_ball(self) -> None:
-        assert ball_of({"keypoints": [100, 50, 1]}) == BallAnnotation(point=CENTRE, occluded=True)
+        assert ball_from_annotation({"keypoints": [100, 50, 1]}) == BallAnnotation(
+            point=CENTRE, occluded=True
+        )
 
     def test_of_several_keypoints_the_one_called_center_counts(self) -> None:
         item = {"keypoints": [1, 2, 2, 100, 50, 2, 3, 4, 0]}
-        assert ball_of(item, ["top", "Center", "bottom"]).point == CENTRE
+        assert ball_from_annotation(item, ["top", "Center", "bottom"]).point == CENTRE
 
     def test_polygons_have_a_box_around_them(self) -> None:
         item = {"segmentation": [[90, 50, 100, 40, 110, 50], [100, 60, 95, 55, 105, 55]]}
-        assert ball_of(item).box == Box(89.5, 39.5, 20, 20)
+        assert ball_from_annotation(item).box == Box(89.5, 39.5, 20, 20)
 
     @pytest.mark.parametrize(
         ("item", "field", "words"),
@@ -71,18 +78,18 @@ class TestBallOf:
     def test_one_that_says_no_place_says_why(
         self, item: dict[str, Any], field: str, words: str
     ) -> None:
-        with pytest.raises(NoPlaceError, match=words) as raised:
-            ball_of(item)
+        with pytest.raises(MissingPositionError, match=words) as raised:
+            ball_from_annotation(item)
         assert raised.value.field == field
 
 
 class TestBoxOf:
     def test_a_person_without_a_box_is_around_its_keypoints(self) -> None:
         item = {"keypoints": [10, 20, 2, 30, 60, 1, 0, 0, 0]}
-        assert box_of(item) == Box(9.5, 19.5, 20, 40)
+        assert box_from_annotation(item) == Box(9.5, 19.5, 20, 40)
 
     def test_a_person_as_a_point_is_a_box_without_area(self) -> None:
-        assert box_of({"bbox": [100, 50, 0, 0]}) == Box(99.5, 49.5, 0, 0)
+        assert box_from_annotation({"bbox": [100, 50, 0, 0]}) == Box(99.5, 49.5, 0, 0)
 
 
 class TestIsOccluded:

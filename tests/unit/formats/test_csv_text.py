@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import DatasetFormatError
-from app.formats.csv_text import CsvTable, cell, is_missing, numbers_in, plain_list, read_rows
+from app.formats.csv_text import (
+    CsvTable,
+    csv_cell,
+    is_missing,
+    list_text,
+    parse_number_list,
+    read_rows,
+)
 from app.formats.file_tree import DEFAULT_LIMITS, Limits
 
 
@@ -28,23 +35,23 @@ class TestCell:
         ],
     )
     def test_numbers_by_repr_and_nothing_for_what_is_missing(self, value: Any, text: str) -> None:
-        assert cell(value) == text
+        assert csv_cell(value) == text
 
     @pytest.mark.parametrize(
         "text", ["=1+2", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "=HYPERLINK()"]
     )
     def test_a_formula_is_escaped(self, text: str) -> None:
-        assert cell(text) == f"'{text}"
+        assert csv_cell(text) == f"'{text}"
 
     @pytest.mark.parametrize("text", ["-5", "+1.5", "-1e-7", "-.5"])
     def test_the_text_of_a_number_is_untouched(self, text: str) -> None:
-        assert cell(text) == text
+        assert csv_cell(text) == text
 
 
 class TestPlainList:
     def test_every_digit_and_no_numpy(self) -> None:
-        assert plain_list([np.float64(0.1), 2.0]) == "[0.1, 2.0]"
-        assert plain_list([3, 4]) == "[3, 4]"
+        assert list_text([np.float64(0.1), 2.0]) == "[0.1, 2.0]"
+        assert list_text([3, 4]) == "[3, 4]"
 
 
 class TestTable:
@@ -106,14 +113,14 @@ class TestNumbersIn:
         ],
     )
     def test_every_spelling_of_a_list(self, text: str) -> None:
-        assert numbers_in(text, 3) == (1.0, -2.5, 300.0)
+        assert parse_number_list(text, 3) == (1.0, -2.5, 300.0)
 
     @pytest.mark.parametrize(
         "text", ["[1, 2]", "[1, 2, nan]", "[1, 2, x]", "[1, 2, f(3)]", "[1e999, 2, 3]"]
     )
     def test_anything_else_is_refused(self, text: str) -> None:
         with pytest.raises(ValueError, match=r"numbers|large"):
-            numbers_in(text, 3)
+            parse_number_list(text, 3)
 
 
 class TestIsMissing:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from app.errors import InputError
-from app.formats.export_names import ExportNames, folded, frame_claims
+from app.formats.export_names import ExportNames, fold_file_name, frame_claims
 from app.soccer.group import Group, View
 from app.soccer.media import Media
 
@@ -62,5 +62,5 @@ class TestExportNames:
 
 class TestFolded:
     def test_case_and_composition_make_no_other_name(self) -> None:
-        assert folded("Caf\u00c9") == folded("cafe\u0301")
-        assert folded("cafe") != folded("caf\u00e9")
+        assert fold_file_name("Caf\u00c9") == fold_file_name("cafe\u0301")
+        assert fold_file_name("cafe") != fold_file_name("caf\u00e9")

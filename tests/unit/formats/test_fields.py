@@ -37,27 +37,27 @@ class TestNumber:
 class TestWhole:
     @pytest.mark.parametrize("value", [1280, 1280.0, "1280", "1280.0"])
     def test_all_spellings_of_a_whole_number(self, value: Any) -> None:
-        assert fields.whole(value) == 1280
+        assert fields.whole_number(value) == 1280
 
     def test_a_fraction_is_refused(self) -> None:
         with pytest.raises(ValueError, match="not a whole number"):
-            fields.whole(1.5)
+            fields.whole_number(1.5)
 
 
 class TestPixel:
     def test_a_coordinate_outside_the_image_is_kept(self) -> None:
-        assert fields.pixel(-20.5) == -20.5
+        assert fields.pixel_coordinate(-20.5) == -20.5
 
     def test_a_coordinate_beyond_any_image_is_refused(self) -> None:
         with pytest.raises(ValueError, match="beyond any image"):
-            fields.pixel(1e9)
+            fields.pixel_coordinate(1e9)
 
 
 class TestNumbers:
     def test_another_length_is_refused_with_both_numbers(self) -> None:
         with pytest.raises(ValueError, match="has 2 numbers, not 3"):
-            fields.numbers([1, 2], 3)
+            fields.number_list([1, 2], 3)
 
     def test_text_is_no_list(self) -> None:
         with pytest.raises(ValueError, match="is text, not a list"):
-            fields.numbers("123", 3)
+            fields.number_list("123", 3)

@@ -3,7 +3,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from app.formats.frame_names import flat_frame, likely_suffix, match_frame, split_folder, view_stem
+from app.formats.frame_names import (
+    expected_frame_suffix,
+    frame_path_by_match,
+    frame_path_in_split,
+    split_folder,
+    view_stem,
+)
 from app.soccer.group import Group
 from app.soccer.media import Media
 
@@ -15,8 +21,10 @@ class TestMatchFrame:
         self, soccer_group: Make, issia_group: Make
     ) -> None:
         group, static = soccer_group(match="l/s/m"), issia_group()
-        assert match_frame(group, group.views[1], "train", ".jpg") == "l/s/m/Frames-v3/7_1.png"
-        name = match_frame(static, static.views[0], "", ".jpg")
+        assert (
+            frame_path_by_match(group, group.views[1], "train", ".jpg") == "l/s/m/Frames-v3/7_1.png"
+        )
+        name = frame_path_by_match(static, static.views[0], "", ".jpg")
         assert name == "issia/Frames-v3/cam3/358.jpg"
 
 
@@ -25,7 +33,7 @@ class TestFlatFrame:
         self, soccer_group: Make, issia_group: Make
     ) -> None:
         groups = [soccer_group(), soccer_group("8.png"), issia_group(), issia_group(359)]
-        names = [flat_frame(g, v, "valid", ".jpg") for g in groups for v in g.views]
+        names = [frame_path_in_split(g, v, "valid", ".jpg") for g in groups for v in g.views]
         assert len(set(names)) == len(names) == 8
         assert all(name.startswith("images/val/") for name in names)
 
@@ -35,7 +43,7 @@ class TestFlatFrame:
         view = soccer_group().views[0]
         for keys in (("7.png", "7.jpg"), ("cam 1", "cam-1"), ("A.png", "a.png")):
             group = Group("g", tuple(replace(view, key=key) for key in keys))
-            names = [flat_frame(group, one, "", ".jpg") for one in group.views]
+            names = [frame_path_in_split(group, one, "", ".jpg") for one in group.views]
             labels = {name.rsplit(".", 1)[0].lower() for name in names}
             assert len(labels) == 2, names
 
@@ -51,9 +59,9 @@ class TestSplitFolder:
 class TestLikelySuffix:
     def test_follows_the_frame_and_is_jpeg_for_videos(self, soccer_group: Make) -> None:
         view = soccer_group().views[0]
-        assert likely_suffix(view) == ".jpg"
-        assert likely_suffix(replace(view, media=Media("a.zip", "7.PNG"))) == ".png"
-        assert likely_suffix(replace(view, media=Media("cam3.mp4", frame=3))) == ".jpg"
+        assert expected_frame_suffix(view) == ".jpg"
+        assert expected_frame_suffix(replace(view, media=Media("a.zip", "7.PNG"))) == ".png"
+        assert expected_frame_suffix(replace(view, media=Media("cam3.mp4", frame=3))) == ".jpg"
 
 
 class TestViewStem:

@@ -13,7 +13,7 @@ import pytest
 from app.errors import InputError
 from app.formats.camera_json import camera_from_json
 from app.formats.export_record import ExportRecord
-from app.formats.gamestate import sequence_frame
+from app.formats.gamestate import sequence_frame_path
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.gamestate_writer import write_gamestate
 from app.formats.report import Report
@@ -397,7 +397,7 @@ class TestWhatEvaluatorsAskFor:
     ) -> None:
         group = soccer_group(replays=0)
         write_gamestate(tmp_path, [solved(group)])
-        place = tmp_path / sequence_frame(group, group.views[0], "train", ".jpg")
+        place = tmp_path / sequence_frame_path(group, group.views[0], "train", ".jpg")
         place.parent.mkdir()
         place.write_bytes(b"x")
         (again,) = read_gamestate(tmp_path, report)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.formats import guess_format as module
-from app.formats.guess_format import guess_format, holds_videos_alone
+from app.formats.guess_format import guess_format, holds_only_videos
 
 CASES = [
     ("soccernet-v3", "l/s/m/Labels-v3.json"),
@@ -66,12 +66,12 @@ class TestGuessFormat:
     def test_videos_without_labels_are_known(
         self, make_zip: Callable[..., Path], tmp_path: Path, names: tuple[str, ...], is_one: bool
     ) -> None:
-        assert holds_videos_alone(make_zip(dict.fromkeys(names, "x"))) is is_one
+        assert holds_only_videos(make_zip(dict.fromkeys(names, "x"))) is is_one
         for name in names:
             path = tmp_path / "in" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text("x")
-        assert holds_videos_alone(tmp_path / "in") is is_one
+        assert holds_only_videos(tmp_path / "in") is is_one
 
     def test_labels_count_more_than_the_cameras_beside_them(self, tmp_path: Path) -> None:
         for name in ("camera_00002.json", "00002.json", "manifest.json"):

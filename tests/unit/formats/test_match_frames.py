@@ -26,15 +26,15 @@ class TestMatchFrames:
     ) -> None:
         path = make_zip({f"{inside}7.png": b"x"}, tmp_path / "Frames-v3.zip")
         frames = _frames(tmp_path, report)
-        assert frames.find("7.png") == Media(str(path), f"{inside}7.png")
-        assert frames.find("8.png") is None
-        assert frames.some
+        assert frames.find_frame("7.png") == Media(str(path), f"{inside}7.png")
+        assert frames.find_frame("8.png") is None
+        assert frames.has_frames
 
     def test_members_with_backslashes_keep_the_name_by_which_they_are_opened(
         self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
     ) -> None:
         path = make_zip({"frames\\7.png": b"x"}, tmp_path / "Frames-v3.zip")
-        assert _frames(tmp_path, report).find("7.png") == Media(str(path), "frames\\7.png")
+        assert _frames(tmp_path, report).find_frame("7.png") == Media(str(path), "frames\\7.png")
 
     @pytest.mark.parametrize("inside", ["", "v3_frames/", "Frames-v3/", "frames/"])
     def test_loose_frames_are_found_alike(
@@ -43,7 +43,7 @@ class TestMatchFrames:
         path = tmp_path / inside / "7.png"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(b"x")
-        assert _frames(tmp_path, report).find("7.png") == Media(str(path))
+        assert _frames(tmp_path, report).find_frame("7.png") == Media(str(path))
 
     def test_a_truncated_archive_is_one_problem_and_loose_frames_still_serve(
         self, tmp_path: Path, make_zip: Callable[..., Path], report: Report
@@ -52,8 +52,8 @@ class TestMatchFrames:
         path.write_bytes(path.read_bytes()[:-30])
         (tmp_path / "8.png").write_bytes(b"x")
         frames = _frames(tmp_path, report)
-        assert frames.find("7.png") is None
-        assert frames.find("8.png") == Media(str(tmp_path / "8.png"))
+        assert frames.find_frame("7.png") is None
+        assert frames.find_frame("8.png") == Media(str(tmp_path / "8.png"))
         (problem,) = report.problems
         assert problem.path == str(path)
         assert "not a complete zip file" in problem.problem
@@ -65,7 +65,7 @@ class TestMatchFrames:
         tree = open_tree(path, report)
         assert tree is not None
         frames = MatchFrames(tree, "m/", ["frames/7.png"], report)
-        assert frames.find("7.png") == Media(str(path), "m/frames/7.png")
+        assert frames.find_frame("7.png") == Media(str(path), "m/frames/7.png")
 
 
 class TestFramesOfAZippedTree:
@@ -76,8 +76,8 @@ class TestFramesOfAZippedTree:
         path = _nested(tmp_path, make_zip, {"v3_frames/7.png": b"x"}, compression)
         frames = _zipped(path, report)
         place = "m/Frames-v3.zip/v3_frames/7.png"
-        assert frames.find("7.png") == Media(str(path), place)
-        assert frames.find("8.png") is None
+        assert frames.find_frame("7.png") == Media(str(path), place)
+        assert frames.find_frame("8.png") is None
         assert report.problems == []
 
     def test_a_damaged_archive_inside_is_one_problem(
@@ -85,7 +85,7 @@ class TestFramesOfAZippedTree:
     ) -> None:
         path = make_zip({"m/Frames-v3.zip": b"PK nothing", "m/8.png": b"x"})
         frames = _zipped(path, report)
-        assert frames.find("8.png") == Media(str(path), "m/8.png")
+        assert frames.find_frame("8.png") == Media(str(path), "m/8.png")
         (problem,) = report.problems
         assert problem.path == f"{path}/m/Frames-v3.zip"
         assert "without these frames" in problem.problem
@@ -109,7 +109,7 @@ class TestFramesOfAZippedTree:
         inside = {f"{n}.png": bytes(1_500_000) for n in range(3)}
         path = _nested(tmp_path, make_zip, inside, zipfile.ZIP_STORED)
         frames = _zipped(path, report, limits)
-        assert frames.find("1.png") is None
+        assert frames.find_frame("1.png") is None
         assert said in report.problems[0].problem
 
     def test_unsafe_members_inside_are_left_out(
@@ -117,7 +117,7 @@ class TestFramesOfAZippedTree:
     ) -> None:
         path = _nested(tmp_path, make_zip, {"../7.png": b"x", "8.png": b"x"}, zipfile.ZIP_STORED)
         frames = _zipped(path, report)
-        assert frames.find("8.png") is not None
+        assert frames.find_frame("8.png") is not None
         assert [item.record for item in report.problems] == ["../7.png"]
 
     def test_an_archive_inside_the_archive_is_not_opened(
@@ -125,7 +125,7 @@ class TestFramesOfAZippedTree:
     ) -> None:
         deep = make_zip({"7.png": b"x"}, tmp_path / "deep.zip").read_bytes()
         path = _nested(tmp_path, make_zip, {"Frames-v3.zip": deep}, zipfile.ZIP_STORED)
-        assert not _zipped(path, report).some
+        assert not _zipped(path, report).has_frames
 
 
 def _nested(

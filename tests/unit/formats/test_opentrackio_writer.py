@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from app.formats.opentrackio_writer import (
     frame_rate,
+    opentrackio_problem,
     opentrackio_sample,
     pan_tilt_roll_z_up,
-    why_not_opentrackio,
 )
 from app.geometry.camera import Camera
 from tests.cameras import EVERY_COEFFICIENT, SIZE, looking, wide
@@ -123,14 +123,14 @@ class TestPanTiltRollZUp:
 
 class TestWhyNotOpentrackio:
     def test_lenses_that_it_has(self) -> None:
-        assert why_not_opentrackio(BENT) is None
+        assert opentrackio_problem(BENT) is None
 
     def test_those_that_it_has_not(self) -> None:
-        assert "tangential" in (why_not_opentrackio(EVERY_COEFFICIENT) or "")
+        assert "tangential" in (opentrackio_problem(EVERY_COEFFICIENT) or "")
         prism = replace(BENT, distortion=np.array([*BENT.distortion[:8], 1e-4, 0.0, 0.0, 0.0]))
-        assert "thin prism" in (why_not_opentrackio(prism) or "")
-        assert "fisheye" in (why_not_opentrackio(wide((0, 60, -20), (0, 0, 0))) or "")
-        assert "skewed" in (why_not_opentrackio(replace(BENT, skew=0.1)) or "")
+        assert "thin prism" in (opentrackio_problem(prism) or "")
+        assert "fisheye" in (opentrackio_problem(wide((0, 60, -20), (0, 0, 0))) or "")
+        assert "skewed" in (opentrackio_problem(replace(BENT, skew=0.1)) or "")
 
 
 class TestFrameRate:

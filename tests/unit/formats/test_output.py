@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import InputError, JobCancelled, StorageError
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.output import output_tree, write_zip, zip_files
+from app.formats.output import output_tree, write_files_to_zip, write_zip
 
 MANIFEST = Manifest("d", "cameras", "2030-01-02", {})
 
@@ -210,7 +210,7 @@ class TestWriteZip:
         for name in ("7.JPG", "a.json"):
             (root / name).write_bytes(b"a" * 1000)
         files = [(path.name, path) for path in sorted(root.iterdir())]
-        zip_files(files, tmp_path / "out.zip", stored=(".jpg",))
+        write_files_to_zip(files, tmp_path / "out.zip", stored=(".jpg",))
         with zipfile.ZipFile(tmp_path / "out.zip") as archive:
             assert [item.compress_type for item in archive.infolist()] == [
                 zipfile.ZIP_STORED,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import UnsafePathError
-from app.formats.safe_path import check_name, resolve_inside
+from app.formats.safe_path import require_safe_path, resolve_inside
 
 HOSTILE = [
     "", "..", "../a", "a/../../b", "a/..", "/etc/passwd", "//host/share", "C:/a", "c:a",
@@ -22,7 +22,7 @@ class TestCheckName:
     @pytest.mark.parametrize("name", HOSTILE)
     def test_a_hostile_path_is_refused(self, name: str) -> None:
         with pytest.raises(UnsafePathError):
-            check_name(name)
+            require_safe_path(name)
 
     @pytest.mark.parametrize(
         "name",
@@ -30,7 +30,7 @@ class TestCheckName:
          "100% FC 2 - 1 A.C. Ö/..7.png", "a..b", "...", ".hidden", "b" * 255 + "/" + "c" * 255],
     )  # fmt: skip
     def test_the_names_of_matches_are_fine(self, name: str) -> None:
-        assert check_name(name) == name
+        assert require_safe_path(name) == name
 
 
 class TestResolveInside:

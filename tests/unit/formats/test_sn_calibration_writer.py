@@ -15,7 +15,12 @@ from app.errors import InputError, UnsafePathError
 from app.formats.cameras_reader import read_cameras
 from app.formats.export_record import ExportRecord
 from app.formats.report import Report
-from app.formats.sn_calibration import DEFAULT_SIZE, LineFile, line_frame, spelling
+from app.formats.sn_calibration import (
+    DEFAULT_SIZE,
+    LineFile,
+    line_frame_path,
+    soccernet_marking_name,
+)
 from app.formats.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
 from app.formats.sn_calibration_writer import lines_to_json, write_line_files, write_sn_calibration
 from app.geometry.camera import Camera
@@ -29,7 +34,7 @@ from tests.cameras import write_cameras
 MATCH = "l/s/m"
 UNIT = st.floats(-0.5, 1.5)
 LINE_FILES = st.dictionaries(
-    st.sampled_from([spelling(marking) for marking in MARKINGS] + ["Line unknown"]),
+    st.sampled_from([soccernet_marking_name(marking) for marking in MARKINGS] + ["Line unknown"]),
     st.lists(st.fixed_dictionaries({"x": UNIT, "y": UNIT}), min_size=1, max_size=6),
 )
 
@@ -127,14 +132,14 @@ class TestTheFramesOfAnExport:
     ) -> None:
         group = soccer_group(replays=0)
         write_sn_calibration(tmp_path, [solved(group)])
-        place = tmp_path / line_frame(group, group.views[0], "train", ".png")
+        place = tmp_path / line_frame_path(group, group.views[0], "train", ".png")
         place.write_bytes(b"x")
         (again,) = read_sn_calibration(tmp_path, DEFAULT_SIZE, report)
         assert again.views[0].media == Media(str(place))
 
     def test_those_of_a_static_camera_lie_by_its_match(self, issia_group: Make) -> None:
         group = issia_group()
-        assert line_frame(group, group.views[0], "", ".jpg") == "issia/Frames-v3/cam3/358.jpg"
+        assert line_frame_path(group, group.views[0], "", ".jpg") == "issia/Frames-v3/cam3/358.jpg"
 
 
 class TestLinesToJson:

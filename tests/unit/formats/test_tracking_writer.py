@@ -65,7 +65,7 @@ class TestWriteTracab:
         found = read_by(KLOPPY, tmp_path, tmp_path)
         assert found["rate"] == 25
         assert np.allclose(found["pitch"], [104.0, 67.0])
-        there = record.there
+        there = record.has_position
         assert found["frames"] == record.track.frames[there].tolist()
         balls = np.array(found["balls"]) / 100
         assert np.abs(balls - record.track.position[there] * (1, -1, -1)).max() < 0.01

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from app.errors import InputError
-from app.formats.camera_arrays import cameras_of_arrays
+from app.formats.camera_arrays import read_camera_arrays
 from app.formats.file_tree import Limits
 from app.formats.tracks_writer import (
     TrackRecord,
@@ -130,6 +130,6 @@ class TestWriteTrackArrays:
         part = {name: found[f"cam1/{name}"] for name in ("K", "R", "t", "k")}
         np.savez(tmp_path / "cam1.npz", **part)
         content = (tmp_path / "cam1.npz").read_bytes()
-        ((name, values),) = cameras_of_arrays(content, "cam1", "cam1.npz", Limits())
+        ((name, values),) = read_camera_arrays(content, "cam1", "cam1.npz", Limits())
         assert name is None
         assert np.allclose(values["K"], TRUTH["cam1"].K)

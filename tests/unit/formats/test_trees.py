@@ -17,7 +17,7 @@ from app.formats.file_tree import Limits, files_inside
 from app.formats.folder_tree import FolderTree
 from app.formats.guess_format import guess_format
 from app.formats.match_frames import MatchFrames
-from app.formats.plain_file import read_plain
+from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
 from app.formats.safe_path import is_hidden
 from app.formats.soccernet_v3_reader import read_soccernet_v3
@@ -127,10 +127,10 @@ class TestReadPlain:
     def test_a_file_beyond_the_limit_is_refused_and_never_cut(self, tmp_path: Path) -> None:
         path = tmp_path / "a"
         path.write_bytes(b"12345")
-        assert read_plain(path, 5) == b"12345"
+        assert read_regular_file(path, 5) == b"12345"
         for limit in (4, 3):
             with pytest.raises(DatasetFormatError, match=f"longer than {limit} bytes"):
-                read_plain(path, limit)
+                read_regular_file(path, limit)
 
 
 class TestZipTree:
@@ -351,5 +351,5 @@ class TestPipesAndDevices:
     ) -> None:
         os.mkfifo(tmp_path / "Frames-v3.zip")
         frames = MatchFrames(FolderTree(tmp_path, report, Limits()), "", ["Frames-v3.zip"], report)
-        assert not frames.some
+        assert not frames.has_frames
         assert "Frames-v3.zip" in report.problems[0].path

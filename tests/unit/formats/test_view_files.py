@@ -7,7 +7,7 @@ import pytest
 
 from app.errors import UnsafePathError
 from app.formats.output import write_zip
-from app.formats.view_files import HELD, GatheredFiles, ViewFiles, put_on_disk
+from app.formats.view_files import HELD, FilesToPack, ViewFiles, write_to_disk
 
 
 class TestViewFiles:
@@ -18,7 +18,7 @@ class TestViewFiles:
             files.put("b/3.json", "ü")
             files.put("b/1.json", "{}")
             files.put("a.json", "")
-        assert list(GatheredFiles(tmp_path)) == [
+        assert list(FilesToPack(tmp_path)) == [
             ("a.json", b""),
             ("b/1.json", b"{}"),
             ("b/2.csv", tmp_path / "b" / "2.csv"),
@@ -29,14 +29,14 @@ class TestViewFiles:
         with ViewFiles(tmp_path) as files:
             files.put("a", "first")
             files.put("./a", "then")
-        assert list(GatheredFiles(tmp_path)) == [("a", b"then")]
+        assert list(FilesToPack(tmp_path)) == [("a", b"then")]
 
     def test_a_zip_of_them_is_that_of_files_on_the_disk_to_the_byte(self, tmp_path):
         texts = {f"{match}/camera_{view}.json": f"{match} {view}" * view for match in "ba" for view in range(40)}  # fmt: skip
         (tmp_path / "disk").mkdir()
         (tmp_path / "held").mkdir()
         with ViewFiles(tmp_path / "held") as files:
-            for put in (put_on_disk(tmp_path / "disk"), files.put):
+            for put in (write_to_disk(tmp_path / "disk"), files.put):
                 for path, text in texts.items():
                     put(path, text)
         made = []
@@ -58,6 +58,6 @@ class TestViewFiles:
     @pytest.mark.parametrize("path", ["../out", "/etc/passwd", "a/../../b", ""])
     def test_no_path_leaves_the_folder(self, tmp_path, path):
         with ViewFiles(tmp_path) as files:
-            for put in (files.put, put_on_disk(tmp_path)):
+            for put in (files.put, write_to_disk(tmp_path)):
                 with pytest.raises(UnsafePathError):
                     put(path, "x")

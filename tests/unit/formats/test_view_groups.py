@@ -23,9 +23,9 @@ class TestViewGroups:
         assert list(groups.add(placed("x", "other"), "a.json")) == []
         (group,) = groups.add(placed("a"), "a.json")
         assert [view.key for view in group.views] == ["a", "b"]
-        (rest,) = groups.rest()
+        (rest,) = groups.incomplete_groups()
         assert (rest.key, report.imported) == ("other", 3)
-        assert list(groups.rest()) == []
+        assert list(groups.incomplete_groups()) == []
         assert report.remarks == [
             "1 group has fewer views than when it was written: other (1 of 2)"
         ]
@@ -54,7 +54,7 @@ class TestViewGroups:
             for key in ("a", "b")
             for group in groups.add(placed(key), path)
         ]
-        assert (len(found), report.imported, list(groups.rest())) == (1, 2, [])
+        assert (len(found), report.imported, list(groups.incomplete_groups())) == (1, 2, [])
         assert [(problem.path, problem.field) for problem in report.problems] == [
             ("b.json", "a"),
             ("b.json", "b"),

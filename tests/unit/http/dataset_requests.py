@@ -18,7 +18,7 @@ from app.features.people.session_routes import get_login
 from app.features.predictions.reader import PredictionFiles, read_files
 from app.features.predictions.service import add_predictions
 from app.finite import json_text
-from app.formats.frame_names import flat_frame
+from app.formats.frame_names import frame_path_in_split
 from app.http.team import get_team
 from app.sample.truth import TRUTH, truth_to_json
 from app.soccer.frames import ImageSize
@@ -232,7 +232,7 @@ def table(api: Any) -> str:
     group = api.get(f"{API}/groups/1").json()
     key = group["views"][0]["key"]
     view = View(key, Station(key, ImageSize(1280, 720)))
-    name = flat_frame(Group(group["key"], ()), view, "", ".jpg")
+    name = frame_path_in_split(Group(group["key"], ()), view, "", ".jpg")
     return uploaded(api, "p.csv", f"image,x,y,w,h,score\n{name},600,300,14,14,0.9".encode())
 
 

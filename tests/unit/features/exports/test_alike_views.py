@@ -24,7 +24,7 @@ from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.formats.cameras_reader import read_cameras
 from app.formats.coco_reader import read_coco
-from app.formats.export_formats import FORMATS, TRACKS, used_options
+from app.formats.export_formats import FORMATS, TRACKS, options_used_by
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.parquet_reader import read_parquet
 from app.formats.report import Report
@@ -186,7 +186,7 @@ class TestEveryFormat:
         groups = made(scheme, tmp_path / "in")
         fill(*groups)
         out = tmp_path / "out"
-        boxes = "annotated" if "boxes" in used_options(name) else "optimized"
+        boxes = "annotated" if "boxes" in options_used_by(name) else "optimized"
         try:
             report = export(store, "demo", name, out, everything=True, boxes=boxes, images=images)
         except InputError as error:
@@ -241,7 +241,7 @@ class TestEveryFormat:
         freeze(store, "demo", FreezeRequest("v1"), actor="ann")
         for out, version in (("live", None), ("frozen", "v1")):
             options = {"images": "copy", "version": version}
-            if "views" in used_options(name):
+            if "views" in options_used_by(name):
                 options["views"] = "all"
             export(store, "demo", name, tmp_path / out, **options)
         assert on_disk(tmp_path / "live") == on_disk(tmp_path / "frozen")

@@ -18,7 +18,7 @@ from app.features.groups.submit import load
 from app.features.predictions.frames import live_truth, version_truth
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.versions.service import find_version
-from app.formats.parquet import pyarrow_modules
+from app.formats.parquet import import_pyarrow
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box, ImagePoint
@@ -56,7 +56,7 @@ def coco(root: Path) -> tuple[int, int]:
 
 
 def parquet(root: Path) -> tuple[int, int]:
-    rows = pyarrow_modules()[1].read_table(root / "views.parquet").to_pylist()
+    rows = import_pyarrow()[1].read_table(root / "views.parquet").to_pylist()
     boxes = sum(row["box_x"] is not None for row in rows)
     return sum(row["ball_3d_x"] is not None for row in rows), boxes
 
@@ -174,7 +174,7 @@ class TestBoxOfAViewApart:
         (found,) = (item for item in value["annotations"] if item["image_id"] == image)
         assert found["bbox"] == found["annotated_bbox"]
         assert (found["ball_3d"], found["optimized_diameter_px"]) == (None, None)
-        rows = pyarrow_modules()[1].read_table(tmp_path / "parquet" / "views.parquet").to_pylist()
+        rows = import_pyarrow()[1].read_table(tmp_path / "parquet" / "views.parquet").to_pylist()
         (row,) = (row for row in rows if row["view"] == "8_2.png")
         assert row["box_width"] == row["annotated_width"] == pytest.approx(12.4)
 

@@ -19,7 +19,7 @@ from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.formats.export_formats import used_options
+from app.formats.export_formats import options_used_by
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.media import Media
@@ -230,7 +230,7 @@ class TestExport:
         assert not (tmp_path / "out").exists()
 
     def test_every_format_uses_the_options_that_it_says(self) -> None:
-        assert {name: used_options(name) for name in FORMATS} == {
+        assert {name: options_used_by(name) for name in FORMATS} == {
             "soccernet-v3d": ["boxes", "images"],
             "soccernet-v3": ["images"],
             "issia-3d": ["images"],

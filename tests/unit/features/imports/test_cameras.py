@@ -19,7 +19,7 @@ from app.features.imports.sources import Source, import_source
 from app.features.solutions.service import solve_dataset, stale_groups
 from app.features.stations.service import load_station, submit_station
 from app.formats.camera_json import covariance_to_json
-from app.formats.cameras_writer import camera_text
+from app.formats.cameras_writer import camera_file_text
 from app.geometry.arrays import row_by_row
 from app.soccer.frames import ImageSize
 from tests.cameras import FULL_HD
@@ -76,7 +76,7 @@ class TestIngestCameras:
         camera = state.solution.view("7_1.png").calibration.camera
         for sigma in (1e-3, 1.0):
             known = row_by_row(np.diag([1e-6] * 3 + [sigma**2] * 3 + [1e-6] * 2))
-            (tmp_path / "camera_7_1.json").write_text(camera_text(camera, known, view.size))
+            (tmp_path / "camera_7_1.json").write_text(camera_file_text(camera, known, view.size))
             source = Source("cameras", tmp_path)
             assert import_source(store, "demo", source, store.settings).result.changed == 1
             again = import_source(store, "demo", source, store.settings).result

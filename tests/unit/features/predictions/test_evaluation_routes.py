@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.formats.frame_names import flat_frame
+from app.formats.frame_names import frame_path_in_split
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
@@ -45,7 +45,7 @@ def views(client, dataset: str = "broadcast") -> list[dict[str, Any]]:
 def name_of(group: str, view: str) -> str:
     """What a YOLO export calls the frame: the groups of this dataset share all other names."""
     found = View(view, Station(view, ImageSize(1280, 720)))
-    return flat_frame(Group(group, ()), found, "", ".jpg")
+    return frame_path_in_split(Group(group, ()), found, "", ".jpg")
 
 
 def results(client, factor: float = 1.0, score: float = 0.9) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ import pytest
 
 from app.errors import TooLargeError
 from app.features.predictions.reader import LIMITS_HINT, PredictionReader
-from app.formats.frame_names import flat_frame
+from app.formats.frame_names import frame_path_in_split
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
@@ -55,7 +55,7 @@ def uploaded(api, content: bytes) -> dict[str, Any]:
 def name_of(emptied: dict[str, Any], view: dict[str, Any]) -> str:
     """What a YOLO export calls the frame: the groups of this dataset share all other names."""
     found = View(view["key"], Station(view["key"], ImageSize(1280, 720)))
-    return flat_frame(Group(emptied["key"], ()), found, "", ".jpg")
+    return frame_path_in_split(Group(emptied["key"], ()), found, "", ".jpg")
 
 
 def asked(api, emptied: dict[str, Any]) -> dict[str, Any]:
