@@ -16,6 +16,7 @@ import numpy.typing as npt
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
+from app.features.file_tools.tripod import DrawnFrame, share_tripods
 from app.finite import json_text
 from app.formats.cameras_reader import read_cameras
 from app.formats.cameras_writer import camera_file_name, camera_file_text
@@ -138,6 +139,7 @@ def snap_files(
     out: Path,
     *,
     settings: Settings,
+    tripod: str | None = None,
     progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Cameras from clicks and paint: ``camera_<stem>.json``, ``lines/<stem>.json``, ``snap.json``.
@@ -147,6 +149,8 @@ def snap_files(
         images: Folders, zips or files; those without a line file are passed over.
         out: Folder, made when missing.
         settings: Limits of pictures.
+        tripod: ``one`` where all pictures are of one camera that stands still, or a file that
+            names the camera of each frame.
         progress: Called with frames done.
 
     Returns:
@@ -159,14 +163,19 @@ def snap_files(
     values = _line_values(lines, settings, report)
     match = _Match(values, images, settings)
     rows: list[dict[str, Any]] = []
+    drawn: list[DrawnFrame] = []
     for picture, frame, key in match.pictures(report):
         row, text, snapped = _snap_picture(picture, frame, values[key], report)
         _keep(out, frame, text, snapped)
         rows.append(row)
+        if snapped is not None:
+            size = ImageSize(snapped.size[1], snapped.size[0])
+            drawn.append(DrawnFrame(frame, snapped, snapped.camera, size, Pitch()))
         if progress is not None:
             progress(len(rows))
     if not rows:
         raise report.refusal(f"no picture has a line file of its name in {lines}")
+    share_tripods(drawn, tripod, rows, out)
     _write(out / "snap.json", rows)
     return rows
 

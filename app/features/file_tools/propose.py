@@ -15,6 +15,7 @@ from app.config import Settings
 from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.features.file_tools.paint import PictureFile, UniqueNames, read_pictures
+from app.features.file_tools.tripod import DrawnFrame, share_tripods
 from app.finite import json_text
 from app.formats.cameras_reader import read_cameras
 from app.formats.cameras_writer import camera_file_name, camera_file_text
@@ -42,6 +43,7 @@ def propose_files(
     *,
     size: ImageSize | None = None,
     known: Sequence[Path] = (),
+    tripod: str | None = None,
     progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Write a camera file for each picture whose camera is certain, and what became of each.
@@ -53,6 +55,8 @@ def propose_files(
         settings: Limits on what is read.
         size: Size for which the cameras are written; None: each picture's own.
         known: Camera files of other frames of the match.
+        tripod: ``one`` where all pictures are of one camera that stands still, or a file that
+            names the camera of each frame.
         progress: Called with frames done.
 
     Returns:
@@ -80,7 +84,10 @@ def propose_files(
     if pitches:
         for at, picture in enumerate(read_pictures(sources, settings, Report())):
             if at in pitches:
-                _propose_again(picture, rows, at, out, pitches[at], seen[at], size)
+                again = _propose_again(picture, rows, at, out, pitches[at], seen[at], size)
+                seen[at] = again or seen[at]
+    drawn = [one.drawn for one in seen if one is not None and one.drawn is not None]
+    share_tripods(drawn, tripod, rows, out)
     _write(out / RESULT, json_text(rows, indent=1) + "\n")
     return rows
 
@@ -92,6 +99,7 @@ class _Proposed:
     camera: Camera
     agreement: float
     frame: PitchFrame
+    drawn: DrawnFrame | None = None
 
 
 def _other_pitches(seen: Sequence[_Proposed | None]) -> dict[int, Pitch]:
@@ -115,14 +123,15 @@ def _propose_again(
     pitch: Pitch,
     before: _Proposed | None,
     size: ImageSize | None,
-) -> None:
+) -> _Proposed | None:
     """A frame once more on the pitch that its film shows; kept where the paint agrees no less."""
     frame = rows[at]["frame"]
     if picture.image is None or before is None:
-        return
+        return None
     row, again = _propose_one(picture, frame, out, [before.camera], size, pitch, before.agreement)
     if again is not None:
         rows[at] = row | {"ms": row["ms"] + rows[at]["ms"]}
+    return again
 
 
 def counts_of(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
@@ -163,8 +172,15 @@ def _propose_one(
             camera = camera.scaled(size.width / width, size.height / height)
         spread = None if found.snapped is None else found.snapped.covariance
         covariance = None if spread is None else row_by_row(spread)
-        _write(file, camera_file_text(camera, covariance, size or ImageSize(width, height)))
-        return row, _Proposed(found.camera, agrees, pitch_frame(picture.image, found.camera, pitch))
+        shape = size or ImageSize(width, height)
+        _write(file, camera_file_text(camera, covariance, shape))
+        known_to = pitch_frame(picture.image, found.camera, pitch)
+        drawn = (
+            DrawnFrame(frame, found.snapped, camera, shape, pitch)
+            if found.snapped is not None and found.snapped.reason is None
+            else None
+        )
+        return row, _Proposed(found.camera, agrees, known_to, drawn)
     file.unlink(missing_ok=True)
     if found.camera is None or picture.image is None or not _is_likely(found):
         return row, None

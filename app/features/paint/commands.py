@@ -20,6 +20,16 @@ from app.terminal.terminal import print_json, print_values, say, show_progress
 commands = typer.Typer()
 
 
+Tripod = Annotated[
+    str | None,
+    typer.Option(
+        metavar="one|FILE",
+        help="one: all pictures are of one camera that stands still; FILE (.json or .csv) names the "
+        "camera (match) of each frame. Their pitch is found together, and their covariances know it.",
+    ),
+]
+
+
 class CamerasOn(StrEnum):
     """Of which pitch the cameras of a clip are."""
 
@@ -85,6 +95,7 @@ def snap(
     size: Annotated[
         str, typer.Option(help="native: the size of each picture is its own.")
     ] = "native",
+    tripod: Tripod = None,
     json_: Json = False,
 ) -> None:
     """Cameras from clicked lines and the paint of their pictures."""
@@ -95,7 +106,9 @@ def snap(
             "each picture is read in its own size; leave this out", param_hint="--size"
         )
     with show_progress("Snapping") as progress:
-        rows = snap_files(lines, images, out, settings=read_settings(), progress=progress)
+        rows = snap_files(
+            lines, images, out, settings=read_settings(), tripod=tripod, progress=progress
+        )
     _print_rows(rows, json_)
 
 
@@ -150,6 +163,7 @@ def propose(
             help="Cameras of the same match: a file, folder or zip; may be given several times.",
         ),
     ] = None,
+    tripod: Tripod = None,
     dataset: Annotated[
         str | None,
         typer.Option(metavar="NAME", help="In place of IMAGES and OUT: a dataset's views."),
@@ -172,7 +186,7 @@ def propose(
     as predictions: nothing counts before a person accepts one.
     """
     if dataset is not None:
-        if images or out or known or size != "native":
+        if images or out or known or tripod or size != "native":
             raise typer.BadParameter("a dataset has its pictures and cameras: name nothing else")
         if show and undo:
             raise typer.BadParameter("show what was proposed or forget it, one at a time")
@@ -182,7 +196,7 @@ def propose(
         raise typer.BadParameter("name IMAGES and OUT, or --dataset")
     if match is not None or show or undo or workers is not None:
         raise typer.BadParameter("--match, --show, --undo and --workers go with --dataset")
-    _propose_for_files(images, out, size, known or (), json_)
+    _propose_for_files(images, out, size, known or (), tripod, json_)
 
 
 def _propose_for_views(
@@ -216,14 +230,19 @@ def _propose_for_views(
 
 
 def _propose_for_files(
-    images: list[Path], out: Path, size: str, known: Sequence[Path], json_: bool
+    images: list[Path],
+    out: Path,
+    size: str,
+    known: Sequence[Path],
+    tripod: str | None,
+    json_: bool,
 ) -> None:
     from app.features.file_tools.propose import counts_of, propose_files
 
     wanted = None if size == "native" else parse_size(size)
     with show_progress("Proposing") as progress:
         rows = propose_files(
-            images, out, read_settings(), size=wanted, known=known, progress=progress
+            images, out, read_settings(), size=wanted, known=known, tripod=tripod, progress=progress
         )
     if json_:
         print_json(rows)
