@@ -40,6 +40,7 @@ from app.features.practice import routes as practice
 from app.features.predictions import evaluation_routes as predictions_evaluation
 from app.features.predictions import routes as predictions
 from app.features.queue import routes as queue
+from app.features.recordings import ball_run_routes as recording_balls
 from app.features.recordings import camera_routes as recording_cameras
 from app.features.recordings import link_routes as recording_links
 from app.features.recordings import routes as recordings
@@ -110,6 +111,7 @@ ROUTERS = (
     imports.imports_router,
     recordings.router,
     tracks.router,
+    recording_balls.router,
     recording_cameras.router,
     recording_links.router,
     saved_views.router,

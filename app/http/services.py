@@ -28,6 +28,7 @@ from app.features.policies.noise import NoiseStore
 from app.features.practice.service import resume_practice
 from app.features.predictions.jobs import resume_evaluations
 from app.features.predictions.reader import PredictionReader
+from app.features.recordings.ball_runs import BallFollower
 from app.features.recordings.camera_jobs import resume_cameras
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
@@ -78,6 +79,7 @@ class Services:
     store: Store
     frames: Frames
     recordings: RecordingFrames
+    balls: BallFollower
     large: LargeEdits
     previews: Previews
     predictions: PredictionReader
@@ -108,6 +110,7 @@ class Services:
             store,
             frames,
             RecordingFrames(settings),
+            BallFollower(settings),
             large,
             Previews(settings, store, PaintFollower(frames), large),
             PredictionReader(settings),
@@ -190,5 +193,6 @@ class Services:
         self.large.close()
         self.frames.close()
         self.recordings.close()
+        self.balls.close()
         self.predictions.close()
         self.store.close()

@@ -1,9 +1,9 @@
-"""The tables of recordings, films of a match from which groups are taken, of links between their shots and of
-the cameras of shots."""
+"""The tables of recordings, films of a match from which groups are taken, of links between their shots, of
+the cameras of shots and of runs of the ball."""
 
 from __future__ import annotations
 
-from sqlalchemy import ForeignKey, Index, UniqueConstraint
+from sqlalchemy import ForeignKey, Index, LargeBinary, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -83,6 +83,32 @@ class ShotLinkModel(Base):
     instants: Mapped[str]
     assumed_speed: Mapped[float | None]
     map: Mapped[str]
+    revision: Mapped[int]
+    actor: Mapped[str]
+    created: Mapped[str]
+
+
+class BallRunModel(Base):
+    """Clicks on a ball, followed through the frames of a recording.
+
+    ``body`` (compressed JSON) has the frames as columns, ``confirmed`` (JSON) are uncertain ones that a person said
+    are right. ``accepted_by`` is who accepted the run, null: nobody, and ``groups`` (JSON) counts what that did.
+    ``sha256`` is that of the video.
+    """
+
+    __tablename__ = "ball_run"
+    __table_args__ = (Index("ball_run_recording", "recording_id", "first"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"))
+    recording_id: Mapped[int] = mapped_column(ForeignKey("recording.id", ondelete="CASCADE"))
+    sha256: Mapped[str]
+    first: Mapped[int]
+    last: Mapped[int]
+    groups: Mapped[str]
+    confirmed: Mapped[str]
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+    accepted_by: Mapped[str | None]
     revision: Mapped[int]
     actor: Mapped[str]
     created: Mapped[str]

@@ -15,6 +15,8 @@ import { announce, complain } from '../../state/notice.js';
 import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
 import { matchTime, shotAt, timecode } from '../../state/shots.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { BallCard, BallOverlay } from './ball_card.js';
+import { useBallKeys, useBalls } from './ball_state.js';
 import { CameraCard } from './camera_card.js';
 import { CameraCurves, CameraLines } from './camera_curves.js';
 import { useCameraKeys, useCameras } from './camera_state.js';
@@ -28,6 +30,7 @@ import { factsOf } from './recordings_page.js';
 
 /** @import {JobJson} from '../../api/jobs.js' */
 /** @import {RecordingJson, Shot, TimedShot} from '../../api/recordings.js' */
+/** @import {Balls} from './ball_state.js' */
 /** @import {Cameras} from './camera_state.js' */
 
 /** The list of shots, and what changes it: at once here, then on the server. @param {number} id */
@@ -106,14 +109,14 @@ function useInstants() {
 	};
 }
 
-/** @param {{one: RecordingJson, seconds: (frame: number) => number, cameras: Cameras}} props */
-function Stage({ one, seconds, cameras }) {
+/** @param {{one: RecordingJson, seconds: (frame: number) => number, cameras: Cameras, balls: Balls}} props */
+function Stage({ one, seconds, cameras, balls }) {
 	const [ref, size] = useSize();
 	useLayoutEffect(() => { if (size.width) showAt(size.width * Math.min(devicePixelRatio, 2)); }, [size.width]);
 	const { frame, address } = seen.value;
 	return html`
 		<section class="film__stage" aria-label="Frame" data-frame=${frame}>
-			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}<${CameraLines} cameras=${cameras} /></div>
+			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}<${CameraLines} cameras=${cameras} /><${BallOverlay} one=${one} balls=${balls} cameras=${cameras} /></div>
 			<p class="film__time">
 				<button class="button" type="button" aria-pressed=${speed.value !== 0} onClick=${toggleRunning}>${speed.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
 				<strong class="mono" data-timecode>${timecode(seconds(wanted.value), one.fps ?? 25)}</strong>
@@ -157,8 +160,11 @@ function Film({ one, reload }) {
 	doing.current = { change, undo, turn: instants.turn };
 	const keys = useMemo(() => keysOfRecording(one, () => latest.current?.items ?? [], doing), [one.id]);
 	useKeys(keys);
-	const cameras = useCameras(one, list?.items[shotAt(list.items, wanted.value)]);
+	const shot = list?.items[shotAt(list.items, wanted.value)];
+	const cameras = useCameras(one, shot);
 	useCameraKeys(cameras);
+	const balls = useBalls(one, shot);
+	useBallKeys(balls);
 	if (error) {
 		return html`
 			<${Trouble} title="The shots cannot be shown" error=${error} retry=${read} />
@@ -169,15 +175,16 @@ function Film({ one, reload }) {
 	const at = shotAt(list.items, wanted.value);
 	return html`
 		<div class="film">
-			<${Stage} one=${one} seconds=${clock(list.items, one)} cameras=${cameras} />
+			<${Stage} one=${one} seconds=${clock(list.items, one)} cameras=${cameras} balls=${balls} />
 			<div class="film__rail">
 				<${ShotCard} one=${one} shots=${list.items} at=${at} change=${change} remember=${remember} />
+				<${BallCard} one=${one} shot=${shot} balls=${balls} />
 				<${CameraCard} one=${one} cameras=${cameras} />
-				<${LinkCard} one=${one} shots=${list.items} shot=${list.items[at]} links=${links} />
-				<${InstantsCard} one=${one} shot=${list.items[at]} instants=${instants} links=${links} />
+				<${LinkCard} one=${one} shots=${list.items} shot=${shot} links=${links} />
+				<${InstantsCard} one=${one} shot=${shot} instants=${instants} links=${links} />
 				<${ClockCard} one=${one} reload=${reload} />
 			</div>
-			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} goTo=${goTo} />
+			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} balls=${balls} goTo=${goTo} />
 			<${CameraCurves} cameras=${cameras} />
 		</div>
 	`;

@@ -7,14 +7,16 @@ import { useEffect, useRef } from 'preact/hooks';
 import { frameAddress } from '../../api/recordings.js';
 import { wanted } from '../../state/playback.js';
 import { kindOf, lengthText, timecode } from '../../state/shots.js';
+import { BallBand } from './ball_card.js';
 
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+/** @import {Balls} from './ball_state.js' */
 
 const THUMBNAIL = 160;
 const STEPS = /** @type {Record<string, number>} */ ({ PageUp: 25, PageDown: -25, Home: -Infinity, End: Infinity });
 
-/** @param {{one: RecordingJson, shots: Shot[], chosen: ReadonlySet<number>, goTo: (frame: number) => void}} props */
-function Bar({ one, shots, chosen, goTo }) {
+/** @param {{one: RecordingJson, shots: Shot[], chosen: ReadonlySet<number>, balls: Balls, goTo: (frame: number) => void}} props */
+function Bar({ one, shots, chosen, balls, goTo }) {
 	const held = useRef(false);
 	const frames = one.frames ?? 1;
 	/** @param {number} frame */
@@ -49,6 +51,7 @@ function Bar({ one, shots, chosen, goTo }) {
 			onPointerDown=${down} onPointerMove=${move} onPointerUp=${release} onPointerCancel=${release} onKeyDown=${key}
 		>
 			${shots.map((shot) => html`<span key=${shot.first} class="film__stretch" data-kind=${shot.kind} data-dropped=${shot.kept === false} style=${{ left: place(shot.first), width: place(shot.last - shot.first + 1) }}></span>`)}
+			<${BallBand} runs=${balls.runs} all=${balls.all} first=${0} frames=${frames} />
 			${[...chosen].map((frame) => html`<span key=${`i${frame}`} class="film__instant" style=${{ left: place(frame + 0.5) }}></span>`)}
 			<span class="film__head" style=${{ left: place(wanted.value + 0.5) }}></span>
 		</div>
@@ -75,11 +78,11 @@ function Item({ one, shot, index, current, go }) {
 	`;
 }
 
-/** @param {{one: RecordingJson, shots: Shot[], at: number, chosen: ReadonlySet<number>, goTo: (frame: number) => void}} props */
-export function Strip({ one, shots, at, chosen, goTo }) {
+/** @param {{one: RecordingJson, shots: Shot[], at: number, chosen: ReadonlySet<number>, balls: Balls, goTo: (frame: number) => void}} props */
+export function Strip({ one, shots, at, chosen, balls, goTo }) {
 	return html`
 		<section class="card film__strip" aria-label="Shots">
-			<${Bar} one=${one} shots=${shots} chosen=${chosen} goTo=${goTo} />
+			<${Bar} one=${one} shots=${shots} chosen=${chosen} balls=${balls} goTo=${goTo} />
 			<ol class="film__shots" tabindex="-1">
 				${shots.map((shot, index) => html`<${Item} key=${shot.first} one=${one} shot=${shot} index=${index} current=${index === at} go=${() => goTo(shot.first)} />`)}
 			</ol>

@@ -24,6 +24,7 @@ from app.sample.truth import TRUTH, truth_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
+from tests.drawn_balls import place, write_film
 from tests.flights import add_flight
 from tests.integration.conftest import picture
 from tests.rigs import groups as rig_groups
@@ -122,6 +123,38 @@ def tracks(api: Any) -> Request:
 
 def tracked_cameras(api: Any) -> Request:
     return "POST", f"{recording(api)}/cameras", {"first": 0, "last": 9}, {}
+
+
+def ball_click(api: Any) -> Request:
+    folder = store_of(api).settings.home
+    film = write_film(folder / "ball.avi")
+    upload = uploaded(api, film.name, film.read_bytes())
+    body = {"dataset": "broadcast", "source": {"upload": upload}}
+    path = f"/recordings/{ended(api, ('POST', '/recordings', body, {})).result['recording']}"
+    frames = {"shots": [{"first": 0, "last": 11, "kind": "main"}]}
+    send(api, ("PUT", f"{path}/shots", frames, etag_of(api, f"{path}/shots")))
+    x, y = place(5)
+    return "POST", f"{path}/ball-runs", {"frame": 5, "x": x, "y": y}, {}
+
+
+def ball_run(api: Any) -> str:
+    made = send(api, asked := ball_click(api)).json()
+    return f"{asked[1]}/{made['id']}"
+
+
+def another_ball_click(api: Any) -> Request:
+    path = ball_run(api)
+    x, y = place(8)
+    return "POST", f"{path}/clicks", {"frame": 8, "x": x, "y": y}, etag_of(api, path)
+
+
+def accepted_ball_run(api: Any) -> Request:
+    path = ball_run(api)
+    return "PATCH", path, {"accepted": True}, etag_of(api, path)
+
+
+def no_ball_run(api: Any) -> Request:
+    return "DELETE", ball_run(api), None, {}
 
 
 def link(api: Any) -> Request:

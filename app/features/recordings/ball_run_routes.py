@@ -1,0 +1,161 @@
+"""Ball runs: followed from a click, mended by others, accepted, and taken back."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+
+from app.features.recordings.ball_run_schemas import (
+    BallClickRequest,
+    BallRunChange,
+    BallRunDocument,
+    BallRunFrames,
+    BallRunList,
+)
+from app.features.recordings.ball_runs import (
+    StoredRun,
+    add_run,
+    change_run,
+    get_run,
+    list_runs,
+    mend_run,
+    remove_run,
+)
+from app.finite import MAX_ID
+from app.http.conflicts import current_state
+from app.http.cursor import paged
+from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
+from app.http.permissions import Action, OwnedKind, may
+from app.http.problem import responses
+from app.http.request_limits import QUESTIONS, limit
+from app.http.respond import document, no_content, responds
+from app.http.route import Route
+
+router = APIRouter(
+    prefix="/recordings/{recording}/ball-runs", tags=["recordings"], route_class=Route
+)
+
+TAGGED = {"headers": {"ETag": {"description": "Of the run.", "schema": {"type": "string"}}}}
+LOCATION = {"Location": {"description": "Its address.", "schema": {"type": "string"}}}
+RunId = Annotated[int, Path(ge=1, le=MAX_ID, description="Id of the ball run.")]
+
+
+def _tagged(found: StoredRun, status: int = 200, **headers: str) -> Response:
+    return document(BallRunFrames.of(found), status, {"ETag": found.etag, **headers})
+
+
+def _made(found: StoredRun) -> Response:
+    return _tagged(
+        found, 201, Location=f"/api/v1/recordings/{found.recording}/ball-runs/{found.id}"
+    )
+
+
+@router.get("", operation_id="listBallRuns", responses=responses(404))
+@may(Action.READ, recording=OwnedKind.RECORDING)
+@paged()
+def get_runs(recording: Id, store: AppStore) -> BallRunList:
+    """The balls that were followed in a recording."""
+    return BallRunList(items=[BallRunDocument.of(one) for one in list_runs(store, recording)])
+
+
+@router.post(
+    "",
+    operation_id="followBall",
+    response_model=BallRunFrames,
+    status_code=201,
+    responses={
+        **responses(404, 409, 413, 415, 503),
+        201: {"description": "The run.", "headers": {**TAGGED["headers"], **LOCATION}},
+    },
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@limit(QUESTIONS)
+@responds(_made)
+def add_one(
+    recording: Id, wanted: BallClickRequest, services: AppServices, actor: Actor
+) -> StoredRun:
+    """Follow the ball from a click, forwards and backwards through the shot, until it is lost.
+
+    The click is put onto the ball's centre. Cameras over time and boxes that a detector predicted help where there are
+    any. Nothing becomes an annotation before a person accepts it.
+    """
+    click = wanted.value()
+    return add_run(services.store, services.balls, recording, click, actor=actor)
+
+
+@router.get(
+    "/{run}",
+    operation_id="getBallRun",
+    response_model=BallRunFrames,
+    responses={**responses(404), 200: TAGGED},
+)
+@may(Action.READ, recording=OwnedKind.RECORDING)
+def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
+    """One ball run, with its frames."""
+    return _tagged(get_run(store, recording, run))
+
+
+@router.post(
+    "/{run}/clicks",
+    operation_id="mendBallRun",
+    response_model=BallRunFrames,
+    responses={**responses(404, 409, 412, 413, 415, 428, 503), 200: TAGGED},
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@limit(QUESTIONS)
+@responds(_tagged)
+def mend_one(
+    recording: Id,
+    run: RunId,
+    wanted: BallClickRequest,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+) -> StoredRun:
+    """Say where the ball is in one more frame, and follow it from there, up to where both agree."""
+    store, click = services.store, wanted.value()
+    with current_state(lambda: BallRunFrames.of(get_run(store, recording, run))):
+        return mend_run(store, services.balls, recording, run, click, if_match, actor=actor)
+
+
+@router.patch(
+    "/{run}",
+    operation_id="changeBallRun",
+    response_model=BallRunFrames,
+    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@responds(_tagged)
+def change_one(
+    recording: Id,
+    run: RunId,
+    wanted: BallRunChange,
+    services: AppServices,
+    actor: Actor,
+    if_match: IfMatch,
+) -> StoredRun:
+    """Accept a ball run, or take that back; confirm frames of it that are uncertain.
+
+    Accepted, each view that shows one of its frames gets the ball, but for uncertain frames that nobody confirmed. A ball
+    that somebody else said stays. Taken back, exactly those balls go.
+    """
+    store = services.store
+    with current_state(lambda: BallRunFrames.of(get_run(store, recording, run))):
+        return change_run(
+            store, recording, run, wanted.value(), if_match, actor=actor, paint=services.paint
+        )
+
+
+@router.delete(
+    "/{run}",
+    operation_id="deleteBallRun",
+    status_code=204,
+    response_class=Response,
+    responses={**responses(404), 204: {"description": "It is gone."}},
+)
+@may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
+@responds(no_content)
+def delete_one(recording: Id, run: RunId, store: AppStore, actor: Actor) -> None:
+    """Delete a ball run; balls that views have from it stay."""
+    remove_run(store, recording, run, actor=actor)

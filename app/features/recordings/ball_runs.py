@@ -1,0 +1,519 @@
+"""Ball runs: one click follows the ball through a shot; a person accepts what came of it, or takes that back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import CancelledError
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from app.canonical import canonical
+from app.config import Settings
+from app.db.idempotency import without_response
+from app.db.json_columns import Json, as_written, pack, parse, unpack
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
+from app.features.audit.audit_events import add_audit_event
+from app.features.groups.bulk_edits import ViewEdits, edit_views
+from app.features.groups.digest import digest
+from app.features.groups.edit import Edit, SetBalls
+from app.features.groups.queries import read_groups
+from app.features.groups.state import read_etags, require_etag
+from app.features.groups.view_paint import PaintFollower
+from app.features.recordings.ball_run_queries import (
+    delete_run,
+    find_run,
+    insert_run,
+    list_run_rows,
+    predicted_in,
+    update_run,
+)
+from app.features.recordings.camera_queries import views_of_video
+from app.features.recordings.cameras import cameras_at
+from app.features.recordings.service import (
+    Recording,
+    get_recording,
+    get_shots,
+    need_recording,
+    read_index,
+)
+from app.media.frames import refused_picture
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import Box
+from app.tracking.ball_follow import follow_ball
+from app.tracking.ball_run import BallClick, BallRun, DetectedBall, FollowedBall, FollowHints
+from app.video.frames import Image, RecordingReader
+from app.worker_pool import WorkerPool
+from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
+
+LIMITS = WorkerLimits(memory=1536 * 2**20, processor=120.0, silence=120.0)
+"""For one click."""
+WAITING = 16
+EACH_WAY = 250
+"""Frames that a click is followed to either side: ten seconds."""
+KEPT_BYTES, BEHIND = 160 * 2**20, 16
+"""Of decoded frames; and how many are decoded together where it goes backwards."""
+_BATCH = 100
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run as it stands.
+
+    Attributes:
+        run: Its frames.
+        confirmed: Uncertain frames that a person said are right.
+        accepted_by: Who accepted it; None: nobody.
+        stale: Whether the video is another one by now.
+        groups: What accepting did: views that got the ball (``placed``), and that had one already (``kept``).
+    """
+
+    id: int
+    dataset_id: int
+    recording: int
+    run: BallRun
+    confirmed: tuple[int, ...]
+    accepted_by: str | None
+    stale: bool
+    groups: Mapping[str, int]
+    actor: str
+    created: str
+    etag: str
+
+    @property
+    def name(self) -> str:
+        """What balls that come from it say they come from."""
+        return f"ball run {self.id}"
+
+    @property
+    def trusted(self) -> dict[int, FollowedBall]:
+        """The balls that accepting it stands for, by frame: all but uncertain ones that nobody confirmed."""
+        sure = {*self.confirmed, *(click.frame for click in self.run.clicks)}
+        return {
+            ball.frame: ball
+            for ball in self.run.balls
+            if ball.state == "followed" or ball.frame in sure
+        }
+
+
+@dataclass(frozen=True)
+class RunChange:
+    """What a person says of a run; what is None stays as it is.
+
+    Attributes:
+        accepted: Whether it is accepted.
+        confirmed: All uncertain frames that are right.
+    """
+
+    accepted: bool | None = None
+    confirmed: tuple[int, ...] | None = None
+
+
+class BallFollower:
+    """Follows balls in a worker process, which decodes."""
+
+    def __init__(self, settings: Settings):
+        self._settings = settings
+        self._pool = WorkerPool(LIMITS, 1, WAITING, "balls", COUNTS["recordings"])
+
+    def follow(
+        self, recording: Recording, click: BallClick, bounds: tuple[int, int], hints: FollowHints
+    ) -> BallRun | None:
+        """What a click is followed to; waits for the process.
+
+        Args:
+            recording: Of which recording.
+            click: Where the ball is.
+            bounds: First and last frame of the shot.
+            hints: What is known beside the pictures.
+
+        Raises:
+            OverloadedError: Too many wait, or the server is shutting down.
+            ImageError: A frame cannot be decoded.
+        """
+        sha256 = recording.require_readable()
+
+        def explain(error: WorkerEnded) -> Exception:
+            return refused_picture(f"{recording.name} around frame {click.frame}", error)
+
+        asked = (recording.path, sha256, click, bounds, hints, self._settings)
+        task = self._pool.submit(follow_in_file, *asked, explain=explain)
+        try:
+            found: BallRun | None = task.future.result()
+        except CancelledError as error:
+            raise OverloadedError(
+                "the server is shutting down", hint="Nothing was saved. Try it again in a moment."
+            ) from error
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        self._pool.close()
+
+
+def follow_in_file(
+    path: Path,
+    sha256: str,
+    click: BallClick,
+    bounds: tuple[int, int],
+    hints: FollowHints,
+    settings: Settings,
+) -> BallRun | None:
+    """The work of the process."""
+    reader = RecordingReader(path, read_index(settings, sha256), KEPT_BYTES)
+
+    def read(number: int) -> Image:
+        if number < click.frame and not reader.has(number):
+            # To decode forwards from a key frame costs as much for one frame as for those before it.
+            for before in range(max(number - BEHIND, bounds[0]), number):
+                reader.read(before)
+        return reader.read(number)
+
+    first, last = max(bounds[0], click.frame - EACH_WAY), min(bounds[1], click.frame + EACH_WAY)
+    try:
+        return follow_ball(
+            read,
+            click,
+            range(click.frame - 1, first - 1, -1),
+            range(click.frame + 1, last + 1),
+            hints,
+        )
+    finally:
+        reader.close()
+
+
+def list_runs(store: Store, recording_id: int) -> list[StoredRun]:
+    """The runs of a recording, by their first frames.
+
+    Raises:
+        NotFoundError: There is no such recording.
+    """
+    with store.read() as session:
+        sha256 = need_recording(session, recording_id).sha256
+        return [_of_row(row, sha256) for row in list_run_rows(session, recording_id)]
+
+
+def get_run(store: Store, recording_id: int, run_id: int) -> StoredRun:
+    """A run of a recording.
+
+    Raises:
+        NotFoundError: The recording has no such run.
+    """
+    with store.read() as session:
+        return _need(session, recording_id, run_id)
+
+
+def _need(session: Session, recording_id: int, run_id: int) -> StoredRun:
+    row = find_run(session, run_id)
+    if row is None or row.recording_id != recording_id:
+        raise NotFoundError(f"recording {recording_id} has no ball run {run_id}")
+    return _of_row(row, need_recording(session, recording_id).sha256)
+
+
+def add_run(
+    store: Store, follower: BallFollower, recording_id: int, click: BallClick, *, actor: str
+) -> StoredRun:
+    """Follow a ball from a click, and keep what came of it.
+
+    Args:
+        store: The database.
+        follower: Does the work.
+        recording_id: Which recording.
+        click: Where the ball is.
+        actor: Who clicked.
+
+    Raises:
+        ConflictError: The recording cannot be read.
+        InputError: The frame is outside of the recording, or nothing near the click looks like a ball.
+    """
+    recording, run = _followed(store, follower, recording_id, click)
+    with store.write() as session:
+        number = insert_run(
+            session,
+            actor,
+            dataset_id=recording.dataset_id,
+            recording_id=recording_id,
+            sha256=recording.sha256,
+            **_values(run),
+        )
+        found = _need(session, recording_id, number)
+        _note(session, actor, "ball followed", found)
+        session.respond(found)
+    return found
+
+
+def mend_run(
+    store: Store,
+    follower: BallFollower,
+    recording_id: int,
+    run_id: int,
+    click: BallClick,
+    if_match: str,
+    *,
+    actor: str,
+) -> StoredRun:
+    """Say where the ball is in one more frame of a run, and follow it from there, too.
+
+    Raises:
+        ConflictError, InputError: As ``add_run``; or the run is accepted.
+        StaleRevisionError: Somebody changed it meanwhile.
+    """
+    before = get_run(store, recording_id, run_id)
+    _require_open(before, if_match)
+    _, new = _followed(store, follower, recording_id, click)
+    with store.write() as session:
+        before = _need(session, recording_id, run_id)
+        _require_open(before, if_match)
+        run = before.run.mended(new)
+        kept = [frame for frame in before.confirmed if frame in {ball.frame for ball in run.balls}]
+        values = {**_values(run), "confirmed": canonical(kept)}
+        found = _change(session, before, actor, "ball followed anew", **values)
+        session.respond(found)
+    return found
+
+
+def change_run(
+    store: Store,
+    recording_id: int,
+    run_id: int,
+    change: RunChange,
+    if_match: str,
+    *,
+    actor: str,
+    paint: PaintFollower | None = None,
+) -> StoredRun:
+    """Confirm uncertain frames of a run, accept it, or take that back.
+
+    Accepted, each view that shows one of its frames gets the ball, unless somebody said another one; taken back,
+    those balls go, and no others.
+
+    Raises:
+        ConflictError: It is of another video; or what is confirmed of an accepted run would change.
+        InputError: Nothing is changed, or a frame is none of its uncertain ones.
+        NotFoundError: The recording has no such run.
+        StaleRevisionError: Somebody changed it meanwhile.
+    """
+    if change.accepted is None and change.confirmed is None:
+        raise InputError("this changes nothing of the run", hint="Send accepted or confirmed.")
+    before = get_run(store, recording_id, run_id)
+    require_etag(before.etag, if_match, "this ball run")
+    if change.confirmed is not None:
+        _require_open(before, if_match)
+        with store.write() as session, without_response():
+            before = _need(session, recording_id, run_id)
+            _require_open(before, if_match)
+            text = canonical(_checked(before, change.confirmed))
+            before = _change(session, before, actor, "ball confirmed", confirmed=text)
+    groups: Mapping[str, int] = {}
+    if change.accepted is not None:
+        if change.accepted and before.stale:
+            raise ConflictError("the video is another one since", hint="Follow the ball again.")
+        with without_response():
+            groups = _place(store, before, change.accepted, actor, paint)
+    with store.write() as session:
+        present = _need(session, recording_id, run_id)
+        require_etag(present.etag, before.etag, "this ball run")
+        if change.accepted is not None:
+            by = actor if change.accepted else None
+            did = "ball run accepted" if change.accepted else "ball run taken back"
+            values = {"accepted_by": by, "groups": canonical(groups)}
+            present = _change(session, present, actor, did, **values)
+        session.respond(present)
+    return present
+
+
+def remove_run(store: Store, recording_id: int, run_id: int, *, actor: str) -> None:
+    """Delete a run; balls that groups have from it stay.
+
+    Raises:
+        NotFoundError: The recording has no such run.
+    """
+    with store.write() as session:
+        found = _need(session, recording_id, run_id)
+        delete_run(session, run_id)
+        _note(session, actor, "ball run removed", found)
+        session.respond(None)
+
+
+def _followed(
+    store: Store, follower: BallFollower, recording_id: int, click: BallClick
+) -> tuple[Recording, BallRun]:
+    shots = get_shots(store, recording_id)
+    recording = shots.recording
+    recording.require_readable()
+    last = (recording.frames or 0) - 1
+    if not 0 <= click.frame <= last:
+        raise InputError(
+            f'"{recording.name}" has no frame {click.frame}; its last one is {last}',
+            pointer="/frame",
+        )
+    inside = (one for one in shots.items if one.first <= click.frame <= one.last)
+    shot = next(((one.first, one.last) for one in inside), (click.frame, click.frame))
+    around = range(max(shot[0], click.frame - EACH_WAY), min(shot[1], click.frame + EACH_WAY) + 1)
+    run = follower.follow(recording, click, shot, _hints(store, recording, around))
+    if run is None:
+        raise InputError(
+            f"nothing near ({click.x:.0f}, {click.y:.0f}) in frame {click.frame} looks like a ball",
+            hint="Click its middle, in a frame where nobody hides it.",
+        )
+    return recording, run
+
+
+def _hints(store: Store, recording: Recording, frames: range) -> FollowHints:
+    """Cameras over time of frames, and what detectors say of those that are groups."""
+    cameras = {
+        number: one.camera
+        for number, one in cameras_at(store, recording, frames).items()
+        if one.camera is not None
+    }
+    with store.read() as session:
+        shown = views_of_video(session, recording.dataset_id, recording.require_readable())
+        rows = predicted_in(session, [view for view in shown if view.number in frames])
+    detected = {
+        number: tuple(
+            DetectedBall(
+                row.x + row.width / 2, row.y + row.height / 2, (row.width + row.height) / 2, row.score
+            )
+            for row in boxes
+        )
+        for number, boxes in rows.items()
+    }  # fmt: skip
+    return FollowHints(cameras, {}, detected)
+
+
+def _place(
+    store: Store, run: StoredRun, accepted: bool, actor: str, paint: PaintFollower | None
+) -> dict[str, int]:
+    """Give the views of a run's frames its balls, or take those away that come from it."""
+    recording = get_recording(store, run.recording)
+    trusted, items, counts = run.trusted, list[ViewEdits](), {"placed": 0, "kept": 0}
+    with store.read() as session:
+        shown = views_of_video(session, recording.dataset_id, str(recording.sha256))
+        shown = [view for view in shown if view.number in trusted]
+        ids = sorted({view.group for view in shown})
+        for start in range(0, len(ids), _BATCH):
+            some = ids[start : start + _BATCH]
+            groups, etags = read_groups(session, some), read_etags(session, some)
+            for view in shown:
+                if view.group not in groups:
+                    continue
+                balls = next(
+                    one.balls for one in groups[view.group].group.views if one.key == view.key
+                )
+                mine = _annotation(run, trusted[view.number])
+                if accepted and balls and balls != (mine,):
+                    counts["kept"] += 1
+                    continue
+                if not accepted and balls != (mine,):
+                    continue
+                change = partial(_set_balls, balls=(mine,) if accepted else ())
+                number = groups[view.group].view_ids[view.key]
+                items.append(ViewEdits(number, None, etags[view.group], change))
+    report = edit_views(store, recording.dataset_id, items, actor=actor, paint=paint)
+    for item in report.items:
+        counts["kept" if item.outcome == "refused" else "placed"] += 1
+    return counts if accepted else {}
+
+
+def _set_balls(view: str, balls: tuple[BallAnnotation, ...]) -> Sequence[Edit]:
+    return [SetBalls(view, balls)]
+
+
+def _annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
+    half = ball.diameter / 2
+    box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
+    return BallAnnotation(box=box, predicted_by=run.name)
+
+
+def _require_open(run: StoredRun, if_match: str) -> None:
+    require_etag(run.etag, if_match, "this ball run")
+    if run.accepted_by is not None:
+        raise ConflictError("this ball run is accepted", hint="Take that back first.")
+
+
+def _checked(run: StoredRun, frames: Sequence[int]) -> list[int]:
+    uncertain = {ball.frame for ball in run.run.balls if ball.state == "uncertain"}
+    for place, frame in enumerate(frames):
+        if frame not in uncertain:
+            raise InputError(
+                f"frame {frame} is no uncertain one of this ball run",
+                pointer=f"/confirmed/{place}",
+            )
+    return sorted(set(frames))
+
+
+def _change(session: Session, run: StoredRun, actor: str, did: str, **values: Any) -> StoredRun:
+    row = find_run(session, run.id)
+    assert row is not None
+    update_run(session, run.id, revision=row.revision + 1, **values)
+    _note(session, actor, did, run)
+    return _need(session, run.recording, run.id)
+
+
+def _note(session: Session, actor: str, did: str, run: StoredRun) -> None:
+    what = {"recording": run.recording, "run": run.id, "first": run.run.first, "last": run.run.last}
+    add_audit_event(session, actor, did, run.dataset_id, **what)
+
+
+def _values(run: BallRun) -> dict[str, Any]:
+    return {"first": run.first, "last": run.last, "body": pack(run_to_json(run))}
+
+
+def run_to_json(run: BallRun) -> Json:
+    """A run as columns: the same place is the same frame."""
+    columns = {
+        name: [round(float(getattr(ball, name)), digits) for ball in run.balls]
+        for name, digits in _COLUMNS.items()
+    }
+    return {
+        "clicks": [asdict(click) for click in run.clicks],
+        "before": run.before,
+        "after": run.after,
+        "frame": [ball.frame for ball in run.balls],
+        **columns,
+        "state": "".join(ball.state[0] for ball in run.balls),
+    }
+
+
+_COLUMNS = {"x": 3, "y": 3, "diameter": 3, "sigma_px": 3, "confidence": 3}
+_STATES = {"f": "followed", "u": "uncertain"}
+
+
+def run_from_json(value: Mapping[str, Any]) -> BallRun:
+    """Back from ``run_to_json``.
+
+    Raises:
+        DamagedError: It is not what was written.
+    """
+    with as_written():
+        rows = zip(
+            value["frame"],
+            *(value[name] for name in _COLUMNS),
+            (_STATES[letter] for letter in value["state"]),
+            strict=True,
+        )
+        return BallRun(
+            tuple(BallClick(**click) for click in value["clicks"]),
+            tuple(FollowedBall(*row) for row in rows),
+            value["before"],
+            value["after"],
+        )
+
+
+def _of_row(row: Any, sha256: str | None) -> StoredRun:
+    return StoredRun(
+        id=int(row.id),
+        dataset_id=int(row.dataset_id),
+        recording=int(row.recording_id),
+        run=run_from_json(unpack(row.body)),
+        confirmed=tuple(parse(row.confirmed)),
+        accepted_by=row.accepted_by,
+        stale=row.sha256 != sha256,
+        groups=parse(row.groups),
+        actor=row.actor,
+        created=row.created,
+        etag=f'"{digest([row.id, row.revision, row.created])[:16]}"',
+    )

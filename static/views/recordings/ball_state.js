@@ -1,0 +1,148 @@
+// @ts-check
+/** What the page of a recording knows of the balls that were followed in the shot on screen. */
+
+import { useEffect, useRef, useState } from 'preact/hooks';
+
+import { deleteBallRun, getBallRun, getBallRuns, patchBallRun, postBallClick, postBallRun } from '../../api/ball_runs.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { useKeys } from '../../lib/hooks.js';
+import { useResource } from '../../lib/resource.js';
+import { plural } from '../../lib/format.js';
+import { nextUncertain, runAt, uncertainAround } from '../../state/ball_runs.js';
+import { announce } from '../../state/notice.js';
+import { goTo, stand, wanted } from '../../state/playback.js';
+
+/** @import {BallRunFrames, BallRunJson} from '../../api/ball_runs.js' */
+/** @import {ApiError} from '../../api/problem.js' */
+/** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+/** @import {Binding} from '../../lib/keys.js' */
+
+/** @typedef {{x: number, y: number}} Place   pixels of the recording */
+/**
+ * @typedef {object} Balls
+ * @property {BallRunJson[]} all runs of the recording
+ * @property {BallRunFrames[]} runs of the shot, with their frames
+ * @property {BallRunFrames | null} run at the frame on screen
+ * @property {Place | null} cross where Enter clicks; null while nobody clicks by keyboard
+ * @property {boolean} busy whether a ball is being followed
+ * @property {ApiError | null} error
+ * @property {(at: Place) => void} click
+ * @property {() => void} accept
+ * @property {() => void} takeBack
+ * @property {() => void} confirm
+ * @property {() => void} next
+ * @property {() => void} remove
+ * @property {() => void} turnCross
+ * @property {(x: number, y: number, event: KeyboardEvent) => void} moveCross
+ */
+
+/** What one press of an arrow moves the cross by, pixels of the recording. */
+const STEPS = { plain: 8, Shift: 40, Alt: 1 };
+
+/** @param {BallRunJson} run */
+const tag = ({ id, etag }) => `${id} ${etag}`;
+
+/** @param {RecordingJson} one @param {Shot | undefined} shot @returns {Balls} */
+export function useBalls(one, shot) {
+	const list = useResource((signal) => getBallRuns(one.id, signal), [one.id]);
+	const [cross, setCross] = useState(/** @type {Place | null} */ (null));
+	const { error, busy, attempt } = useAttempt();
+	const known = useRef(/** @type {Map<string, BallRunFrames>} */ (new Map()));
+	const all = list.value?.items ?? [];
+	const mine = shot ? all.filter(({ first, last }) => first <= shot.last && shot.first <= last) : [];
+	const asked = mine.map(tag).join();
+	const read = useResource(async (signal) => {
+		for (const run of mine) {
+			if (!known.current.has(tag(run))) known.current.set(tag(run), await getBallRun(one.id, run.id, signal));
+		}
+		return asked;
+	}, [one.id, asked]);
+	const runs = mine.flatMap((run) => known.current.get(tag(run)) ?? []);
+	const frame = wanted.value;
+	const run = runAt(runs, frame);
+	useEffect(() => { setCross(null); }, [one.id]);
+	/** @param {Promise<BallRunFrames>} doing @param {(done: BallRunFrames) => string} told */
+	const ask = (doing, told) => attempt(doing, (done) => {
+		known.current.set(tag(done), done);
+		list.reload();
+		announce(told(done));
+	});
+	/** @param {Place} at */
+	function click(at) {
+		if (busy || list.waiting) return;
+		stand();
+		const said = { frame, x: at.x, y: at.y };
+		setCross(null);
+		const open = run && !run.accepted_by ? run : null;
+		ask(open ? postBallClick(one.id, open, said) : postBallRun(one.id, said), ({ first, last, uncertain }) => (
+			`The ball is followed from frame ${first} to ${last}; ${uncertain ? `${plural(uncertain, 'frame')} uncertain` : 'every frame is sure'}.`
+		));
+	}
+	/** @param {boolean} accepted */
+	function decide(accepted) {
+		if (busy) return;
+		if (!run) announce('No ball is followed in this frame.');
+		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This run is accepted.' : 'This run is not accepted.');
+		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept }) => (accepted
+			? `Accepted: ${plural(placed ?? 0, 'view')} got the ball${kept ? `, ${kept} had another one` : ''}.`
+			: 'Taken back.'));
+	}
+	function confirm() {
+		const around = run ? uncertainAround(run, frame) : [];
+		if (busy || !run) return;
+		if (!around.length) announce('This frame is not uncertain.');
+		else ask(patchBallRun(one.id, run, { confirmed: [...run.confirmed, ...around] }), () => `${plural(around.length, 'frame')} confirmed.`);
+	}
+	function remove() {
+		if (busy || !run) return;
+		attempt(deleteBallRun(one.id, run.id), () => { list.reload(); announce('The run is deleted.'); });
+	}
+	function next() {
+		const place = nextUncertain(runs, frame);
+		if (place === null) announce(runs.length ? 'No frame is uncertain.' : 'No ball is followed in this shot.');
+		else goTo(place);
+	}
+	const middle = { x: (one.width ?? 0) / 2, y: (one.height ?? 0) / 2 };
+	return {
+		all, runs, run, cross, busy, error: error ?? list.error ?? read.error, click, confirm, next, remove,
+		accept: () => decide(true),
+		takeBack: () => decide(false),
+		turnCross: () => { stand(); setCross(cross ? null : middle); },
+		moveCross: (x, y, { shiftKey, altKey }) => {
+			const step = altKey ? STEPS.Alt : shiftKey ? STEPS.Shift : STEPS.plain;
+			/** @param {number} value @param {number | null} size */
+			const inside = (value, size) => Math.min(Math.max(value, 0), (size ?? 1) - 1);
+			if (cross) setCross({ x: inside(cross.x + x * step, one.width), y: inside(cross.y + y * step, one.height) });
+		},
+	};
+}
+
+/** @param {Balls} balls */
+export function useBallKeys(balls) {
+	const latest = useRef(balls);
+	latest.current = balls;
+	const keys = useRef(/** @type {Binding[]} */ ([
+		{ keys: ['f'], label: 'Click the ball by keyboard: a cross that the arrows move', group: 'Ball', needs: 'annotate', run: () => latest.current.turnCross() },
+		{ keys: ['y'], label: 'Accept the ball of this run', group: 'Ball', needs: 'annotate', run: () => latest.current.accept() },
+		{ keys: ['u'], label: 'Take that back', group: 'Ball', needs: 'annotate', run: () => latest.current.takeBack() },
+		{ keys: ['v'], label: 'Next uncertain or lost frame', group: 'Ball', run: () => latest.current.next() },
+		{ keys: ['o'], label: 'These uncertain frames are right', group: 'Ball', needs: 'annotate', run: () => latest.current.confirm() },
+		{ keys: ['Delete'], label: 'Delete the run', group: 'Ball', needs: 'annotate', run: () => latest.current.remove() },
+	]));
+	useKeys(keys.current);
+	const crossed = useRef(/** @type {Binding[]} */ (crossKeys(latest)));
+	useKeys(crossed.current);
+}
+
+/** @param {{current: Balls}} latest @returns {Binding[]} */
+function crossKeys(latest) {
+	const when = () => latest.current.cross !== null;
+	const ways = /** @type {const} */ ([['ArrowLeft', -1, 0], ['ArrowRight', 1, 0], ['ArrowUp', 0, -1], ['ArrowDown', 0, 1]]);
+	return [
+		...ways.map(([key, x, y]) => /** @type {Binding} */ ({
+			keys: [key, `Shift+${key}`, `Alt+${key}`], label: `Move the cross ${key.slice(5).toLowerCase()}`, group: 'Ball, by cross', shown: '↑ ↓ ← →, with Shift or Alt', when, run: (event) => latest.current.moveCross(x, y, event),
+		})),
+		{ keys: ['Enter'], label: 'Follow the ball from the cross', group: 'Ball, by cross', when, run: () => { const { cross, click } = latest.current; if (cross) click(cross); } },
+		{ keys: ['Escape'], label: 'Put the cross away', group: 'Ball, by cross', when, run: () => latest.current.turnCross() },
+	];
+}
