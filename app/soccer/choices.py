@@ -23,7 +23,7 @@ SplitKind = Literal["given", "match", "camera"]
 """How a version is split into train and test."""
 ProposalOutcome = Literal["proposed", "unsure", "nothing"]
 """What can become of a view for which lines are sought in the paint of its picture."""
-PredictionFormat = Literal["coco", "yolo", "csv"]
+PredictionFormat = Literal["coco", "yolo", "csv", "tracks"]
 """How files of predictions are written."""
 AnyPredictionFormat = Literal["auto", PredictionFormat]
 """The same, or as the endings of the files tell."""
@@ -47,3 +47,5 @@ BatchState = Literal["open", "closed"]
 """Whether groups are still given out of a batch."""
 JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
 """How far long work is."""
+BallEventKind = Literal["kick", "bounce", "out"]
+"""What happened to the ball."""

@@ -146,17 +146,6 @@ class DatasetNoise:
     ball: BallNoise
     misses: tuple[tuple[Miss, ...], ...]
 
-    def used_by(self, policy: Policy) -> Policy:
-        """A policy with the estimates, as far as there are any."""
-        click, given, share = self.ball.click, self.ball.given, self.ball.share
-        policy = replace(
-            policy,
-            click_sigma_px=policy.click_sigma_px if click is None else click.value,
-            box_sigma_share=policy.box_sigma_share if share is None else share,
-            given_sigma_px=policy.given_sigma_px if given is None else given.value,
-        )
-        return policy if self.lines is None else _with_lines(policy, self.lines)
-
 
 def estimate_noise(groups: Sequence[SeenGroup], policy: Policy) -> DatasetNoise:
     """The noise that many groups show.

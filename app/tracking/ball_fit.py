@@ -239,6 +239,12 @@ class _Problem:
             force[far] += (doubt * off)[:, None] * along
         np.add.at(diagonal[:, _P, _P], knots.at, normal)
         np.add.at(pull[:, _P], knots.at, force)
+        asked = knots.asked
+        if len(asked.at):
+            off = (state[asked.at, _P] * asked.normal).sum(axis=1) - asked.value
+            sure = asked.normal / asked.sigma[:, None] ** 2
+            np.add.at(diagonal[:, _P, _P], asked.at, sure[:, :, None] * asked.normal[:, None, :])
+            np.add.at(pull[:, _P], asked.at, off[:, None] * sure)
 
     def _begin(self, state: FloatArray, diagonal: FloatArray, pull: FloatArray) -> None:
         """What is known before anything is seen."""

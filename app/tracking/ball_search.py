@@ -9,6 +9,7 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_models import REST
+from app.tracking.ball_said import Asked, Said, asked_of
 from app.tracking.ball_search_kernels import likeliest
 from app.tracking.ball_track import BallMeasurements
 
@@ -38,6 +39,7 @@ class Knots:
         noise: Radians, shape (R,).
         far, far_sigma: Distance from the camera by size, 0 where unknown, metres, shape (R,).
         view: Number of each ray's view, shape (R,).
+        asked: What is said beside the rays.
     """
 
     times: FloatArray
@@ -52,6 +54,7 @@ class Knots:
     far: FloatArray
     far_sigma: FloatArray
     view: IntArray
+    asked: Asked
 
 
 @dataclass(frozen=True)
@@ -73,13 +76,16 @@ class History:
     score: float
 
 
-def knots_of(measurements: BallMeasurements, times: FloatArray, shift: FloatArray) -> Knots:
+def knots_of(
+    measurements: BallMeasurements, times: FloatArray, shift: FloatArray, said: Said | None = None
+) -> Knots:
     """Instants and rays; pixels through which no ray goes have none.
 
     Args:
         measurements: Of a stretch.
         times: Further instants, seconds.
         shift: Seconds to add to each view's times, by ``measurements.names``.
+        said: What is said beside the measurements.
     """
     names = {name: number for number, name in enumerate(measurements.names)}
     view = np.array([names[name] for name in measurements.views], dtype=int)
@@ -119,6 +125,7 @@ def knots_of(measurements: BallMeasurements, times: FloatArray, shift: FloatArra
         far,
         np.where(known, far * size_sigma / np.where(known, size, 1.0), 0.0),
         view[rows],
+        asked_of(knots, said or Said()),
     )
 
 
@@ -154,9 +161,13 @@ def search(knots: Knots, pitch: Pitch, width: int = _WIDTH) -> History:
     """The likeliest history of a stretch."""
     x, y = pitch.length / 2 + _ASIDE_M, pitch.width / 2 + _ASIDE_M
     room = np.array([[-x, x], [-y, y], [-_ABOVE_M, _BELOW_M]])
+    asked = knots.asked
     mode, event, left, state, score = likeliest(
         knots.times, knots.starts, knots.centres, knots.across, knots.along,
         knots.noise, knots.scale, knots.far, knots.far_sigma, room, width,
+        asked.wanted, asked.begin, asked.due, asked.may_not,
+        np.searchsorted(asked.at, np.arange(len(knots.times) + 1)),
+        asked.normal, asked.value, asked.sigma,
     )  # fmt: skip
     bit = np.arange(len(knots.at)) - knots.starts[knots.at]
     return History(mode, event, state, (left[knots.at] >> bit) & 1 == 0, float(score))

@@ -48,6 +48,8 @@ _OUTLIER = np.log(0.01 / 1000.0**2)
 """Logarithm of the density of a measurement of something else, per square pixel."""
 _WORST = 35.0
 """Natural logarithm by which a hypothesis may be less likely than the best."""
+_UNLIKELY = 30.0
+"""The same, by which a place that is known makes one less likely at most."""
 _ALIKE = 2
 """Hypotheses that are kept of those whose mode and last event are the same."""
 _PER_KNOT = 5
@@ -265,7 +267,10 @@ def _see(m, P, first, last, centres, across, along, noise, scale, far, far_sigma
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigma, room, width):
+def likeliest(
+    times, starts, centres, across, along, noise, scale, far, far_sigma, room, width,
+    wanted, begin, due, may_not, places, normal, value, sigma,
+):  # fmt: skip
     """The likeliest history of modes and events.
 
     Args:
@@ -279,6 +284,12 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
         far, far_sigma: Distances from the cameras by size, and noise, 0 where unknown, shape (M,).
         room: Lowest and highest x, y and z of a ball, shape (3, 2).
         width: Hypotheses kept.
+        wanted: Kind of the event that happens once before a knot of its window, or ``NOTHING``, (K,).
+        begin: First knot of that window, shape (K,).
+        due: Whether a knot is its last, shape (K,).
+        may_not: Other kinds that do not happen before each knot, as bits, shape (K,).
+        places: Rows of what is known of places at each knot, shape (K + 1,).
+        normal, value, sigma: Directions, metres along them and how surely, (Q, 3), (Q,), (Q,).
 
     Returns:
         Mode at each knot and event before it, both shape (K,); bits of measurements left out,
@@ -293,11 +304,13 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
     count = 3
     M, C = np.zeros((width, 6)), np.zeros((width, 6, 6))
     score, since = np.zeros(width), np.zeros(width, np.int64)
+    latest = np.zeros(width, np.int64)
     size = width * _PER_KNOT + 3
     cm, cC = np.zeros((size, 6)), np.zeros((size, 6, 6))
     cs, cp = np.zeros(size), np.zeros(size, np.int64)
     cmode, cevent = np.zeros(size, np.int64), np.zeros(size, np.int64)
     csince, cleft = np.zeros(size, np.int64), np.zeros(size, np.int64)
+    clatest = np.zeros(size, np.int64)
     order = np.zeros(size, np.int64)
     for k in range(K):
         made = 0
@@ -312,44 +325,57 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
                 _copy(cm[made], cC[made], m, P)
                 cs[made] = -0.7 if mode < 2 else -4.0
                 cmode[made], cevent[made], cp[made], csince[made] = mode, NOTHING, 0, 0
+                clatest[made] = NOTHING
                 made += 1
         else:
             dt = times[k] - times[k - 1]
-            for h in range(count):
-                mode = modes[k - 1, h]
-                for way in range(_PER_KNOT):
-                    m, P = cm[made], cC[made]
-                    _copy(m, P, M[h], C[h])
-                    after, event, cost = mode, NOTHING, 0.0
-                    if way == 0:
-                        _move(m, P, mode, dt)
-                    elif way == 1:
-                        after, event = FLIGHT, KICK
-                        cost = _touch(m, P, mode, FLIGHT, dt)
-                    elif way == 2:
-                        after, event = ROLL, KICK
-                        cost = _touch(m, P, mode, ROLL, dt)
-                    elif way == 3:
-                        if mode == HELD:
+            for strict in range(2):
+                # Where no history can do what has to happen, it is as if nobody had said it.
+                if strict == 1 and made > 0:
+                    break
+                for h in range(count):
+                    mode = modes[k - 1, h]
+                    missing = wanted[k]
+                    if latest[h] == missing and since[h] >= begin[k]:
+                        missing = NOTHING
+                    now = missing != NOTHING and due[k] and strict == 0
+                    for way in range(_PER_KNOT):
+                        event = NOTHING if way == 0 else BOUNCE if way == 4 else KICK
+                        may = event == NOTHING or not (may_not[k] >> event) & 1
+                        if (now or not may) and (event != missing or event == NOTHING):
                             continue
-                        after, event = HELD, KICK
-                        cost = _touch(m, P, mode, HELD, dt)
-                    else:
-                        if mode != FLIGHT:
-                            continue
-                        after, event = FLIGHT, BOUNCE
-                        cost = _bounce(m, P, FLIGHT, dt)
-                        if cost > -np.inf and m[5] > -1.2:
-                            # Too low a hop to be seen as one.
-                            _copy(m, P, M[h], C[h])
+                        m, P = cm[made], cC[made]
+                        _copy(m, P, M[h], C[h])
+                        after, cost = mode, 0.0
+                        if way == 0:
+                            _move(m, P, mode, dt)
+                        elif way == 1:
+                            after = FLIGHT
+                            cost = _touch(m, P, mode, FLIGHT, dt)
+                        elif way == 2:
                             after = ROLL
-                            cost = _bounce(m, P, ROLL, dt)
-                    if cost == -np.inf:
-                        continue
-                    cmode[made], cevent[made], cp[made] = after, event, h
-                    csince[made] = since[h] if event == NOTHING else k
-                    cs[made] = score[h] + cost
-                    made += 1
+                            cost = _touch(m, P, mode, ROLL, dt)
+                        elif way == 3:
+                            if mode == HELD:
+                                continue
+                            after = HELD
+                            cost = _touch(m, P, mode, HELD, dt)
+                        else:
+                            if mode != FLIGHT:
+                                continue
+                            cost = _bounce(m, P, FLIGHT, dt)
+                            if cost > -np.inf and m[5] > -1.2:
+                                # Too low a hop to be seen as one.
+                                _copy(m, P, M[h], C[h])
+                                after = ROLL
+                                cost = _bounce(m, P, ROLL, dt)
+                        if cost == -np.inf:
+                            continue
+                        cmode[made], cevent[made], cp[made] = after, event, h
+                        csince[made] = since[h] if event == NOTHING else k
+                        clatest[made] = latest[h] if event == NOTHING else event
+                        cs[made] = score[h] + cost
+                        made += 1
         best = -np.inf
         for c in range(made):
             m, P = cm[c], cC[c]
@@ -358,6 +384,9 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
             )
             cs[c] += likely
             cleft[c] = left
+            for row in range(places[k], places[k + 1]):
+                square, total = _pin(m, P, normal[row], value[row], sigma[row] ** 2)
+                cs[c] -= min(square / 2, _UNLIKELY) + np.log(total) / 2
             for i in range(3):
                 slack = 2 * np.sqrt(max(P[i, i], 0.0)) + 0.1
                 off = max(room[i, 0] - m[i], m[i] - room[i, 1]) - slack
@@ -392,7 +421,7 @@ def likeliest(times, starts, centres, across, along, noise, scale, far, far_sigm
             score[kept] = cs[c]
             parent[k, kept], modes[k, kept], events[k, kept] = cp[c], cmode[c], cevent[c]
             lefts[k, kept] = cleft[c]
-            since[kept] = csince[c]
+            since[kept], latest[kept] = csince[c], clatest[c]
             kept += 1
         count = kept
     path = np.zeros(K, np.int64)

@@ -13,12 +13,14 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
+from app.plural import plural
+from app.soccer.choices import BallEventKind
 
 BallState = Literal["measured", "one_view", "predicted", "bridged", "gap"]
 """How a frame's ball is known: by two views or more, by one, by physics from one side of a gap or
 between measurements close by, by physics across a gap, or not at all."""
 BallMode = Literal["roll", "flight", "held", "out", ""]
-EventKind = Literal["kick", "bounce", "out"]
+EventKind = BallEventKind
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,21 @@ class BallEvent:
 
 
 @dataclass(frozen=True)
+class Correction:
+    """An event that a person added to a track, or removed from it.
+
+    Attributes:
+        frame: Of the stretch.
+        kind: ``kick``, ``bounce`` or ``out``.
+        added: Whether it is there; else it is not.
+    """
+
+    frame: int
+    kind: EventKind
+    added: bool
+
+
+@dataclass(frozen=True)
 class Contradiction:
     """A measurement that the track does not explain, and took no part.
 
@@ -107,6 +124,28 @@ class Contradiction:
     measurement: int
     px: float
     reason: str
+
+
+@dataclass(frozen=True)
+class Untracked:
+    """A run of measurements that is in no track, beside others that are.
+
+    Attributes:
+        first, last: Its first and last frame.
+        measurements: How many it has.
+        reason: Why, a sentence.
+    """
+
+    first: int
+    last: int
+    measurements: int
+    reason: str
+
+    @property
+    def sentence(self) -> str:
+        """What people are told."""
+        balls = plural(self.measurements, "measured ball")
+        return f"Frames {self.first} to {self.last} ({balls}) have no track: {self.reason}"
 
 
 @dataclass(frozen=True)
@@ -147,6 +186,7 @@ class BallTrack:
         left_out: None where nothing was left out.
         offsets: Seconds to add to a view's times, as the ball shows them, by name; only where that
             is observable and not nought.
+        untracked: Runs of measurements that are in no track, though others are.
     """
 
     frames: IntArray
@@ -162,6 +202,7 @@ class BallTrack:
     reason: str | None = None
     left_out: LeftOut | None = None
     offsets: tuple[tuple[str, float], ...] = ()
+    untracked: tuple[Untracked, ...] = ()
 
     @cached_property
     def sigma(self) -> FloatArray:

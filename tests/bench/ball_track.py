@@ -21,8 +21,9 @@ from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.rig_proposal import propose_rig
+from app.tracking.ball_correct import correct_track
 from app.tracking.ball_solve import track_ball
-from app.tracking.ball_track import BallMeasurements, BallTrack
+from app.tracking.ball_track import BallMeasurements, BallTrack, Correction
 from tests.bench.link import DATA, STANDS, Filmed, at_times, film, hawkeye, made_ball
 from tests.bench.rigs import rig_of
 from tests.bench.table import print_table
@@ -64,6 +65,23 @@ def bench_ball_track(data: Path = DATA, seeds: int = 3) -> None:
         "events F1", "left out px", "CPU s",
     )  # fmt: skip
     print_table("Is the ball over time where it was?", header, rows)
+    seen = {"six cameras": through(ball, next(iter(rigs.values())), 0, 0.0, 0.3)}
+    seen["main camera alone"] = main(ball, 0)
+    edits = [(name, *edited(ball, one)) for name, one in seen.items()]
+    print_table("What does a correction take?", ("", "frames solved anew", "CPU ms"), edits)
+
+
+def edited(ball: FloatArray, seen: BallMeasurements, count: int = 20) -> tuple[float, float]:
+    """Frames that are solved anew around an event that a person adds, and milliseconds; medians."""
+    times = frame_times(ball)
+    track = track_ball(seen, np.arange(len(times)), times, pitch=Pitch())
+    frames, taken = [], []
+    for frame in np.linspace(60, len(times) - 60, count).astype(int).tolist():
+        began = time.process_time()
+        patches = correct_track(track, seen, Pitch(), [Correction(frame, "kick", True)])
+        taken.append(1000 * (time.process_time() - began))
+        frames.append(sum(len(patch.part.frames) for patch in patches))
+    return float(np.median(frames)), float(np.median(taken))
 
 
 def through(

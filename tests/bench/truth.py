@@ -15,7 +15,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
 from app.solving.ball_noise import Miss
-from app.solving.dataset_noise import SeenGroup, estimate_noise
+from app.solving.dataset_noise import DatasetNoise, SeenGroup, estimate_noise
 from app.solving.solve import solve
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.pitches import estimate_match
@@ -180,7 +180,23 @@ def with_found_pitch(made: list[Made], case: Case) -> list[Made]:
 def with_noise(made: list[Made]) -> Policy:
     """The policy ``paper`` with the noise that the groups themselves show."""
     seen = [SeenGroup.of(one.group, solve(one.group, PAPER), PAPER) for one in made]
-    return estimate_noise(seen, PAPER).used_by(replace(PAPER, name="estimated"))
+    return noise_used(estimate_noise(seen, PAPER), replace(PAPER, name="estimated"))
+
+
+def noise_used(noise: DatasetNoise, policy: Policy) -> Policy:
+    """A policy with estimates, as far as there are any."""
+    ball, lines = noise.ball, noise.lines
+    policy = replace(
+        policy,
+        click_sigma_px=policy.click_sigma_px if ball.click is None else ball.click.value,
+        box_sigma_share=policy.box_sigma_share if ball.share is None else ball.share,
+        given_sigma_px=policy.given_sigma_px if ball.given is None else ball.given.value,
+    )
+    if lines is None:
+        return policy
+    sigma, share = lines.sigma.value, lines.share.value
+    known = replace(policy.calibration, line_sigma_px=sigma, line_share=share)
+    return replace(policy, calibration=known)
 
 
 def misses_in(made: Made, policy: Policy) -> tuple[Miss, ...]:

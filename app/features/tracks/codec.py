@@ -6,7 +6,7 @@ A track is always computed from its stored inputs, so that whoever has them gets
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass
 from typing import Any, cast, get_args
 
 import numpy as np
@@ -18,37 +18,23 @@ from app.features.tracks.stretches import Stretch
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
+from app.tracking.ball_correct import TrackPatch, correct_track, patched
 from app.tracking.ball_solve import track_ball
 from app.tracking.ball_track import (
     BallEvent,
     BallMeasurements,
     BallTrack,
     Contradiction,
+    Correction,
     EventKind,
     LeftOut,
+    Untracked,
 )
 
-TRACK_VERSION = "1"
+TRACK_VERSION = "2"
 """Of the solver: tracks of another one are stale."""
 EVENT_KINDS: tuple[str, ...] = get_args(EventKind)
-NEAR_FRAMES = 3
-"""Between an event and the frame in which a person removes it."""
 _UPPER = np.triu_indices(6)
-
-
-@dataclass(frozen=True)
-class Correction:
-    """An event that a person added to a track, or removed from it.
-
-    Attributes:
-        frame: Of the stretch.
-        kind: ``kick``, ``bounce`` or ``out``.
-        added: Whether it is there; else it is not.
-    """
-
-    frame: int
-    kind: EventKind
-    added: bool
 
 
 @dataclass(frozen=True)
@@ -84,39 +70,42 @@ class TrackInputs:
 def make_track(inputs: TrackInputs) -> BallTrack:
     """The track of inputs, with their corrections."""
     track = track_ball(inputs.measurements, inputs.frames, inputs.times, pitch=inputs.pitch)
-    return corrected(track, inputs.corrections)
+    return corrected(inputs, track, correct(inputs, track))
 
 
-def corrected(track: BallTrack, corrections: Sequence[Correction]) -> BallTrack:
-    """A track with the events that people added and without those they removed."""
-    events = list(track.events)
-    rows = {int(frame): row for row, frame in enumerate(track.frames)}
-    for item in corrections:
-        near = [
-            event
-            for event in events
-            if event.kind == item.kind and abs(event.frame - item.frame) <= NEAR_FRAMES
-        ]
-        row = rows.get(item.frame)
-        if not item.added:
-            gone = set(map(id, near))
-            events = [event for event in events if id(event) not in gone]
-        elif not near and row is not None and np.isfinite(track.position[row]).all():
-            time = float(track.times[row])
-            # People see an event in a frame, and not when between two of them.
-            half = float(np.median(np.diff(track.times))) / 2 if len(track.times) > 1 else 0.0
-            events.append(BallEvent(item.frame, time, item.kind, track.position[row], half))
-    return replace(track, events=tuple(sorted(events, key=lambda event: event.time_s)))
+def correct(
+    inputs: TrackInputs, track: BallTrack, known: Sequence[TrackPatch] = ()
+) -> tuple[TrackPatch, ...]:
+    """The parts of a track that corrections change, solved anew.
+
+    Args:
+        inputs: With the corrections.
+        track: Made of them without corrections.
+        known: Parts that were solved before, of the same track.
+    """
+    return correct_track(track, inputs.measurements, inputs.pitch, inputs.corrections, known)
 
 
-def frozen_track(inputs: TrackInputs, track: BallTrack) -> Json:
+def corrected(inputs: TrackInputs, track: BallTrack, patches: Sequence[TrackPatch]) -> BallTrack:
+    """A track with its corrections.
+
+    Args:
+        inputs: With the corrections.
+        track: Made of them without corrections.
+        patches: As ``correct`` made them.
+    """
+    return patched(track, inputs.measurements, patches, inputs.corrections)
+
+
+def frozen_track(match: str, inputs: TrackInputs, track: BallTrack) -> Json:
     """A track with all that it was computed from, as versions keep it.
 
     Args:
+        match: Of its groups.
         inputs: With corrections.
         track: The same with its corrections.
     """
-    return {"inputs": inputs_to_json(inputs), "track": track_to_json(track)}
+    return {"match": match, "inputs": inputs_to_json(inputs), "track": track_to_json(track)}
 
 
 def track_again(frozen: Mapping[str, Any]) -> Json:
@@ -165,6 +154,12 @@ def inputs_to_json(inputs: TrackInputs) -> Json:
 def corrections_to_json(corrections: Iterable[Correction]) -> Json:
     """Corrections in their order."""
     return [[item.frame, item.kind, item.added] for item in corrections]
+
+
+def corrections_text(corrections: Iterable[Correction]) -> str:
+    """Corrections as they are stored, each once."""
+    whole = sorted(set(corrections), key=lambda item: (item.frame, item.kind, item.added))
+    return canonical(corrections_to_json(whole))
 
 
 def corrections_from_json(value: Sequence[Any]) -> tuple[Correction, ...]:
@@ -222,6 +217,7 @@ def track_to_json(track: BallTrack) -> Json:
             for item in track.events
         ],
         "contradicted": [[item.measurement, item.px, item.reason] for item in track.contradicted],
+        "untracked": [list(astuple(item)) for item in track.untracked],
         "reason": track.reason,
         "left_out": left
         and {
@@ -233,6 +229,35 @@ def track_to_json(track: BallTrack) -> Json:
         },
         "offsets": [list(item) for item in track.offsets],
     }
+
+
+def patches_to_json(patches: Iterable[TrackPatch]) -> Json:
+    """Parts of a track that corrections changed."""
+    return [
+        {
+            "corrections": corrections_to_json(patch.corrections),
+            "rows": patch.rows.tolist(),
+            "part": track_to_json(patch.part),
+        }
+        for patch in patches
+    ]
+
+
+def patches_from_json(value: Iterable[Mapping[str, Any]]) -> tuple[TrackPatch, ...]:
+    """Back from ``patches_to_json``.
+
+    Raises:
+        DamagedError: It is not what was written.
+    """
+    with as_written():
+        return tuple(
+            TrackPatch(
+                corrections_from_json(item["corrections"]),
+                np.array(item["rows"], dtype=np.int64),
+                track_from_json(item["part"]),
+            )
+            for item in value
+        )
 
 
 def track_from_json(value: Mapping[str, Any]) -> BallTrack:
@@ -272,6 +297,8 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
                 left["predicted"],
             ),
             tuple((name, offset) for name, offset in value["offsets"]),
+            # Tracks of earlier versions do not say it.
+            tuple(Untracked(*item) for item in value.get("untracked", ())),
         )
 
 

@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from app.errors import InputError
-from app.features.tracks.codec import Correction, TrackInputs, inputs_digest, make_track
-from app.features.tracks.stretches import Shots, Stretch, gather_stretches, require_stretch
+from app.features.tracks.codec import (
+    TrackInputs,
+    inputs_digest,
+    inputs_from_json,
+    make_track,
+    track_from_json,
+)
+from app.features.tracks.stretches import (
+    RATE,
+    Shots,
+    Stretch,
+    gather_stretches,
+    require_stretch,
+    stored_as,
+)
 from app.formats.export_record import ExportRecord
 from app.formats.tracks_writer import TrackRecord
 from app.geometry.arrays import FloatArray
 from app.soccer.policy import Policy
-from app.tracking.ball_track import BallTrack
+from app.tracking.ball_track import BallTrack, Correction
+
+_FRAMES = re.compile(r" \d+-\d+$", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -23,12 +39,17 @@ class KnownTrack:
     """What is stored of a stretch.
 
     Attributes:
+        key, match, first, last: Of the stretch, when the track was made.
         digest: Of the inputs of its track.
         track: The track, with its corrections; None where nobody accepted it.
         verdict: ``accepted``, ``rejected`` or None.
         corrections: What people said of its events.
     """
 
+    key: str
+    match: str
+    first: int
+    last: int
     digest: str
     track: BallTrack | None
     verdict: str | None
@@ -43,8 +64,9 @@ class TrackSource:
         dataset: Name of the dataset.
         policy: Says how noisy clicks and cameras are.
         shots: Of its recordings.
-        known: What is stored of stretches, by key.
-        frozen: The tracks of a frozen version, by key: they are written as they are, and no others.
+        known: What is stored of stretches, or frozen.
+        frozen: Whether it is a frozen version's tracks that are known: they are written as they are, and
+            no others.
         everything: Whether rejected groups and tracks take part.
         try_only: Whether it is only asked if there are stretches.
         facts: Gets what the manifest says of each stretch, as its track is made.
@@ -53,8 +75,8 @@ class TrackSource:
     dataset: str
     policy: Policy
     shots: Shots = field(default_factory=dict)
-    known: Mapping[str, KnownTrack] = field(default_factory=dict)
-    frozen: Mapping[str, BallTrack] = field(default_factory=dict)
+    known: Sequence[KnownTrack] = ()
+    frozen: bool = False
     everything: bool = False
     try_only: bool = False
     facts: list[dict[str, Any]] = field(default_factory=list)
@@ -70,9 +92,9 @@ class TrackSource:
         require_stretch(self.dataset, stretches)
         if self.try_only:
             return
-        reasons = []
+        reasons, known = [], stored_as(stretches, self.known)
         for stretch in stretches:
-            found = self._record(stretch)
+            found = self._record(stretch, known.get(stretch.key))
             if isinstance(found, str):
                 reasons.append(f"{stretch.key}: {found}")
                 self.facts.append({"stretch": stretch.key, "reason": found})
@@ -83,14 +105,12 @@ class TrackSource:
                 f'no stretch of "{self.dataset}" has a track of the ball ({"; ".join(reasons[:5])})'
             )
 
-    def _record(self, stretch: Stretch) -> TrackRecord | str:
+    def _record(self, stretch: Stretch, known: KnownTrack | None) -> TrackRecord | str:
         """A stretch's track, or why there is none."""
         if self.frozen:
-            track, verdict = self.frozen.get(stretch.key), "accepted"
-            if track is None:
+            if known is None or known.track is None:
                 return "its track was not accepted when the version was frozen"
-            return self._made(stretch, track, verdict)
-        known = self.known.get(stretch.key)
+            return self._made(replace(stretch, key=known.key), known.track, "accepted")
         verdict, track = "unreviewed", None
         if known is not None and known.digest == inputs_digest(TrackInputs.of(stretch)):
             if known.verdict == "rejected" and not self.everything:
@@ -111,6 +131,36 @@ class TrackSource:
         )
 
 
+def frozen_known(key: str, value: Mapping[str, Any]) -> KnownTrack:
+    """What a frozen version has of a stretch.
+
+    Args:
+        key: Of the stretch, as it was frozen.
+        value: As ``codec.frozen_track`` made it.
+    """
+    track = track_from_json(value["track"])
+    # Versions of earlier software do not say the match: a recording's stretches end in their frames.
+    match = value.get("match") or _FRAMES.sub("", key)
+    return KnownTrack(
+        key, match, int(track.frames[0]), int(track.frames[-1]), "", track, "accepted"
+    )
+
+
+def frozen_records(frozen: Mapping[str, Mapping[str, Any]]) -> list[TrackRecord]:
+    """The tracks of a frozen version as they are, without cameras.
+
+    Args:
+        frozen: By stretch, as ``codec.frozen_track`` made them.
+    """
+    found = []
+    for key, value in sorted(frozen.items()):
+        track, inputs = track_from_json(value["track"]), inputs_from_json(value["inputs"])
+        step = np.diff(inputs.times)
+        rate = 1 / float(np.median(step)) if len(step) else RATE
+        found.append(TrackRecord(key, track, inputs.pitch, rate, verdict="accepted"))
+    return found
+
+
 def _facts(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
     """What a manifest says of a track."""
     left, measured = track.left_out, stretch.measurements
@@ -124,6 +174,7 @@ def _facts(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
         "states": {state: track.state.count(state) for state in sorted(set(track.state))},
         "measurements": len(measured),
         "contradicted": len(track.contradicted),
+        "untracked": [asdict(item) for item in track.untracked],
         "not_measured": dict(stretch.unused),
         "left_out_median_px": left and left.median_px,
         "left_out_p95_px": left and left.p95_px,

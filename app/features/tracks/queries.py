@@ -16,7 +16,7 @@ from app.features.queue.tables import QueueModel
 from app.features.recordings.tables import RecordingModel
 from app.features.tracks.tables import TrackModel
 
-_LARGE = ("inputs", "body")
+_LARGE = ("inputs", "body", "patches")
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,21 @@ class TrackGroup:
     state: tuple[str, bool, bool]
     rejected: bool
     place: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
+class TrackBody:
+    """What is large of a track, compressed.
+
+    Attributes:
+        inputs: What it was computed from.
+        body: The track without corrections.
+        patches: Parts that corrections changed; None where there are none.
+    """
+
+    inputs: bytes
+    body: bytes
+    patches: bytes | None
 
 
 def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[int, int]]]:
@@ -68,12 +83,15 @@ def find_row(session: Session, track_id: int) -> Any | None:
     return session.execute(_heads().where(TrackModel.id == track_id)).one_or_none()
 
 
-def read_bodies(session: Session, track_ids: Collection[int]) -> dict[int, tuple[bytes, bytes]]:
-    """Inputs and body of tracks, compressed, by id."""
-    statement = select(TrackModel.id, TrackModel.inputs, TrackModel.body).where(
-        TrackModel.id.in_(list(track_ids))
+def read_bodies(session: Session, track_ids: Collection[int]) -> dict[int, TrackBody]:
+    """What is large of tracks, by id."""
+    model = TrackModel
+    statement = select(model.id, model.inputs, model.body, model.patches).where(
+        model.id.in_(list(track_ids))
     )
-    return {row.id: (row.inputs, row.body) for row in session.execute(statement)}
+    return {
+        row.id: TrackBody(row.inputs, row.body, row.patches) for row in session.execute(statement)
+    }
 
 
 def insert_track(session: Session, values: Mapping[str, Any]) -> int:

@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.tracks.codec import Correction
 from app.features.tracks.service import (
     MOST_CORRECTIONS,
     TrackChange,
@@ -20,7 +19,8 @@ from app.finite import MAX_ID, finite
 from app.formats.tracks_writer import position_sigma
 from app.geometry.arrays import FloatArray
 from app.http.documents import Document, ListDocument
-from app.tracking.ball_track import BallMode, BallState, EventKind
+from app.tracking.ball_correct import near_correction
+from app.tracking.ball_track import BallMode, BallState, Correction, EventKind
 
 MOST_FRAMES = 5000
 """Of one answer."""
@@ -45,7 +45,7 @@ class TrackSummaryDocument(Document, shows=TrackSummary):
         description="Frames by how the ball is known: `measured` by two views, `one_view`, "
         "`predicted`, `bridged` over a gap, `gap`."
     )
-    events: dict[str, int] = Field(description="Events by kind, without corrections.")
+    events: dict[str, int] = Field(description="Events by kind.")
     measurements: int = Field(description="Balls that views show.")
     contradicted: int = Field(description="Those that the track does not explain.")
     median_px: float | None = Field(
@@ -56,6 +56,9 @@ class TrackSummaryDocument(Document, shows=TrackSummary):
     reason: str | None = Field(description="Why there is no track; null: there is one.")
     rate: float = Field(description="Frames a second.")
     unused: dict[str, int] = Field(description="Balls that were not used, by reason.")
+    warnings: list[str] = Field(
+        description="Sentences: balls that were not used, and runs of them that fit no track."
+    )
 
 
 class TrackDocument(Document):
@@ -155,7 +158,6 @@ class TrackFrames(Document):
             np.full(len(ball.frames), np.nan) if ball.left_out is None else ball.left_out.by_frame
         )
         inside = set(numbers)
-        added = {(item.frame, item.kind) for item in detail.track.corrections if item.added}
         return TrackFrames(
             etag=detail.track.etag,
             frame=numbers,
@@ -179,7 +181,7 @@ class TrackFrames(Document):
                     kind=event.kind,
                     position=[float(value) for value in event.position],
                     sigma_s=event.sigma_s,
-                    added=(event.frame, event.kind) in added,
+                    added=near_correction(event, detail.track.corrections, added=True),
                 )
                 for event in ball.events
                 if event.frame in inside

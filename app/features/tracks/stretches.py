@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -62,7 +62,8 @@ class Stretch:
     """Frames in time order, one row each, with what views measured of the ball.
 
     Attributes:
-        key: Unique in its dataset: the match; of a recording with its first and last frame.
+        key: Unique in its dataset: the match; of a recording with the first and last frame of the shot,
+            or of the groups where no shot is known.
         match: Of its groups.
         rate: Frames a second, of a variable rate the mean.
         frames: Every number from the first group to the last, shape (N,).
@@ -84,6 +85,32 @@ class Stretch:
     groups: Mapping[int, str]
     cameras: Mapping[str, Mapping[int, Camera]]
     unused: Mapping[str, int]
+
+    @property
+    def first(self) -> int:
+        """Number of its first frame."""
+        return int(self.frames[0])
+
+    @property
+    def last(self) -> int:
+        """Number of its last frame."""
+        return int(self.frames[-1])
+
+
+class StoredStretch(Protocol):
+    """A stretch as it was when something was stored of it: its key, its match, its frames."""
+
+    @property
+    def key(self) -> str: ...
+    @property
+    def match(self) -> str: ...
+    @property
+    def first(self) -> int: ...
+    @property
+    def last(self) -> int: ...
+
+
+Stored = TypeVar("Stored", bound=StoredStretch)
 
 
 def frame_of(key: str) -> int | None:
@@ -151,12 +178,40 @@ def gather_stretches(
     stretches = []
     for name, match in sorted(matches.items()):
         match.rows.sort(key=lambda row: row.instant.frame)
-        for rows in _parts(match, (shots or {}).get(name)):
+        of_match = (shots or {}).get(name)
+        for rows in _parts(match, of_match):
             key = name
             if match.recorded:
-                key = f"{name} {rows[0].instant.frame}-{rows[-1].instant.frame}"
+                first, last = rows[0].instant.frame, rows[-1].instant.frame
+                first, last = _shot_at(first, of_match) or (first, last)
+                key = f"{name} {first}-{last}"
             stretches.append(_stretch(key, name, rows, match, policy))
     return stretches
+
+
+def stored_as(stretches: Iterable[Stretch], stored: Iterable[Stored]) -> dict[str, Stored]:
+    """What is stored of stretches, by their keys.
+
+    A stretch is what was stored under its key, or else what shares the most frames with it in its match: one
+    more group, or another cut, makes it no other. Nothing is of two stretches.
+    """
+    pairs = [
+        (item.key != stretch.key, -shared, stretch, item)
+        for item in stored
+        for stretch in stretches
+        if item.match == stretch.match
+        and (
+            (shared := min(stretch.last, item.last) - max(stretch.first, item.first) + 1) > 0
+            or item.key == stretch.key
+        )
+    ]
+    found: dict[str, Stored] = {}
+    taken: set[str] = set()
+    for *_, stretch, item in sorted(pairs, key=lambda pair: pair[:2]):
+        if stretch.key not in found and item.key not in taken:
+            found[stretch.key] = item
+            taken.add(item.key)
+    return found
 
 
 def require_stretch(dataset: str, stretches: Sequence[Stretch]) -> None:
@@ -233,7 +288,7 @@ def _parts(match: _Match, shots: Sequence[tuple[int, int]] | None) -> list[list[
     for row in match.rows:
         frame = row.instant.frame
         if match.recorded and shots:
-            here: object = next((shot for shot in shots if shot[0] <= frame <= shot[1]), None)
+            here: object = _shot_at(frame, shots)
             new = here is None or here != place
             place = here
         else:
@@ -250,6 +305,11 @@ def _parts(match: _Match, shots: Sequence[tuple[int, int]] | None) -> list[list[
         parts[-1].append(row)
         last = row
     return parts
+
+
+def _shot_at(frame: int, shots: Sequence[tuple[int, int]] | None) -> tuple[int, int] | None:
+    """The shot that a frame is of; None: none, as in a transition."""
+    return next((shot for shot in shots or () if shot[0] <= frame <= shot[1]), None)
 
 
 def _stretch(key: str, name: str, rows: Sequence[_Row], match: _Match, policy: Policy) -> Stretch:
@@ -314,6 +374,6 @@ def _rough(item: BallObservation, place: tuple[float, float, float] | None) -> F
 
 
 def unused_sentence(unused: Mapping[str, int]) -> str | None:
-    """Which balls took no part, in words; None: all did."""
+    """Which balls took no part, a sentence; None: all did."""
     parts = [f"{plural(count, 'ball')} ({reason})" for reason, count in sorted(unused.items())]
-    return f"not measured: {', '.join(parts)}" if parts else None
+    return f"Not measured: {', '.join(parts)}." if parts else None

@@ -14,7 +14,8 @@ class TrackModel(Base):
     ``inputs`` (compressed JSON) is all that it was computed from, ``digest`` theirs, ``body`` (compressed
     JSON) the track without corrections, ``summary`` (JSON) what lists say of it. ``stamp`` is a digest of
     the stretch's groups, by which it is known to be stale. ``corrections`` (JSON) are events that people
-    added and removed; ``revision`` counts what people said. ``verdict`` (``accepted`` or ``rejected``) with
+    added and removed, ``patches`` (compressed JSON) the parts of the track that they change, NULL without any;
+    ``revision`` counts what people said. ``verdict`` (``accepted`` or ``rejected``) with
     ``note``, ``judged_by`` and ``judged_at`` holds for what was computed then: another track has none.
     """
 
@@ -31,6 +32,7 @@ class TrackModel(Base):
     digest: Mapped[str]
     inputs: Mapped[bytes] = mapped_column(LargeBinary)
     body: Mapped[bytes] = mapped_column(LargeBinary)
+    patches: Mapped[bytes | None] = mapped_column(LargeBinary)
     summary: Mapped[str]
     corrections: Mapped[str]
     revision: Mapped[int]

@@ -11,6 +11,7 @@ from app.soccer.policy import PAPER, Policy
 from app.solving.dataset_noise import DatasetNoise, SeenGroup, estimate_noise
 from app.solving.solve import solve
 from tests.bench.cases import Case, Made, make_case
+from tests.bench.truth import noise_used
 
 GROUPS = 12
 FINE = Case("fine clicks", ball_px=0.5, line_px=0.4, views=(3, 3))
@@ -29,7 +30,7 @@ def told(made: list[Made], policy: Policy) -> DatasetNoise:
 
 def test_what_is_estimated_once_it_is_used_is_the_same(fine: list[Made]) -> None:
     first = told(fine, PAPER)
-    again = told(fine, first.used_by(PAPER))
+    again = told(fine, noise_used(first, PAPER))
     assert first.lines is not None and again.lines is not None
     assert first.ball.click is not None and again.ball.click is not None
     assert again.lines.sigma.value == pytest.approx(first.lines.sigma.value, rel=1e-6)
@@ -61,4 +62,4 @@ def test_the_covariances_are_those_that_solving_makes(fine: list[Made]) -> None:
 
 def test_nothing_solved_leaves_a_policy_as_it_is() -> None:
     found = estimate_noise([], PAPER)
-    assert (found.lines, found.ball.click, found.used_by(PAPER)) == (None, None, PAPER)
+    assert (found.lines, found.ball.click, noise_used(found, PAPER)) == (None, None, PAPER)

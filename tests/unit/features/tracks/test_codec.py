@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,22 +9,34 @@ import pytest
 from app.canonical import canonical
 from app.errors import DamagedError
 from app.features.tracks.codec import (
-    Correction,
+    TRACK_VERSION,
     TrackInputs,
+    correct,
     corrected,
     inputs_digest,
     inputs_from_json,
     inputs_to_json,
     make_track,
+    patches_from_json,
+    patches_to_json,
     track_from_json,
     track_to_json,
 )
 from app.features.tracks.stretches import gather_stretches
 from app.formats.export_record import ExportRecord
+from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
-from app.tracking.ball_track import BallEvent, BallTrack, Contradiction, LeftOut
+from app.tracking.ball_track import (
+    BallEvent,
+    BallTrack,
+    Contradiction,
+    Correction,
+    LeftOut,
+    Untracked,
+)
 from tests.flights import FIRST, flight_groups, places
+from tests.unit.tracking.test_ball_solve import BOTH, FRAMES, TIMES, seen
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +96,7 @@ class TestTrackJson:
             contradicted=(Contradiction(3, 9.5, "off"),),
             left_out=LeftOut(px, px, 1.5, 1.5, 1),
             offsets=(("cam2", 0.04),),
+            untracked=(Untracked(FIRST, FIRST + 3, 5, "They contradict each other."),),
         )
         again = track_from_json(track_to_json(whole))
         assert equal(again, whole)
@@ -96,22 +110,50 @@ class TestTrackJson:
         assert track_from_json(track_to_json(nothing)).reason == "one measurement"
 
 
-class TestCorrected:
-    def test_adds_and_removes_events_by_frame(self, track) -> None:
-        event = BallEvent(FIRST + 5, 4.2, "kick", track.position[5], 0.02)
-        bare = replace(track, events=(event,))
-        near = Correction(FIRST + 7, "kick", False)
-        assert corrected(bare, [near]).events == ()
-        assert corrected(bare, [replace(near, kind="bounce")]).events == (event,)
-        assert corrected(bare, [replace(near, frame=FIRST + 9)]).events == (event,)
-        added = corrected(bare, [Correction(FIRST + 2, "bounce", True)]).events
-        assert [(item.frame, item.kind) for item in added] == [
-            (FIRST + 2, "bounce"),
-            (FIRST + 5, "kick"),
-        ]
-        assert np.array_equal(added[0].position, track.position[2])
+class TestCorrections:
+    def test_patches_come_back_bit_for_bit(self, inputs, track) -> None:
+        said = replace(inputs, corrections=(Correction(FIRST + 8, "kick", True),))
+        patches = correct(said, track)
+        again = patches_from_json(json.loads(canonical(patches_to_json(patches))))
+        assert len(patches) == 1
+        assert equal(corrected(said, track, again), corrected(said, track, patches))
 
-    def test_an_event_that_is_there_is_not_added_twice(self, track) -> None:
-        event = BallEvent(FIRST + 5, 4.2, "kick", track.position[5], 0.02)
-        bare = replace(track, events=(event,))
-        assert corrected(bare, [Correction(FIRST + 6, "kick", True)]).events == (event,)
+    def test_a_stored_track_is_corrected_as_a_fresh_one(self, inputs, track) -> None:
+        said = replace(inputs, corrections=(Correction(FIRST + 8, "kick", True),))
+        stored = track_from_json(json.loads(canonical(track_to_json(track))))
+        assert equal(corrected(said, stored, correct(said, stored)), make_track(said))
+
+
+def pinned() -> TrackInputs:
+    """A made ball before two cameras, part of its way before one, with a correction."""
+    measured = seen(BOTH, hide=[("left", 60, 90), ("right", 100, 106)])
+    said = (Correction(130, "kick", True), Correction(231, "bounce", False))
+    return TrackInputs(FRAMES, TIMES, Pitch(), measured, said)
+
+
+PLACES = [
+    *(-7.788814833480648, 5.525342384329569, -0.11322623429637715),
+    *(-17.306332288806733, 9.96533769330585, -0.08179455165018851),
+    *(-3.9237562912575443, -14.084785123826896, -0.9739250604700936),
+    *(-3.056739811727608, -2.328541324920376, -1.6898964747200402),
+    *(26.615321735434016, -8.915113459216348, -0.18487305472768703),
+]
+SIGMA = [
+    *(0.02898530599434924, 0.032172126743380824, 0.17110791067565193),
+    *(0.043114813098111875, 0.01989406154150712),
+]
+EVENTS = [
+    *((125, "kick"), (129, "kick"), (169, "kick"), (193, "bounce"), (196, "kick")),
+    *((227, "bounce"), (244, "bounce"), (256, "kick")),
+]
+
+
+class TestVersion:
+    def test_the_track_of_a_pinned_input_is_what_its_version_says(self) -> None:
+        """A change here asks for another ``TRACK_VERSION``: tracks of the old one are stale then."""
+        track = make_track(pinned())
+        assert (TRACK_VERSION, track.reason) == ("2", None)
+        rows = [10, 30, 75, 103, 150]
+        assert track.position[rows].ravel() == pytest.approx(PLACES, abs=1e-5)
+        assert track.sigma[rows] == pytest.approx(SIGMA, rel=1e-4)
+        assert [(event.frame, event.kind) for event in track.events] == EVENTS

@@ -12,13 +12,13 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
 from app.features.exports.service import export
-from app.features.tracks.codec import Correction
 from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
 from app.features.versions.check import examine_versions
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.versions.frozen_queries import body_of, json_of, read_frozen
 from app.features.versions.service import Version
 from app.features.versions.verify import verify
+from app.tracking.ball_track import Correction
 from tests.databases import said_for_sqlite
 from tests.flights import FIRST
 from tests.unit.features.tracks.test_service import move

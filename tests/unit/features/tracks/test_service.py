@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
+from app.features.datasets.tables import GroupModel
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
+from app.features.imports.ingest import ingest
 from app.features.solutions.service import solve_dataset
-from app.features.tracks.codec import Correction
 from app.features.tracks.service import (
     MadeTracks,
     Track,
@@ -24,7 +26,10 @@ from app.features.tracks.service import (
 )
 from app.features.verdicts.service import set_verdict
 from app.soccer.frames import ImagePoint
+from app.soccer.group import Group
+from app.tracking.ball_track import Correction
 from tests.flights import FIRST, flight_groups, places
+from tests.unit.features.tracks.test_stretches import recorded
 
 
 def make(store: Store) -> MadeTracks:
@@ -120,6 +125,80 @@ class TestMakeTracks:
             session.execute(_renamed())
         make(store)
         assert [track.key for track in list_tracks(store, "demo")] == ["other"]
+
+
+def add_instants(store: Store, *numbers: int) -> None:
+    """Groups of a recording at frames of it, solved."""
+    groups = [
+        recorded(item, n) for item, n in zip(flight_groups(len(numbers)), numbers, strict=True)
+    ]
+    ingest(store, "demo", groups, source="test", actor="ann")
+    solve_dataset(store, "demo")
+
+
+class TestStretchesThatChange:
+    """A stretch is the one that it was, whatever groups it gains and wherever it is cut."""
+
+    def test_one_more_instant_leaves_it_its_corrections(self, store) -> None:
+        add_instants(store, *range(20))
+        make(store)
+        said = (Correction(7, "kick", True),)
+        before = change(store, TrackChange(corrections=said))
+        add_instants(store, 20)
+        make(store)
+        after = only(store)
+        assert (after.key, after.id, after.corrections) == ("final 0-20", before.id, said)
+
+    def test_joined_ones_have_what_was_said_of_both(self, store) -> None:
+        add_instants(store, *range(20), *range(150, 170))
+        make(store)
+        said = (Correction(7, "kick", True), Correction(155, "bounce", True))
+        for track, item in zip(list_tracks(store, "demo"), said, strict=True):
+            wanted = TrackChange(corrections=(item,))
+            change_track(store, track.id, wanted, track.etag, actor="ben")
+        add_instants(store, 85)
+        make(store)
+        assert (only(store).key, only(store).corrections) == ("final 0-169", said)
+
+    def test_cut_ones_have_each_what_was_said_of_its_frames(self, store) -> None:
+        add_instants(store, *range(20), 85, *range(150, 180))
+        make(store)
+        said = (Correction(7, "kick", True), Correction(155, "bounce", True))
+        whole = change(store, TrackChange(corrections=said))
+        with store.read() as session:
+            cut = session.scalar(select(GroupModel.id).where(GroupModel.key == "final/85.png"))
+        etag = load(store, cut).etag
+        set_verdict(store, cut, "rejected", "ball_not_visible", if_match=etag, actor="ann")
+        make(store)
+        first, last = list_tracks(store, "demo")
+        assert (first.corrections, last.corrections) == (said[:1], said[1:])
+        assert (last.id, last.key) == (whole.id, "final 150-179")
+
+    def test_a_rig_that_goes_on_makes_its_track_stale(self, store, flight) -> None:
+        make(store)
+        ingest(store, "demo", flight_groups(62)[60:], source="test", actor="ann")
+        assert only(store).stale
+
+
+class TestWarnings:
+    def test_a_run_that_fits_no_ball_is_named_beside_a_good_one(self, store, fill) -> None:
+        groups = flight_groups(60)
+        far = [replace(item, key=str(FIRST + 200 + at)) for at, item in enumerate(groups[:20])]
+        fill(*groups, *(mirrored(item) for item in far))
+        make(store)
+        summary = only(store).summary
+        assert summary.reason is None
+        (warning,) = summary.warnings
+        assert warning.startswith(f"Frames {FIRST + 200} to {FIRST + 219} (")
+        assert "contradict each other" in warning
+
+
+def mirrored(group: Group) -> Group:
+    """A group with the ball of one view where a mirrored camera would have it."""
+    view = group.views[0]
+    point = view.ball.point
+    ball = replace(view.ball, point=ImagePoint(view.size.width - 1 - point.x, point.y))
+    return group.with_view(replace(view, balls=(ball,)))
 
 
 def _events(store: Store) -> list[tuple[int, str]]:

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from app.features.tracks.stretches import (
     gather_stretches,
     instant_of,
     require_stretch,
+    stored_as,
     unused_sentence,
 )
 from app.formats.export_record import ExportRecord
@@ -74,7 +75,7 @@ class TestGatherStretches:
         assert stretch.unused == {"view left out": 1, "not solved": len(records[4].group.views)}
         assert (
             unused_sentence(stretch.unused)
-            == "not measured: 4 balls (not solved), 1 ball (view left out)"
+            == "Not measured: 4 balls (not solved), 1 ball (view left out)."
         )
 
     def test_two_groups_of_one_frame_are_refused_by_their_keys(self, records) -> None:
@@ -88,7 +89,7 @@ class TestGatherStretches:
         groups = [recorded(group, frame) for frame, group in enumerate(flight_groups(12))]
         stretches = gather_stretches(map(record, groups), PAPER, {"final": [(0, 4), (6, 20)]})
         assert [item.key for item in stretches][:2] == ["final 0-4", "final 5-5"]
-        assert stretches[2].key == "final 6-11"
+        assert stretches[2].key == "final 6-20"
         assert stretches[0].rate == pytest.approx(50)
         assert stretches[0].times[0] == 10
 
@@ -132,6 +133,46 @@ class TestGatherStretches:
         assert found == []
         with pytest.raises(InputError, match='no groups of "demo" follow each other in time'):
             require_stretch("demo", found)
+
+
+@dataclass(frozen=True)
+class Stored:
+    key: str
+    match: str
+    first: int
+    last: int
+
+
+class TestStoredAs:
+    """What was stored of a stretch is found again when groups come and cuts move."""
+
+    @staticmethod
+    def stretches(*numbers: int) -> list[Stretch]:
+        groups = [
+            recorded(item, n) for item, n in zip(flight_groups(len(numbers)), numbers, strict=True)
+        ]
+        return gather_stretches(map(record, groups), PAPER)
+
+    def test_one_more_instant_makes_it_no_other(self) -> None:
+        before, other = Stored("final 0-20", "final", 0, 20), Stored("cup 0-30", "cup", 0, 30)
+        (stretch,) = self.stretches(0, 10, 20, 30)
+        assert stretch.key == "final 0-30"
+        assert stored_as([stretch], [other, before]) == {"final 0-30": before}
+
+    def test_the_larger_part_of_what_was_cut_has_it(self) -> None:
+        whole = Stored("final 0-410", "final", 0, 410)
+        found = self.stretches(0, 10, 390, 410, 420)
+        assert stored_as(found, [whole]) == {"final 390-420": whole}
+
+    def test_the_same_key_counts_before_what_is_shared(self) -> None:
+        same, more = Stored("final 0-20", "final", 0, 20), Stored("final 0-25", "final", 0, 25)
+        (stretch,) = self.stretches(0, 10, 20)
+        assert stored_as([stretch], [more, same]) == {"final 0-20": same}
+
+    def test_nothing_is_of_two_and_nothing_is_found_where_nothing_is_shared(self) -> None:
+        first = Stored("final 0-15", "final", 0, 15)
+        found = self.stretches(0, 20, 400, 410)
+        assert stored_as(found, [first]) == {"final 0-20": first}
 
 
 class TestInstantOf:

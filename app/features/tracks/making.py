@@ -1,0 +1,250 @@
+"""Making tracks: what views measured of the ball, stretch by stretch, tracked and stored."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from app.canonical import canonical
+from app.db.json_columns import pack, parse, unpack
+from app.db.session import Session, now
+from app.db.store import Store
+from app.features.datasets.service import DatasetHead, read_dataset_head
+from app.features.groups.state import read_states
+from app.features.tracks.codec import (
+    TrackInputs,
+    correct,
+    corrected,
+    corrections_from_json,
+    corrections_text,
+    inputs_digest,
+    inputs_to_json,
+    make_track,
+    patches_to_json,
+    track_from_json,
+    track_to_json,
+)
+from app.features.tracks.queries import (
+    TrackGroup,
+    delete_tracks,
+    find_row,
+    insert_track,
+    list_rows,
+    match_groups,
+    read_bodies,
+    recording_shots,
+    update_track,
+)
+from app.features.tracks.stored import (
+    UNJUDGED,
+    TrackSummary,
+    corrections_of,
+    summary_of,
+    track_stamp,
+)
+from app.features.tracks.stretches import (
+    Stretch,
+    gather_stretches,
+    instant_of,
+    require_stretch,
+    stored_as,
+    unused_sentence,
+)
+from app.formats.export_record import ExportRecord
+from app.progress import ReportProgress
+from app.tracking.ball_track import BallTrack
+
+BATCH = 200
+
+
+@dataclass
+class MadeTracks:
+    """What came of making tracks.
+
+    Attributes:
+        made: Stretches that were tracked.
+        unchanged: Those whose track is what would come of them again.
+        without: Stretches without a track, with the reason.
+    """
+
+    made: int = 0
+    unchanged: int = 0
+    without: list[dict[str, str]] = field(default_factory=list)
+
+
+def make_tracks(
+    store: Store,
+    dataset: str | int,
+    matches: Collection[str] | None,
+    actor: str,
+    progress: ReportProgress,
+) -> MadeTracks:
+    """Track the ball over all stretches of a dataset, or of some matches, and store the tracks.
+
+    What people corrected stays, also where a stretch has grown, was cut or joined; a verdict holds for the
+    track that it was given to. Killed anywhere and started again, it ends in the same state.
+
+    Raises:
+        InputError: No groups follow each other in time, or two of a stretch are one frame.
+    """
+    made = MadeTracks()
+    with store.read() as session:
+        found = read_dataset_head(session, dataset)
+        shots = recording_shots(session, found.id)
+        groups = match_groups(session, found.id, matches)
+        timed = {name: items for name, items in groups.items() if _says_time(session, items)}
+        total, done = sum(map(len, timed.values())), 0
+        stretches: list[Stretch] = []
+        for items in timed.values():
+            records = []
+            for record in _records(session, items):
+                records.append(record)
+                if len(records) % BATCH == 0:
+                    progress(done + len(records), total)
+            done += len(items)
+            stretches += gather_stretches(records, found.policy, shots)
+        stored = stored_as(stretches, list_rows(session, found.id))
+    require_stretch(found.name, stretches)
+    for tracked, stretch in enumerate(stretches, 1):
+        stamp = track_stamp(found.policy, groups[stretch.match], stretch)
+        is_new, reason = _make(store, found, stretch, stored.get(stretch.key), stamp, actor)
+        made.made += is_new
+        made.unchanged += not is_new
+        if reason is not None:
+            made.without.append({"stretch": stretch.key, "reason": reason})
+        progress(done, total, f"{tracked} of {len(stretches)} stretches tracked.")
+    _forget(store, found, stretches, matches)
+    return made
+
+
+def _records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
+    """Groups with their solutions; those that people rejected measure nothing."""
+    ids = [group.id for group in groups if not group.rejected]
+    for start in range(0, len(ids), BATCH):
+        for state in read_states(session, ids[start : start + BATCH], markings=False):
+            yield ExportRecord(state.group, state.solution, state.verdict.state)
+
+
+def _says_time(session: Session, groups: Sequence[TrackGroup]) -> bool:
+    """Whether a match's groups follow each other in time, by the first of them."""
+    first = next(iter(_records(session, groups[:1])), None)
+    return first is None or instant_of(first.group) is not None
+
+
+def _make(
+    store: Store, dataset: DatasetHead, stretch: Stretch, row: Any | None, stamp: str, actor: str
+) -> tuple[bool, str | None]:
+    """Track a stretch, if its measurements are others than those of its row; whether they are, and why
+    there is no track."""
+    inputs = TrackInputs.of(stretch)
+    key = inputs_digest(inputs)
+    is_new = row is None or row.digest != key
+    base = make_track(inputs) if is_new else None
+    saved, reason = False, None
+    while not saved:
+        with store.read() as session:
+            said = _said(session, dataset, stretch, row)
+            if base is None and row is not None and said != row.corrections:
+                base = track_from_json(unpack(read_bodies(session, [row.id])[row.id].body))
+        values: dict[str, Any] = {"key": stretch.key, "stamp": stamp, "digest": key}
+        if base is not None:
+            track, columns = _computed(stretch, inputs, base, said)
+            values |= columns
+            reason = track.reason
+        elif row is not None:
+            reason = parse(row.summary)["reason"]
+        if is_new:
+            values |= UNJUDGED | {"actor": actor, "created": now()}
+        saved = _save(store, dataset, stretch, row, values | {"corrections": said})
+    return is_new, reason
+
+
+def _computed(
+    stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str
+) -> tuple[BallTrack, dict[str, Any]]:
+    """A track with what was said of its events, and the columns of what was computed."""
+    whole = replace(inputs, corrections=corrections_from_json(parse(said)))
+    patches = correct(whole, base)
+    track = corrected(whole, base, patches)
+    unused = unused_sentence(stretch.unused)
+    warnings = [*([unused] if unused else []), *(item.sentence for item in track.untracked)]
+    summary = summary_of(
+        track,
+        TrackSummary(
+            *(0, {}, {}, len(inputs.measurements), 0, None, None, None, None),
+            rate=stretch.rate,
+            unused=dict(stretch.unused),
+            warnings=warnings,
+        ),
+    )
+    return track, {
+        "inputs": pack(inputs_to_json(inputs)),
+        "body": pack(track_to_json(base)),
+        "patches": pack(patches_to_json(patches)) if patches else None,
+        "summary": canonical(asdict(summary)),
+        "match": stretch.match,
+        "first": stretch.first,
+        "last": stretch.last,
+    }
+
+
+def _said(session: Session, dataset: DatasetHead, stretch: Stretch, own: Any | None) -> str:
+    """What was said of the events of a stretch, wherever it was stored."""
+    return corrections_text(
+        item
+        for row in list_rows(session, dataset.id)
+        if row.match == stretch.match
+        for item in corrections_of(row)
+        if (own is not None and row.id == own.id) or stretch.first <= item.frame <= stretch.last
+    )
+
+
+def _save(
+    store: Store, dataset: DatasetHead, stretch: Stretch, row: Any | None, values: Mapping[str, Any]
+) -> bool:
+    """Store a track; not if somebody has said more of its events meanwhile."""
+    with store.write() as session:
+        if _said(session, dataset, stretch, row) != values["corrections"]:
+            return False
+        own = None if row is None else find_row(session, row.id)
+        if own is None:
+            insert_track(session, {**values, "dataset_id": dataset.id, "revision": 0})
+        else:
+            told = any(
+                values[name] != getattr(own, name) for name in ("key", "digest", "corrections")
+            )
+            update_track(session, own.id, **values, revision=own.revision + told)
+    return True
+
+
+def _forget(
+    store: Store,
+    dataset: DatasetHead,
+    stretches: Sequence[Stretch],
+    matches: Collection[str] | None,
+) -> None:
+    """Leave each event that people said to the stretch of its frame alone, and delete tracks of stretches
+    that are no more, unless a person said something of them that none of today's stretches holds."""
+    with store.write() as session:
+        gone = []
+        for row in list_rows(session, dataset.id):
+            if matches is not None and row.match not in matches:
+                continue
+            own = [item for item in stretches if item.match == row.match]
+            home = next((item for item in own if item.key == row.key), None)
+            elsewhere = [item for item in own if item is not home]
+            said = corrections_of(row)
+            kept = [
+                item
+                for item in said
+                if not any(other.first <= item.frame <= other.last for other in elsewhere)
+            ]
+            now_in = any(other.first <= row.last and row.first <= other.last for other in own)
+            if home is None and not kept and (row.verdict is None or now_in):
+                gone.append(row.id)
+            elif len(kept) < len(said):
+                text = corrections_text(kept)
+                update_track(session, row.id, corrections=text, revision=row.revision + 1)
+        if gone:
+            delete_tracks(session, gone)

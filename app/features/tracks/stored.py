@@ -1,0 +1,163 @@
+"""Tracks as they are stored: from a row of the database to a value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from app.db.json_columns import as_written, parse
+from app.features.groups.digest import digest
+from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
+from app.features.tracks.queries import TrackGroup
+from app.features.tracks.stretches import StoredStretch, frame_of
+from app.soccer.policy import Policy
+from app.soccer.solution import SOLVER_VERSION
+from app.tracking.ball_track import BallTrack, Correction
+
+Verdict = Literal["accepted", "rejected"]
+UNJUDGED: dict[str, None] = dict.fromkeys(("verdict", "note", "judged_by", "judged_at"))
+"""Columns of a track that nobody judged."""
+
+
+@dataclass(frozen=True)
+class TrackSummary:
+    """What a list says of a track.
+
+    Attributes:
+        frames: Of its stretch.
+        states: How many of them are ``measured``, ``one_view``, ``predicted``, ``bridged`` and ``gap``.
+        events: How many there are, by kind.
+        measurements: What views measured.
+        contradicted: Measurements that took no part because the track does not explain them.
+        median_px, p95_px: Of what was left out in turn and predicted; None where nothing was.
+        worst: Frame with the largest such error; None where there is none.
+        reason: Why there is no track; None where there is one.
+        rate: Frames a second.
+        unused: Balls that are no measurement, counted by reason.
+        warnings: Sentences: balls that took no part, and runs of measurements beside the track that fit
+            no ball.
+    """
+
+    frames: int
+    states: dict[str, int]
+    events: dict[str, int]
+    measurements: int
+    contradicted: int
+    median_px: float | None
+    p95_px: float | None
+    worst: int | None
+    reason: str | None
+    rate: float
+    unused: dict[str, int]
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Track:
+    """The track of a stretch, without its frames.
+
+    Attributes:
+        key: Of the stretch; unique in its dataset.
+        match: Of its groups.
+        first, last: Its first and last frame.
+        stale: Whether its groups have changed since, so that another track would come of them.
+        corrections: Events that people added, and removed.
+        summary: What came of it.
+        revision: How often something was said of it, or it was made anew.
+    """
+
+    id: int
+    dataset_id: int
+    dataset: str
+    key: str
+    match: str
+    first: int
+    last: int
+    stale: bool
+    verdict: Verdict | None
+    note: str | None
+    judged_by: str | None
+    judged_at: str | None
+    corrections: tuple[Correction, ...]
+    summary: TrackSummary
+    actor: str
+    created: str
+    revision: int
+    etag: str
+
+
+def summary_of(track: BallTrack, like: TrackSummary) -> TrackSummary:
+    """What a list says of a track.
+
+    Args:
+        track: With its corrections.
+        like: Has what the track does not say: measurements, rate, balls that are none, warnings.
+    """
+    left, worst = track.left_out, None
+    if left is not None and np.isfinite(left.by_frame).any():
+        worst = int(track.frames[np.nanargmax(left.by_frame)])
+    kinds = [event.kind for event in track.events]
+    return replace(
+        like,
+        frames=len(track.frames),
+        states={state: track.state.count(state) for state in sorted(set(track.state))},
+        events={kind: kinds.count(kind) for kind in sorted(set(kinds))},
+        contradicted=len(track.contradicted),
+        median_px=None if left is None else left.median_px,
+        p95_px=None if left is None else left.p95_px,
+        worst=worst,
+        reason=track.reason,
+    )
+
+
+def stored_track(row: Any, policy: Policy, groups: Iterable[TrackGroup]) -> Track:
+    """A row of the table without what is large, with the groups of its match."""
+    with as_written():
+        summary = TrackSummary(**parse(row.summary))
+    return Track(
+        id=row.id,
+        dataset_id=row.dataset_id,
+        dataset=row.dataset,
+        key=row.key,
+        match=row.match,
+        first=row.first,
+        last=row.last,
+        stale=row.stamp != track_stamp(policy, groups, row),
+        verdict=row.verdict,
+        note=row.note,
+        judged_by=row.judged_by,
+        judged_at=row.judged_at,
+        corrections=corrections_of(row),
+        summary=summary,
+        actor=row.actor,
+        created=row.created,
+        revision=row.revision,
+        etag=f'"{digest([row.digest, row.revision])[:16]}"',
+    )
+
+
+def corrections_of(row: Any) -> tuple[Correction, ...]:
+    """What people said of the events of a row's track."""
+    with as_written():
+        return corrections_from_json(parse(row.corrections))
+
+
+def track_stamp(policy: Policy, groups: Iterable[TrackGroup], place: StoredStretch) -> str:
+    """A digest of what a stretch's track depends on, without computing it.
+
+    Args:
+        policy: Of the dataset.
+        groups: Of the match.
+        place: The stretch: of a rig all groups of the match, of a recording those of its frames.
+    """
+    whole = place.key == place.match
+    states = [
+        [group.key, *group.state]
+        for group in groups
+        if (frame := frame_of(group.key)) is not None
+        and (whole or place.first <= frame <= place.last)
+    ]
+    return digest([TRACK_VERSION, SOLVER_VERSION, policy.hash, states])

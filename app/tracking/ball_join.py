@@ -1,0 +1,225 @@
+"""Join: runs and their gaps as one track, with its events and with what contradicts it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm
+
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.soccer.pitch import Pitch
+from app.tracking.ball_fit import Fitted
+from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, LEAST_CHANGE, NOTHING, REST, ROLL
+from app.tracking.ball_prediction import left_out, summed
+from app.tracking.ball_search import History, Knots
+from app.tracking.ball_solve_run import Run, TrackOptions
+from app.tracking.ball_track import (
+    BallEvent,
+    BallMeasurements,
+    BallMode,
+    BallState,
+    BallTrack,
+    Contradiction,
+    EventKind,
+    Untracked,
+)
+
+_MODES: dict[int, BallMode] = {FLIGHT: "flight", ROLL: "roll", HELD: "held"}
+OPEN = (
+    "The ball's distance is not known: no bounce, kick or known height in reach of a view that sees it "
+    "alone."
+)
+"""Why a ball that is seen has no place."""
+LEAST_TOLD_S = 0.0015
+"""Of an offset in time that is told."""
+
+
+def joined(
+    measurements: BallMeasurements,
+    frames: IntArray,
+    times: FloatArray,
+    runs: Sequence[Run],
+    shift: FloatArray,
+    pitch: Pitch,
+    options: TrackOptions,
+) -> BallTrack:
+    """The track of all runs, all of whose frames may be gaps.
+
+    Args:
+        measurements: Of the stretch.
+        frames: Numbers, increasing, shape (N,).
+        times: Of the frames, seconds, shape (N,).
+        runs: With a fit or without.
+        shift: Seconds that were added to each view's times, by ``measurements.names``.
+        pitch: Where the ball is played.
+        options: As of the track.
+    """
+    blank = BallTrack.none(frames, times, "")
+    position, velocity = blank.position.copy(), blank.velocity.copy()
+    covariance = blank.covariance.copy()
+    state: list[BallState] = list(blank.state)
+    mode: list[BallMode] = list(blank.mode)
+    views: list[tuple[str, ...]] = list(blank.views)
+    events: list[BallEvent] = []
+    against: list[Contradiction] = []
+    untracked: list[Untracked] = []
+    px = np.full(len(measurements), np.nan)
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.04
+    half = np.array([-step / 2 - 1e-9, step / 2 + 1e-9])
+    for run in runs:
+        knots, fitted, history = run.knots, run.fitted, run.history
+        if knots is None or fitted is None or history is None:
+            untracked.append(_untracked(measurements, run, run.reason or ""))
+            continue
+        assert run.used is not None and run.noise is not None
+        spread = _with_event_times(knots, fitted)
+        seen = np.flatnonzero(np.bincount(knots.at[run.used], minlength=len(knots.times)) > 0)
+        sigma = np.sqrt(np.maximum(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1], 0.0))
+        known = sigma <= options.most_sigma_m
+        if not known.any():
+            untracked.append(_untracked(measurements, run, OPEN))
+        at_times = knots.times[knots.at]
+        for row, knot in _rows_of(knots, times):
+            if not known[knot]:
+                continue
+            rays = np.arange(*np.searchsorted(at_times, times[row] + half))
+            names = {measurements.views[knots.rows[ray]] for ray in rays[run.used[rays]]}
+            position[row] = fitted.state[knot, :3]
+            velocity[row] = fitted.state[knot, 3:6]
+            covariance[row] = spread[knot]
+            views[row] = tuple(sorted(names))
+            mode[row] = _MODES[int(history.mode[knot])]
+            if names:
+                state[row] = "measured" if len(names) > 1 else "one_view"
+            else:
+                state[row] = "bridged" if seen[0] < knot < seen[-1] else "predicted"
+        events += _events(knots, history, fitted, known, frames, times)
+        off = np.linalg.norm(fitted.miss, axis=1)
+        for ray in np.flatnonzero(~run.used & known[knots.at]):
+            reason = (
+                f"It lies {off[ray]:.0f} times its noise beside the track: another ball, or a slip."
+            )
+            miss = float(off[ray] * run.noise[ray] * knots.scale[ray])
+            against.append(Contradiction(int(knots.rows[ray]), miss, reason))
+        if options.leave_out:
+            px[knots.rows] = left_out(knots, fitted, run.noise, known)
+    mode, out = _outside(position, mode, pitch, frames, times)
+    return replace(
+        blank,
+        position=position,
+        velocity=velocity,
+        covariance=covariance,
+        state=tuple(state),
+        mode=tuple(mode),
+        views=tuple(views),
+        events=tuple(sorted([*events, *out], key=lambda one: one.time_s)),
+        contradicted=tuple(sorted(against, key=lambda one: one.measurement)),
+        reason=None,
+        left_out=summed(px, measurements.frames, frames) if options.leave_out else None,
+        offsets=tuple(
+            (name, float(late))
+            for name, late in zip(measurements.names, shift, strict=True)
+            if abs(late) > LEAST_TOLD_S
+        ),
+        untracked=tuple(sorted(untracked, key=lambda one: one.first)),
+    )
+
+
+def _untracked(measurements: BallMeasurements, run: Run, reason: str) -> Untracked:
+    of_run = measurements.frames[run.rows]
+    return Untracked(int(of_run.min()), int(of_run.max()), len(run.rows), reason)
+
+
+def _rows_of(knots: Knots, times: FloatArray) -> Iterator[tuple[int, int]]:
+    """Rows of the track and their knots."""
+    at = np.clip(np.searchsorted(knots.times, times - 1e-3), 0, len(knots.times) - 1)
+    for row in np.flatnonzero(np.abs(knots.times[at] - times) < 1e-3):
+        yield int(row), int(at[row])
+
+
+def _with_event_times(knots: Knots, fitted: Fitted) -> FloatArray:
+    """Covariances with what unknown times of events in gaps add, (K, 6, 6).
+
+    The fit places an event in one interval. Where neither end of it was seen the event may have been
+    in a neighbouring one, and until it the ball goes on as before.
+    """
+    covariance = fitted.covariance[:, :6, :6].copy()
+    seen = np.flatnonzero(np.diff(knots.starts) > 0)
+    for at in np.flatnonzero(np.isfinite(fitted.event_time)):
+        first = seen[seen <= at - 1].max(initial=-1)
+        last = seen[seen >= at].min(initial=len(knots.times))
+        if first < 0 or last == len(knots.times) or last - first < 2:
+            continue
+        change = fitted.state[at, 3:6] - fitted.state[at - 1, 3:6]
+        slack = 2 * np.sqrt(np.trace(covariance[at, :3, :3]))
+        length = knots.times[last] - knots.times[first]
+        sigma = min(length / np.sqrt(12), slack / max(float(np.linalg.norm(change)), 1e-6))
+        inside = np.arange(first + 1, last)
+        off = np.abs(knots.times[inside] - fitted.event_time[at]) / max(sigma, 1e-6)
+        # Mean square of how far a normal number lies beyond another: half at nought.
+        tail = (1 + off**2) * norm.sf(off) - off * norm.pdf(off)
+        covariance[inside, :3, :3] += (sigma**2 * tail)[:, None, None] * np.outer(change, change)
+    return covariance
+
+
+def _events(
+    knots: Knots,
+    history: History,
+    fitted: Fitted,
+    known: BoolArray,
+    frames: IntArray,
+    times: FloatArray,
+) -> Iterator[BallEvent]:
+    """Kicks and bounces that change the velocity clearly, or that somebody saw, where the track is known."""
+    places = np.flatnonzero((history.event != NOTHING) & known)
+    change = np.linalg.norm(
+        fitted.state[places, 3:6] - fitted.state[np.maximum(places - 1, 0), 3:6], axis=1
+    )
+    shown = change >= LEAST_CHANGE
+    when = fitted.event_time.copy()
+    for begin, end, wanted in knots.asked.windows:
+        own = np.flatnonzero(
+            (places >= begin) & (places <= end) & (history.event[places] == wanted)
+        )
+        if len(own):
+            told = own[change[own].argmax()]
+            shown[told] = True
+            # The fit may see it a little earlier or later; people were there.
+            at = places[told]
+            when[at] = np.clip(when[at], knots.times[begin - 1], knots.times[end])
+    for at in places[shown]:
+        kind: EventKind = "bounce" if history.event[at] == BOUNCE else "kick"
+        before = fitted.state[at - 1]
+        place = before[:3] + before[3:6] * (when[at] - knots.times[at - 1])
+        frame = int(frames[np.abs(times - when[at]).argmin()])
+        yield BallEvent(frame, float(when[at]), kind, place, float(fitted.event_sigma[at]))
+
+
+def _outside(
+    position: FloatArray,
+    mode: list[BallMode],
+    pitch: Pitch,
+    frames: IntArray,
+    times: FloatArray,
+) -> tuple[list[BallMode], list[BallEvent]]:
+    """Modes with those over the lines as out, and the events of going there.
+
+    The whole of the ball has to be over the line.
+    """
+    off = np.maximum(
+        np.abs(position[:, 0]) - pitch.length / 2, np.abs(position[:, 1]) - pitch.width / 2
+    )
+    is_out = off > REST
+    events: list[BallEvent] = []
+    for row in np.flatnonzero(is_out):
+        mode[row] = "out"
+        if row and off[row - 1] <= REST:
+            share = (REST - off[row - 1]) / (off[row] - off[row - 1])
+            when = float(times[row - 1] + share * (times[row] - times[row - 1]))
+            place = position[row - 1] + share * (position[row] - position[row - 1])
+            step = float(times[row] - times[row - 1])
+            frame = int(frames[row if share > 0.5 else row - 1])
+            events.append(BallEvent(frame, when, "out", place, step / 2))
+    return mode, events
