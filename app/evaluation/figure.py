@@ -20,6 +20,7 @@ FIGURES = (
     "sensitivity",
     "jac",
     "box_overlap",
+    "track_distance",
 )
 
 

@@ -1,6 +1,6 @@
 """Prediction files, read: ball boxes with scores, as detectors and people write them.
 
-Three formats, each a file, a folder or a zip:
+Four formats, each a file, a folder or a zip:
 
 ``coco``  COCO results: ``[{"image_id", "category_id", "bbox": [x, y, w, h], "score"}]``, pixels
           from the corner of the first pixel. ``file_name`` names the frame where it is there; else
@@ -12,6 +12,7 @@ Three formats, each a file, a folder or a zip:
           replay`` as in SNv3D.csv, in ``image`` or ``file_name``, or in ``frame`` (with ``camera``);
           the box in ``ball_bbox`` (``[x, y, w, h]``), ``x, y, w, h``, corners or centre and size;
           ``score`` may be missing. MOT's text files, too.
+``tracks`` The ball in 3D over time (``track_files``).
 
 Names count before numbers. What is wrong is reported with file, record and field, and left out; frames that the dataset does
 not have are counted and listed. Nothing is evaluated.
@@ -37,6 +38,7 @@ from app.evaluation.prediction_run import (
     read_field,
 )
 from app.evaluation.prediction_table import is_mot, read_table
+from app.evaluation.track_files import is_ball_table, read_tracks
 from app.finite import quoted
 from app.formats import fields
 from app.formats.ball_names import is_ball
@@ -117,6 +119,12 @@ def read_predictions(
             raise _unused("images", "a COCO document", kind)
         if size is not None and kind == "yolo":
             raise _unused("size", "a size: its numbers are shares of the image", kind)
+        if kind == "tracks":
+            if size is not None or category is not None:
+                option = "size" if size is not None else "category"
+                raise _unused(option, f"a {option}: its balls are places on the pitch", kind)
+            run.found.tracks = read_tracks(tree, path, run.found.report, limits)
+            return run.found
         if kind == "coco":
             beside = [] if images is None else _document(images, run, limits)
             _read_coco(_json_documents(tree, path, run.found.report), run, beside)
@@ -141,6 +149,11 @@ def _kind_by_ending(path: Path, limits: Limits) -> str:
         names = [] if tree is None else tree.names()
         endings = {PurePosixPath(name).suffix.lower() for name in names}
         kind = next((kind for ending, kind in ENDINGS if ending in endings), "coco")
+        if tree is not None and kind == "csv":
+            tables = (name for name in names if name.lower().endswith(".csv"))
+            return (
+                "tracks" if any(is_ball_table(tree.read_bytes(name)) for name in tables) else kind
+            )
         if tree is not None and kind == "yolo":
             first = next(name for name in names if name.lower().endswith(".txt"))
             # MOT's files end as YOLO's do.

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from app.errors import InputError
 from app.evaluation.frame import Detection
 from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.predicted_track import PredictedTrack
 from app.formats.ball_names import is_ball
 from app.formats.corner_origin import box_from_corner, box_to_corner
 from app.formats.report import Report
@@ -34,6 +35,7 @@ class ReadPredictions:
         unknown: Names of frames that the dataset does not have, with their number of boxes.
         reasons: Why, by name.
         without_score: Boxes that came without a score and count as sure.
+        tracks: Tracks of the ball by stretch, as the file calls it.
         report: What was wrong.
         format: As which it was read.
     """
@@ -42,6 +44,7 @@ class ReadPredictions:
     unknown: Counter[str] = field(default_factory=Counter)
     reasons: dict[str, str] = field(default_factory=dict)
     without_score: int = 0
+    tracks: dict[str, PredictedTrack] = field(default_factory=dict)
     report: Report = field(default_factory=Report)
     format: str = ""
 

@@ -12,6 +12,8 @@ TABLES = (
     "boxes",
     "calibration",
     "sensitivity",
+    "tracks",
+    "track_events",
 )
 
 

@@ -21,6 +21,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {number} frames
  * @property {number} boxes
  * @property {number} cameras
+ * @property {number} tracks
  * @property {number} unknown
  * @property {{[name: string]: any}} report
  */

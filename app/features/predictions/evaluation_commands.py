@@ -34,7 +34,10 @@ def _size(panel: str, text: str, *names: str) -> Any:
 
 
 Predictions = Annotated[
-    Path | None, typer.Argument(help="File, folder or zip of ball boxes, or the name of a set.")
+    Path | None,
+    typer.Argument(
+        help="File, folder or zip of ball boxes, or of tracks (ball.csv, events.csv), or the name of a set."
+    ),
 ]
 Format = Annotated[
     AnyPredictionFormat,
@@ -144,7 +147,7 @@ def evaluate(
     out: Out = None,
     json_: Json = False,
 ) -> None:
-    """Measure predictions against a dataset: AP, MAE, P_2m, boxes, cameras, sensitivity.
+    """Measure predictions against a dataset: AP, MAE, P_2m, boxes, cameras, sensitivity; or tracks.
 
     What was read is kept in the dataset as predictions, and the result as an evaluation.
     """

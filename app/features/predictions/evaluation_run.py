@@ -27,6 +27,7 @@ from app.features.predictions.frames import (
 )
 from app.features.predictions.queries import PredictionSet, read_boxes, read_predicted_cameras
 from app.features.predictions.service import read_set
+from app.features.predictions.track_evaluation import track_evaluation
 from app.features.solutions.codec import to_json
 from app.features.versions.service import Version, read_version
 from app.finite import quoted
@@ -192,25 +193,40 @@ def run_evaluation(
         found = read_dataset_head(session, dataset)
         if progress is not None:
             progress(0, None, "Reading frames.")
-        truth = _truth(session, found, request)
         sets = {
             name: _own_set(session, found, identity, name)
             for name in ("predictions", "careful")
             if (identity := getattr(request, name)) is not None
         }
-        inputs = _inputs(session, sets)
-    if not truth.frames:
-        raise _no_frames(found, request)
-    _require_common_frames(truth, inputs, sets)
-    options = Options(
-        boxes=request.boxes,
-        min_score=request.min_score,
-        ball_diameter_m=truth.policy.ball_diameter_m,
-        min_jac=truth.policy.min_jac,
-    )
-    result = evaluate(truth.frames, inputs, options, progress)
-    own = sets["predictions"].name if "predictions" in sets else None
-    accepted = AcceptedTruth.count(truth.frames, request.boxes, own)
+        if (tracks := _tracks(request, sets)) is not None:
+            version = None
+            if request.version is not None:
+                version = _own_version(session, found, request.version)
+            result, pins = track_evaluation(session, found, version, tracks)
+            options, more = Options(), {}
+        else:
+            truth = _truth(session, found, request)
+            inputs = _inputs(session, sets)
+            pins = truth.pins
+    if tracks is None:
+        if not truth.frames:
+            raise _no_frames(found, request)
+        _require_common_frames(truth, inputs, sets)
+        options = Options(
+            boxes=request.boxes,
+            min_score=request.min_score,
+            ball_diameter_m=truth.policy.ball_diameter_m,
+            min_jac=truth.policy.min_jac,
+        )
+        result = evaluate(truth.frames, inputs, options, progress)
+        own = sets["predictions"].name if "predictions" in sets else None
+        accepted = AcceptedTruth.count(truth.frames, request.boxes, own)
+        result = replace(result, tables=tuple(accepted.warn(result.tables)))
+        more = {
+            "gone": truth.gone,
+            "accepted_predictions": accepted.frames,
+            **_set_counts(sets),
+        }
     values = {
         "dataset_id": found.id,
         "name": request.name or " and ".join(item.name for item in sets.values()),
@@ -219,14 +235,9 @@ def run_evaluation(
         "prediction_set_id": request.predictions,
         "careful_set_id": request.careful,
         "version_id": request.version,
-        "pins": {**truth.pins, **_pins(request, options, sets)},
-        "counts": {
-            **result.counts,
-            "gone": truth.gone,
-            "accepted_predictions": accepted.frames,
-            **_set_counts(sets),
-        },
-        "tables": [to_json(table) for table in accepted.warn(result.tables)],
+        "pins": {**pins, **_pins(request, options, sets)},
+        "counts": {**result.counts, **more},
+        "tables": [to_json(table) for table in result.tables],
     }
     return _save(store, values, result)
 
@@ -236,15 +247,37 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
     request.check()
     with store.read() as session:
         found = read_dataset_head(session, dataset)
+        sets = {}
         for name in ("predictions", "careful"):
             if (identity := getattr(request, name)) is not None:
-                own = _own_set(session, found, identity, name)
+                own = sets[name] = _own_set(session, found, identity, name)
                 if name == "careful":
                     careful_boxes(session, own)
+        _tracks(request, sets)
         if request.version is not None:
             _own_version(session, found, request.version)
         elif request.groups not in LIVE_RULES:
             raise unknown_rule(request.groups)
+
+
+def _tracks(request: EvaluationRequest, sets: Mapping[str, PredictionSet]) -> PredictionSet | None:
+    """The set of tracks that is evaluated; None where it is one of boxes or cameras.
+
+    Raises:
+        InputError: Something is asked for that tracks have no use for.
+    """
+    found = sets.get("predictions")
+    if found is None or not found.tracks:
+        return None
+    usual = EvaluationRequest()
+    for name in ("careful", "split", "boxes", "min_score"):
+        if getattr(request, name) != getattr(usual, name):
+            raise InputError(
+                f'"{found.name}" is of tracks, which do not use {name}',
+                hint="Leave it out, or evaluate boxes by themselves.",
+                pointer=f"/{name}",
+            )
+    return found
 
 
 def _truth(session: Session, dataset: DatasetHead, request: EvaluationRequest) -> Truth:

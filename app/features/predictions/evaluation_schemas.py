@@ -29,7 +29,9 @@ class EvaluationBody(BaseModel):
     )
 
     name: Annotated[str, Field(max_length=MAX_NAME)] = ""
-    predictions: SetId | None = Field(default=None, description="Boxes, cameras or both.")
+    predictions: SetId | None = Field(
+        default=None, description="Boxes, cameras or both; or tracks."
+    )
     careful: SetId | None = Field(
         default=None, description="Reference boxes, for the table of boxes (the paper's table 1)."
     )
@@ -66,6 +68,9 @@ _HEADLINE = (
     ("localization", "oracle", "mae_m"),
     ("localization", "oracle", "mae_percent"),
     ("localization", "oracle", "p_2m"),
+    ("tracks", "all", "mae_m"),
+    ("tracks", "all", "p_2m"),
+    ("track_events", "any", "f1"),
 )
 
 
@@ -90,7 +95,7 @@ class EvaluationRow(Document):
     counts: dict[str, int]
     headline: Annotated[dict[str, Cell], BeforeValidator(_headline)] = Field(
         validation_alias="tables",
-        description="ap_50, mae_m, mae_percent and p_2m, those that the run has.",
+        description="ap_50, mae_m, mae_percent, p_2m and f1 (of events), those that the run has.",
     )
 
 

@@ -59,14 +59,7 @@ def version_truth(session: Session, version: Version, split: str | None) -> Trut
                 if split is None or frame.split == split:
                     frames.append(frame)
                     gone += frame.id < 0
-    pins = {
-        "version": version.id,
-        "version_name": version.name,
-        "version_hash": version.hash,
-        "groups": version.groups,
-        "state": version.hash,
-        **_pins(version.policy, version.solver_version),
-    }
+    pins = truth_pins(version.policy, version.solver_version, version.hash, version.groups, version)
     return Truth(tuple(frames), version.policy, gone, pins)
 
 
@@ -96,14 +89,7 @@ def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | N
                 for frame in group_frames(state.group, state.solution, state.id, state.view_ids)
                 if split is None or frame.split == split
             ]
-    pins = {
-        "version": None,
-        "version_name": None,
-        "version_hash": None,
-        "groups": rule,
-        "state": digest(sorted(hashes)),
-        **_pins(dataset.policy, SOLVER_VERSION),
-    }
+    pins = truth_pins(dataset.policy, SOLVER_VERSION, digest(sorted(hashes)), rule)
     return Truth(tuple(frames), dataset.policy, 0, pins)
 
 
@@ -154,8 +140,24 @@ def _frozen_frames(
     yield from group_frames(item.group, item.solution, group_id, ids, splits)
 
 
-def _pins(policy: Policy, solver_version: str) -> dict[str, Json]:
+def truth_pins(
+    policy: Policy, solver_version: str, state: str, groups: str, version: Version | None = None
+) -> dict[str, Json]:
+    """What makes a truth the one that it is.
+
+    Args:
+        policy: That judged it.
+        solver_version: That computed it.
+        state: Digest of it, of a version its hash.
+        groups: Which of them take part.
+        version: Whose truth it is; None: the dataset as it was.
+    """
     return {
+        "version": version and version.id,
+        "version_name": version and version.name,
+        "version_hash": version and version.hash,
+        "groups": groups,
+        "state": state,
         "policy": policy_to_json(policy),
         "policy_hash": policy.hash,
         "solver_version": solver_version,

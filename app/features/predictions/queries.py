@@ -9,8 +9,9 @@ from typing import Any
 from sqlalchemy import ColumnElement, delete, func, insert, select
 
 from app.canonical import canonical
-from app.db.json_columns import Json, as_written, parse
+from app.db.json_columns import Json, as_written, pack, parse, unpack
 from app.db.session import Session
+from app.evaluation.predicted_track import PredictedTrack
 from app.features.datasets.tables import ViewModel
 from app.features.groups.codecs import camera_from_json, camera_to_json
 from app.features.groups.digest import digest
@@ -18,6 +19,7 @@ from app.features.groups.insert_queries import next_id
 from app.features.people.alias_queries import columns_shown
 from app.features.predictions.tables import (
     PredictedCameraModel,
+    PredictedTrackModel,
     PredictionModel,
     PredictionSetModel,
 )
@@ -31,9 +33,10 @@ class PredictionSet:
     """What one file or one run of a detector predicted.
 
     Attributes:
-        format: ``coco``, ``yolo``, ``csv``, or ``detect`` for a detector of ours.
+        format: ``coco``, ``yolo``, ``csv``, ``tracks``, ``cameras``, or ``detect`` for a detector of ours.
         source: Name of the file or of the model.
         frames: Frames with a box; ``boxes`` and ``cameras`` count those that have their frame.
+        tracks: Stretches over which the ball was predicted.
         unknown: Frames that the dataset does not have.
         report: JSON; what could not be read, and where it comes from.
     """
@@ -49,6 +52,7 @@ class PredictionSet:
     frames: int
     boxes: int
     cameras: int
+    tracks: int
     unknown: int
     report: Json
 
@@ -71,23 +75,41 @@ Boxes = Mapping[int, Sequence[tuple[float, float, float, float, float]]]
 """x, y, width, height and score of each ball by id of the view, in the order of the file."""
 
 
-def predictions_digest(keys: Mapping[int, str], boxes: Boxes, cameras: Mapping[int, Camera]) -> str:
+Tracks = Mapping[str, PredictedTrack]
+"""What was predicted of the ball over time, by stretch as the file calls it."""
+
+
+def predictions_digest(
+    keys: Mapping[int, str],
+    boxes: Boxes,
+    cameras: Mapping[int, Camera],
+    tracks: Tracks | None = None,
+) -> str:
     """Digest of what was predicted, the same on every machine.
 
     Args:
         keys: A name of each view that does not depend on the database.
         boxes: By id of the view.
         cameras: By id of the view.
+        tracks: By stretch.
     """
     predicted = sorted(
         (keys[view], [list(map(float, box)) for box in boxes[view]]) for view in boxes
     )
     seen = sorted((keys[view], camera_to_json(cameras[view])) for view in cameras)
-    return digest([[list(item) for item in predicted], [list(item) for item in seen]])
+    parts: list[list[Json]] = [[list(item) for item in predicted], [list(item) for item in seen]]
+    # Sets without tracks keep the digest that they had before there were any.
+    if tracks:
+        parts.append([[name, track.to_json()] for name, track in sorted(tracks.items())])
+    return digest(parts)
 
 
 def insert_prediction_set(
-    session: Session, values: Mapping[str, Any], boxes: Boxes, cameras: Mapping[int, Camera]
+    session: Session,
+    values: Mapping[str, Any],
+    boxes: Boxes,
+    cameras: Mapping[int, Camera],
+    tracks: Tracks | None = None,
 ) -> int:
     """Insert a set with everything that belongs to it; returns its id.
 
@@ -96,6 +118,7 @@ def insert_prediction_set(
         values: Columns of the set but its id, ``report`` as a JSON value.
         boxes: By id of the view.
         cameras: By id of the view.
+        tracks: By stretch.
     """
     identity = next_id(session, PredictionSetModel)
     row = {**values, "id": identity, "report": canonical(values["report"])}
@@ -114,6 +137,9 @@ def insert_prediction_set(
     ]
     for start in range(0, len(seen), _BATCH):
         session.execute(insert(PredictedCameraModel), seen[start : start + _BATCH])
+    for stretch, track in (tracks or {}).items():
+        body = {"set_id": identity, "stretch": stretch, "body": pack(track.to_json())}
+        session.execute(insert(PredictedTrackModel), [body])
     return identity
 
 
@@ -180,6 +206,14 @@ def read_predicted_cameras(session: Session, set_id: int) -> dict[int, Camera]:
     rows = session.execute(select(model.view_id, model.camera).where(model.set_id == set_id))
     with as_written():
         return {row.view_id: camera_from_json(parse(row.camera)) for row in rows}
+
+
+def read_predicted_tracks(session: Session, set_id: int) -> dict[str, PredictedTrack]:
+    """Every track of a set, by stretch."""
+    model = PredictedTrackModel
+    rows = session.execute(select(model.stretch, model.body).where(model.set_id == set_id))
+    with as_written():
+        return {row.stretch: PredictedTrack.from_json(unpack(row.body)) for row in rows}
 
 
 def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:

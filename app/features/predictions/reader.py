@@ -37,9 +37,9 @@ class PredictionFiles:
     """Files of predictions, and how to read them.
 
     Attributes:
-        path: File, folder or zip of ball boxes, or None; of a command also the name of a set that is
+        path: File, folder or zip of ball boxes or tracks, or None; of a command also the name of a set that is
             there.
-        format: ``auto``, ``coco``, ``yolo`` or ``csv``.
+        format: ``auto``, ``coco``, ``yolo``, ``csv`` or ``tracks``.
         images: The COCO document that numbers in ``coco`` results refer to, or None.
         cameras: Folder or zip of SoccerNet camera JSON, or None.
         category: The class that is the ball, where the file has several.
@@ -138,6 +138,12 @@ def read_files(files: PredictionFiles, names: FrameNames, limits: Limits) -> Fou
             size=files.size,
             images=files.images,
             limits=limits,
+        )
+    if boxes.tracks and files.cameras is not None:
+        raise InputError(
+            "tracks of the ball come without cameras",
+            hint="Bring the cameras as a set of their own.",
+            pointer="/cameras_upload",
         )
     if files.cameras is not None:
         cameras = read_predicted_cameras(

@@ -56,7 +56,9 @@ class PredictionRequest(BaseModel):
     format: AnyPredictionFormat = Field(
         default="coco", description="`auto`: by the endings of the files."
     )
-    upload: Upload | None = None
+    upload: Upload | None = Field(
+        default=None, description="Ball boxes; of the format `tracks`, `ball.csv` and `events.csv`."
+    )
     images_upload: Upload | None = Field(
         default=None,
         description="The COCO document whose images the numbers in COCO results mean.",
@@ -121,7 +123,7 @@ class PredictionSetDocument(Document):
 
     id: int
     name: str
-    format: Literal["coco", "yolo", "csv", "cameras", "detect"]
+    format: Literal["coco", "yolo", "csv", "tracks", "cameras", "detect"]
     source: str
     created: datetime
     actor: str
@@ -129,6 +131,7 @@ class PredictionSetDocument(Document):
     frames: int = Field(description="Frames with at least one box.")
     boxes: int
     cameras: int
+    tracks: int = Field(description="Stretches over which the ball was predicted in 3D.")
     unknown: int = Field(description="Frames that the dataset does not have.")
     report: PredictionReport
 

@@ -27,6 +27,7 @@ from app.features.groups.view_queries import dataset_views
 from app.features.predictions.queries import PredictedBox as PredictedBox
 from app.features.predictions.queries import PredictionSet as PredictionSet
 from app.features.predictions.queries import (
+    Tracks,
     dataset_prediction_sets,
     delete_prediction_set,
     has_prediction_set,
@@ -78,14 +79,18 @@ def add_predictions(
     first = files.first
     names = frame_names(store, dataset)
     boxes, cameras = read(files, names, Limits.of(store.settings))
-    if not boxes.detections and not cameras.cameras and _is_for_another(boxes, cameras):
+    nothing = not boxes.detections and not cameras.cameras and not boxes.tracks
+    if nothing and _is_for_another(boxes, cameras):
         raise _nothing_known(boxes, cameras, names)
+    if boxes.tracks and not any(track.position for track in boxes.tracks.values()):
+        raise next(iter(boxes.report.problems), InputError(f"{first.name} holds no ball"))
     return save_predictions(
         store,
         dataset,
         prediction_set_name(first) if name is None else name,
         boxes.detections,
         cameras.cameras,
+        tracks=boxes.tracks,
         names=names,
         format=boxes.format if files.path is not None else "cameras",
         source=first.name,
@@ -103,6 +108,7 @@ def save_predictions(
     detections: Mapping[int, Sequence[Detection]],
     cameras: Mapping[int, Camera],
     *,
+    tracks: Tracks | None = None,
     names: FrameNames,
     format: str,  # noqa: A002
     source: str,
@@ -130,10 +136,11 @@ def save_predictions(
         "source": source[:300],
         "created": now(),
         "actor": actor,
-        "digest": predictions_digest(keys, boxes, cameras),
+        "digest": predictions_digest(keys, boxes, cameras, tracks),
         "frames": len(boxes),
         "boxes": sum(map(len, boxes.values())),
         "cameras": len(cameras),
+        "tracks": len(tracks or {}),
         "unknown": unknown,
         "report": report,
     }
@@ -154,6 +161,7 @@ def save_predictions(
             # A view can have gone since its name was looked up.
             {view: found for view, found in boxes.items() if view in present},
             {view: camera for view, camera in cameras.items() if view in present},
+            tracks,
         )
         made = read_set(session, identity)
         session.respond(made)

@@ -15,7 +15,7 @@ from app.db.base import Base
 class PredictionSetModel(Base):
     """What one file, or one run of a detector, predicted for a dataset.
 
-    ``digest`` is that of all its boxes and cameras; ``report`` (JSON) tells what could not be
+    ``digest`` is that of all its boxes, cameras and tracks; ``report`` (JSON) tells what could not be
     read, which frames the dataset does not have, and where the predictions come from.
     """
 
@@ -33,6 +33,7 @@ class PredictionSetModel(Base):
     frames: Mapped[int]
     boxes: Mapped[int]
     cameras: Mapped[int]
+    tracks: Mapped[int] = mapped_column(server_default="0")
     unknown: Mapped[int]
     report: Mapped[str]
 
@@ -69,6 +70,18 @@ class PredictedCameraModel(Base):
         ForeignKey("view.id", ondelete="CASCADE"), primary_key=True
     )
     camera: Mapped[str]
+
+
+class PredictedTrackModel(Base):
+    """The ball over a stretch (compressed JSON) as it was predicted; ``stretch`` is the file's name for it."""
+
+    __tablename__ = "predicted_track"
+
+    set_id: Mapped[int] = mapped_column(
+        ForeignKey("prediction_set.id", ondelete="CASCADE"), primary_key=True
+    )
+    stretch: Mapped[str] = mapped_column(primary_key=True)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
 class EvaluationModel(Base):

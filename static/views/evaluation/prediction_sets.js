@@ -26,6 +26,7 @@ const FORMATS = [
 	{ name: 'coco', label: 'COCO results', note: 'JSON with boxes and scores', ending: /\.json$/i },
 	{ name: 'yolo', label: 'YOLO', note: 'a zip of txt files', ending: /\.(?:zip|txt)$/i },
 	{ name: 'csv', label: 'CSV', note: 'as SNv3D.csv, or image,x,y,w,h,score', ending: /\.csv$/i },
+	{ name: 'tracks', label: 'Tracks', note: 'ball.csv, or a zip with events.csv', ending: /(?:ball\.csv|tracks[^/]*\.zip)$/i },
 ];
 /** @typedef {{boxes: string | null, cameras: string | null, images: string | null}} Files */
 
@@ -67,7 +68,7 @@ function UploadDialog({ one, onClose, onAdded }) {
 		try {
 			const category = String(form.get('category') ?? '').trim();
 			await postPredictions(one.id, {
-				name: name.trim(), format, upload: files.boxes, cameras_upload: files.cameras,
+				name: name.trim(), format, upload: files.boxes, cameras_upload: format === 'tracks' ? null : files.cameras,
 				images_upload: format === 'coco' ? files.images : null, category: category === '' ? null : Number(category),
 				size: size.size, cameras_size: camerasSize.size,
 			});
@@ -81,7 +82,7 @@ function UploadDialog({ one, onClose, onAdded }) {
 	/** @param {keyof Files} kind */
 	const took = (kind) => (/** @type {UploadJson | null} */ sent) => {
 		setFiles((before) => ({ ...before, [kind]: sent?.id ?? null }));
-		const guessed = kind === 'boxes' && FORMATS.find(({ ending }) => ending.test(sent?.name ?? ''));
+		const guessed = kind === 'boxes' && [...FORMATS].reverse().find(({ ending }) => ending.test(sent?.name ?? ''));
 		if (guessed) setFormat(guessed.name);
 		if (sent && kind !== 'images') setName((before) => before || sent.name.replace(/\.[a-z]+$/i, ''));
 	};
@@ -91,11 +92,11 @@ function UploadDialog({ one, onClose, onAdded }) {
 			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy ? 'Reading…' : 'Add predictions'}</button>`}
 		>
 			<fieldset class="choice choice--row">
-				<legend>Format of the boxes</legend>
+				<legend>Format</legend>
 				${FORMATS.map((known) => html`<label key=${known.name}><input type="radio" name="format" value=${known.name} checked=${format === known.name} onChange=${() => setFormat(known.name)} /><span>${known.label}<small>${known.note}</small></span></label>`)}
 			</fieldset>
-			<${UploadField} id="prediction-boxes" label="Ball boxes" onUploaded=${took('boxes')} />
-			<details>
+			<${UploadField} id="prediction-boxes" label=${format === 'tracks' ? 'Tracks of the ball' : 'Ball boxes'} onUploaded=${took('boxes')} />
+			${format === 'tracks' ? html`<p class="note">The ball in 3D over time, as an export of tracks has it: frame, time_s, x_m, y_m, z_m, and sigma_m where it is known.</p>` : html`<details>
 				<summary class="evaluation__pins">More about the file</summary>
 				<div class="form">
 					${format === 'coco' ? html`<${UploadField} id="prediction-images" label="COCO images" hint="the document whose image numbers the results use" accept=".json" onUploaded=${took('images')} />` : null}
@@ -104,7 +105,7 @@ function UploadDialog({ one, onClose, onAdded }) {
 					<div class="form__row"><label for="prediction-cameras-size">Image size of the cameras</label><input class="field" id="prediction-cameras-size" name="cameras_size" autocomplete="off" maxlength="20" placeholder="as annotated, or 960x540" /></div>
 				</div>
 			</details>
-			<${UploadField} id="prediction-cameras" label="Predicted cameras (optional)" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />
+			<${UploadField} id="prediction-cameras" label="Predicted cameras (optional)" hint="a zip of SoccerNet camera JSON" onUploaded=${took('cameras')} />`}
 			<div class="form__row">
 				<label for="prediction-name">Name</label>
 				<input class="field" id="prediction-name" maxlength="100" autocomplete="off" value=${name} onInput=${withValue(setName)} />
@@ -125,12 +126,12 @@ export function PredictionSets({ one, sets, changed }) {
 		<section class="card" aria-labelledby="sets-title">
 			<h2 id="sets-title">Predictions</h2>
 			<p><button data-needs="lead" class="button" type="button" onClick=${() => setAsked('upload')}>Upload predictions…</button></p>
-			${sets.length === 0 ? html`<p class="empty-note">None yet: COCO results, YOLO files, a CSV, or cameras.</p>` : null}
+			${sets.length === 0 ? html`<p class="empty-note">None yet: COCO results, YOLO files, a CSV, cameras, or tracks.</p>` : null}
 			<ul>
 				${sets.map((set) => html`
 					<li class="prediction-set" key=${set.id}>
 						<strong>${set.name}</strong>
-						<p class="note">${count(set.boxes)} ${set.boxes === 1 ? 'box' : 'boxes'} in ${plural(set.frames, 'frame')}${set.cameras ? ` · ${plural(set.cameras, 'camera')}` : ''} · ${set.format} · <${When} at=${set.created} /></p>
+						<p class="note">${set.tracks ? `${plural(set.tracks, 'track')} of the ball` : `${count(set.boxes)} ${set.boxes === 1 ? 'box' : 'boxes'} in ${plural(set.frames, 'frame')}`}${set.cameras ? ` · ${plural(set.cameras, 'camera')}` : ''} · ${set.format} · <${When} at=${set.created} /></p>
 						<${Report} set=${set} />
 						<p class="buttons">
 							${set.boxes ? html`<button data-needs="lead" class="button button--small" type="button" onClick=${() => setAsked(set)}>Accept…<span class="hidden-text"> ${set.name}</span></button>` : null}

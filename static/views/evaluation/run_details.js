@@ -22,13 +22,16 @@ import { TableCard } from './table_card.js';
 
 /** What each count of a run means, in the order in which they narrow down. */
 const COUNTS = [
+	['track_stretches', 'stretches'], ['track_frames', 'frames with a true ball'], ['track_frames_compared', 'with a predicted one'],
+	['stretches_not_predicted', 'stretches not predicted'], ['predicted_stretches_unknown', 'unknown predicted stretches'], ['predicted_frames', 'predicted balls'],
+	['predicted_frames_without_truth', 'predicted balls without a true one'],
 	['groups', 'groups'], ['matches', 'matches'], ['frames', 'frames'], ['judged', 'frames judged'], ['balls', 'with a ball'],
 	['with_3d_ball', 'with a 3D ball'], ['without_ball', 'without a ball'], ['detections', 'detections'], ['frames_with_detections', 'frames with detections'],
 	['detections_not_judged', 'detections not judged'], ['predicted_cameras', 'predicted cameras'], ['careful_boxes', 'reference boxes'],
 	['unknown_predictions_frames', 'unknown frames'], ['accepted_predictions', 'balls accepted from predictions'], ['gone', 'frames deleted since'],
 ];
 /** Those that say nothing when they are zero. */
-const OPTIONAL = new Set(['predicted_cameras', 'careful_boxes', 'accepted_predictions', 'gone', 'unknown_predictions_frames', 'detections_not_judged']);
+const OPTIONAL = new Set(['stretches_not_predicted', 'predicted_stretches_unknown', 'predicted_frames_without_truth', 'predicted_cameras', 'careful_boxes', 'accepted_predictions', 'gone', 'unknown_predictions_frames', 'detections_not_judged']);
 
 /** @param {{[name: string]: number}} counts @returns {[string, number][]} */
 function countsOf(counts) {
@@ -71,7 +74,7 @@ function Head({ run, others, compare, remove, openFrames }) {
 					<select class="field" aria-label="Compare with another run" disabled=${others.length === 0} title=${others.length ? '' : 'There is no other run yet'} onChange=${choose}>
 						<option value="">Compare with…</option>${others.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`)}
 					</select>
-					<button class="button" type="button" onClick=${openFrames}>Frames</button>
+					${run.counts.frames ? html`<button class="button" type="button" onClick=${openFrames}>Frames</button>` : null}
 					<${ConfirmButton} label="Delete" question="Delete for good?" what="the run" run=${remove} />
 				</div>
 			</header>

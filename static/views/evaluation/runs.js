@@ -19,7 +19,7 @@ import { number } from './cell.js';
 /** @import {VersionJson} from '../../api/versions.js' */
 
 const HEADLINES = [
-	{ name: 'ap_50', label: 'AP@0.5' }, { name: 'mae_m', label: 'MAE, m' }, { name: 'mae_percent', label: 'MAE, %' }, { name: 'p_2m', label: 'P 2 m' },
+	{ name: 'ap_50', label: 'AP@0.5' }, { name: 'mae_m', label: 'MAE, m' }, { name: 'mae_percent', label: 'MAE, %' }, { name: 'p_2m', label: 'P 2 m' }, { name: 'f1', label: 'events F1' },
 ];
 const LIVE = [{ name: 'passing', label: 'current state: groups that pass' }, { name: 'accepted', label: 'current state: accepted groups' }, { name: 'all', label: 'current state: every group' }];
 

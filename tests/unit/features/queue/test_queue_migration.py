@@ -35,6 +35,8 @@ def as_before(store: Store) -> None:
         session.execute(text("ALTER TABLE version DROP COLUMN tracks"))
         session.execute(text("DROP TABLE track"))
         session.execute(text("DROP TABLE ball_run"))
+        session.execute(text("DROP TABLE predicted_track"))
+        session.execute(text("ALTER TABLE prediction_set DROP COLUMN tracks"))
         session.execute(text("DROP TABLE shot_cameras"))
         session.execute(text("DROP TABLE shot_link"))
         session.execute(text("DROP TABLE recording"))

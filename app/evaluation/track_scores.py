@@ -1,0 +1,355 @@
+"""Predicted tracks against true ones: how far the ball is, how much of it there is, how sure, and its events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from app.errors import InputError
+from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
+from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
+from app.evaluation.predicted_track import PredictedTrack
+from app.evaluation.result import Evaluation
+from app.evaluation.table import Cell, Column, Row, Table
+from app.evaluation.track_files import KINDS
+from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.plural import plural
+
+NEAR_M = 2.0
+EVENT_FRAMES = 2
+"""Between an event that is predicted and the true one that it is."""
+INSIDE_95 = 7.815
+"""Chi-squared with three degrees of freedom."""
+FARTHEST_M, STEP_M = 5.0, 0.05
+NAMED = 5
+"""Stretches that a note names; all are counted."""
+COLUMNS = (
+    Column("mae_m", "MAE", "m", "lower"),
+    Column("median_m", "Median", "m", "lower"),
+    Column("p_2m", "P 2 m", "", "higher"),
+    Column("p_2m_all", "P 2 m, all frames", "", "higher"),
+    Column("coverage", "Coverage", "", "higher"),
+    Column("inside_95", "Inside 95 %"),
+)
+EVENT_COLUMNS = (
+    Column("precision", "Precision", "", "higher"),
+    Column("recall", "Recall", "", "higher"),
+    Column("f1", "F1", "", "higher"),
+)
+_ROWS = (
+    ("measured", "Two views or more saw it", ("measured",)),
+    ("one_view", "One view saw it", ("one_view",)),
+    ("unseen", "No view saw it", ("bridged", "predicted")),
+)
+_CURVES: tuple[tuple[str, str, Literal["line", "dashed"]], ...] = (
+    ("compared", "Predicted", "line"),
+    ("all", "All frames", "dashed"),
+)
+_MODES = (("flight", "In the air"), ("roll", "On the grass"))
+
+
+@dataclass(frozen=True)
+class TrueTrack:
+    """The ball over a stretch, as people accepted it.
+
+    Attributes:
+        key: Of the stretch.
+        folder: What exports call it.
+        frames: Numbers, increasing, shape (N,).
+        times: Seconds, shape (N,).
+        position: Pitch frame, metres, NaN in gaps, shape (N, 3).
+        state: How each frame is known.
+        mode: What the ball does.
+        events: Kind and seconds of each.
+    """
+
+    key: str
+    folder: str
+    frames: IntArray
+    times: FloatArray
+    position: FloatArray
+    state: tuple[str, ...]
+    mode: tuple[str, ...]
+    events: tuple[tuple[str, float], ...]
+
+    @property
+    def there(self) -> BoolArray:
+        """Frames with a ball, shape (N,)."""
+        return np.asarray(np.isfinite(self.position).all(axis=1))
+
+
+@dataclass
+class _Compared:
+    """True frames with a ball, one after the other, beside what was predicted for them.
+
+    Attributes:
+        error: Metres, NaN where nothing was predicted.
+        inside: 1 where the truth is inside of what the prediction calls 95 %, 0 where not, NaN without
+            a sigma.
+        stretch, state, mode: Of each.
+        beside: Predicted balls of instants that have no true one.
+        events: By stretch: kinds and seconds of true events, of predicted ones (None: none are
+            predicted), and how far apart one and the same may be, seconds.
+    """
+
+    error: list[float] = field(default_factory=list)
+    inside: list[float] = field(default_factory=list)
+    stretch: list[str] = field(default_factory=list)
+    state: list[str] = field(default_factory=list)
+    mode: list[str] = field(default_factory=list)
+    beside: int = 0
+    events: list[tuple[list[tuple[str, float]], list[tuple[str, float]], float]] = field(
+        default_factory=list
+    )
+
+
+def evaluate_tracks(
+    truth: Sequence[TrueTrack], predicted: Mapping[str, PredictedTrack]
+) -> Evaluation:
+    """Tables and figures of predicted tracks.
+
+    Args:
+        truth: The true ones.
+        predicted: By stretch, as its key or as exports call its folder; the empty name is the only
+            stretch's.
+
+    Raises:
+        InputError: Nothing that is predicted is of an instant with a true ball.
+    """
+    own, unknown = _joined(truth, predicted)
+    found = _Compared()
+    for track in truth:
+        _compare(found, track, own.get(track.key))
+    error = np.array(found.error)
+    if not np.isfinite(error).any():
+        raise InputError(
+            "nothing that is predicted is of an instant with a true ball: "
+            f"{_named('the stretches', [track.key for track in truth])}"
+            f"{_named('; predicted', unknown) if unknown else ''}",
+            hint="Name folders by the stretches, and frames as exports of tracks do.",
+            pointer="/predictions",
+        )
+    missed = [track.key for track in truth if track.key not in own]
+    counts = {
+        "track_stretches": len(truth),
+        "stretches_not_predicted": len(missed),
+        "predicted_stretches_unknown": len(unknown),
+        "track_frames": len(error),
+        "track_frames_compared": int(np.isfinite(error).sum()),
+        "predicted_frames": sum(len(item.position) for item in predicted.values()),
+        "predicted_frames_without_truth": found.beside
+        + sum(len(predicted[name].position) for name in unknown),
+    }
+    note = _note(counts, missed, unknown)
+    tables = [_places(found, note)]
+    if found.events:
+        tables.append(_events(found))
+    return Evaluation(counts, tuple(tables), (_within(error),), ())
+
+
+def _joined(
+    truth: Sequence[TrueTrack], predicted: Mapping[str, PredictedTrack]
+) -> tuple[dict[str, PredictedTrack], list[str]]:
+    """Predictions by key of their stretch, and the names of those that are of none."""
+    names = {name.casefold(): track.key for track in truth for name in (track.folder, track.key)}
+    found: dict[str, PredictedTrack] = {}
+    unknown = []
+    for name, track in sorted(predicted.items()):
+        key = names.get(name.casefold())
+        if key is None and len(truth) == 1 and len(predicted) == 1:
+            key = truth[0].key
+        if key is None or key in found:
+            unknown.append(name or "the file at the top")
+        else:
+            found[key] = track
+    return found, unknown
+
+
+def _compare(found: _Compared, track: TrueTrack, predicted: PredictedTrack | None) -> None:
+    there = track.there
+    rows = np.full(len(track.frames), -1)
+    if predicted is not None:
+        place = _rows_of(track, predicted)
+        known = np.flatnonzero(place >= 0)
+        rows[place[known[::-1]]] = known[::-1]
+        found.beside += len(place) - int((there & (rows >= 0)).sum())
+        if predicted.events is not None:
+            found.events.append(_events_of(track, predicted))
+    position = np.array([] if predicted is None else predicted.position).reshape(-1, 3)
+    sigma = np.zeros((0, 3)) if predicted is None else predicted.sigma_array
+    for row in np.flatnonzero(there):
+        at = int(rows[row])
+        off = position[at] - track.position[row] if at >= 0 else np.full(3, np.nan)
+        square = float(((off / sigma[at]) ** 2).sum()) if at >= 0 else float("nan")
+        found.error.append(float(np.linalg.norm(off)))
+        found.inside.append(float(square <= INSIDE_95) if np.isfinite(square) else float("nan"))
+        found.stretch.append(track.key)
+        found.state.append(track.state[row])
+        found.mode.append(track.mode[row])
+
+
+def _rows_of(track: TrueTrack, predicted: PredictedTrack) -> IntArray:
+    """The row of the true track of each predicted ball, -1 where there is none, shape (M,)."""
+    by_frame = {int(frame): row for row, frame in enumerate(track.frames)}
+    half = _step(track) / 2
+    found = np.full(len(predicted.position), -1)
+    for at, (frame, time) in enumerate(zip(predicted.frames, predicted.times, strict=True)):
+        if frame is not None:
+            found[at] = by_frame.get(frame, -1)
+        elif time is not None:
+            row = int(np.abs(track.times - time).argmin())
+            found[at] = row if abs(track.times[row] - time) <= half else -1
+    return found
+
+
+def _step(track: TrueTrack) -> float:
+    return float(np.median(np.diff(track.times))) if len(track.times) > 1 else 0.04
+
+
+def _events_of(
+    track: TrueTrack, predicted: PredictedTrack
+) -> tuple[list[tuple[str, float]], list[tuple[str, float]], float]:
+    by_frame = {
+        int(frame): float(time) for frame, time in zip(track.frames, track.times, strict=True)
+    }
+    step = _step(track)
+    said = []
+    for kind, frame, time in predicted.events or ():
+        if frame is not None and frame in by_frame:
+            said.append((kind, by_frame[frame]))
+        else:
+            said.append((kind, float("inf") if time is None else time))
+    return list(track.events), said, EVENT_FRAMES * step + step / 2
+
+
+def _places(found: _Compared, note: str) -> Table:
+    resamples = Resamples.draw(found.stretch, RESAMPLES, SEED)
+    state, mode = np.array(found.state), np.array(found.mode)
+    parts = [("all", "All frames", np.ones(len(state), dtype=bool))]
+    parts += [(name, label, np.isin(state, names)) for name, label, names in _ROWS]
+    parts += [(name, label, mode == name) for name, label in _MODES]
+    if len(set(found.stretch)) > 1:
+        keys = np.array(found.stretch)
+        parts += [(f"stretch {key}", key, keys == key) for key in dict.fromkeys(found.stretch)]
+    rows = [_place_row(found, resamples, *part) for part in parts if part[2].any()]
+    return Table("tracks", "The ball over time", COLUMNS, tuple(rows), note)
+
+
+def _place_row(
+    found: _Compared, resamples: Resamples, name: str, label: str, part: BoolArray
+) -> Row:
+    chosen = np.flatnonzero(part).tolist()
+    of = len(chosen)
+    placed = [at for at in chosen if np.isfinite(found.error[at])]
+    errors = [found.error[at] for at in placed]
+    stretches = [found.stretch[at] for at in placed]
+    everywhere = [found.stretch[at] for at in chosen]
+    near = [float(error < NEAR_M) for error in errors]
+    near_all = [float(found.error[at] < NEAR_M) for at in chosen]
+    sure = [at for at in placed if np.isfinite(found.inside[at])]
+    inside = [found.inside[at] for at in sure]
+    return Row(
+        name,
+        label,
+        (
+            resamples.mean(errors, stretches, of),
+            Cell(float(np.median(errors)) if errors else None, count=len(errors), of=of),
+            resamples.mean(near, stretches, of),
+            resamples.mean(near_all, everywhere),
+            resamples.mean([float(np.isfinite(found.error[at])) for at in chosen], everywhere),
+            resamples.mean(inside, [found.stretch[at] for at in sure], len(placed)),
+        ),
+    )
+
+
+def _events(found: _Compared) -> Table:
+    rows = [_event_row("any", "Events of any kind", found, None)]
+    rows += [
+        _event_row(kind, f"{kind.capitalize()}s" if kind != "out" else "Out", found, kind)
+        for kind in KINDS
+    ]
+    note = (
+        f"Events are one and the same within {EVENT_FRAMES} frames, each once; rows of a kind compare those "
+        "of that kind alone. Stretches without predicted events do not count."
+    )
+    return Table("track_events", "Events of the ball", EVENT_COLUMNS, tuple(rows), note)
+
+
+def _event_row(name: str, label: str, found: _Compared, kind: str | None) -> Row:
+    true = said = hits = 0
+    for real, predicted, slack in found.events:
+        times = [
+            sorted(at for one, at in some if kind in (None, one)) for some in (real, predicted)
+        ]
+        true, said = true + len(times[0]), said + len(times[1])
+        hits += _matched(times[0], times[1], slack)
+    f1 = 2 * hits / (true + said) if true + said else None
+    return Row(
+        name,
+        label,
+        (
+            Cell(hits / said if said else None, count=hits, of=said),
+            Cell(hits / true if true else None, count=hits, of=true),
+            Cell(f1, count=2 * hits, of=true + said),
+        ),
+    )
+
+
+def _matched(true: Sequence[float], said: Sequence[float], slack: float) -> int:
+    """How many pairs of one and the same event there are, the most that are possible."""
+    hits = at = 0
+    for time in true:
+        while at < len(said) and said[at] < time - slack:
+            at += 1
+        if at < len(said) and said[at] <= time + slack:
+            hits, at = hits + 1, at + 1
+    return hits
+
+
+def _within(error: FloatArray) -> Figure:
+    """Share of frames within a distance, against the distance."""
+    places = (np.arange(round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
+    below = np.searchsorted(np.sort(error[np.isfinite(error)]), places, side="left")
+    whole = {"compared": int(np.isfinite(error).sum()), "all": len(error)}
+    series = [
+        Series(
+            name,
+            f"{label} (of {whole[name]})",
+            tuple(places.tolist()),
+            tuple((below / whole[name]).tolist()),
+            kind,
+            count=tuple(below.tolist()),
+        )
+        for name, label, kind in _CURVES
+    ]
+    panel = Panel(
+        "Share within a distance",
+        Axis("Distance from the ball", "m", 0.0, FARTHEST_M),
+        Axis("Share of frames", "", 0.0, 1.0),
+        tuple(series),
+        (Mark("x", NEAR_M, "2 m"),),
+    )
+    note = "Solid: frames with a predicted ball. Dashed: all frames with a true one."
+    return Figure("track_distance", "Precision of tracks against distance", (panel,), note)
+
+
+def _note(counts: Mapping[str, int], missed: Sequence[str], unknown: Sequence[str]) -> str:
+    said = [
+        f"{plural(counts['track_frames'], 'frame')} with a true ball, "
+        f"{counts['track_frames_compared']} with a predicted one too. MAE, median and P 2 m are over those; "
+        "inside 95 % are the true places within what the predicted sigmas call 95 % in three dimensions."
+    ]
+    if counts["predicted_frames_without_truth"]:
+        balls = plural(counts["predicted_frames_without_truth"], "predicted ball")
+        said.append(f"{balls} belong to no frame with a true one.")
+    said += [_named("Not predicted", missed) + "."] if missed else []
+    said += [_named("Predicted, but no stretch of the truth", unknown) + "."] if unknown else []
+    return " ".join(said)
+
+
+def _named(what: str, names: Sequence[str]) -> str:
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{what}: {', '.join(names[:NAMED])}{more}"
