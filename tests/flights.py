@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -13,13 +14,21 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.features.imports.ingest import ingest
 from app.features.solutions.service import solve_dataset
-from app.features.tracks.codec import TrackInputs, inputs_to_json, track_to_json
+from app.features.tracks.codec import TrackInputs, inputs_to_json, make_track, track_to_json
 from app.features.tracks.queries import insert_track
 from app.features.tracks.service import TrackSummary, list_tracks, make_tracks
+from app.features.tracks.stretches import gather_stretches
+from app.formats.export_formats import WriteOptions, write_format
+from app.formats.export_record import ExportRecord
+from app.formats.manifest import Manifest, write_manifest
+from app.formats.output import output_tree
+from app.formats.tracks_writer import TrackRecord
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER
+from app.solving.solve import solve
 from app.tracking.ball_track import BallMeasurements, BallTrack
 from tests.cameras import SIZE
 from tests.rigs import TRUTH
@@ -82,6 +91,20 @@ def add_flight(store: Store, name: str = "flight") -> int:
     make_tracks(store, name, None, "local", lambda *_: None)
     (track,) = list_tracks(store, name)
     return track.id
+
+
+def write_flight_export(out: Path) -> BallTrack:
+    """A Parquet export of a frozen version of the flight, with its track, as the review floor writes it."""
+    records = [ExportRecord(item, solve(item, PAPER), "accepted") for item in flight_groups(60)]
+    (stretch,) = gather_stretches(records, PAPER)
+    track = make_track(TrackInputs.of(stretch))
+    kept = [TrackRecord(stretch.key, track, stretch.pitch, stretch.rate, verdict="accepted")]
+    with output_tree(out) as root:
+        counts = write_format(root, records, WriteOptions("parquet", kept=kept))
+        stamp = {"frozen": {"hash": "6f1ed002ab559585" * 4}}
+        manifest = Manifest("flight", "parquet", "2030-01-01", counts, version="v1", stamp=stamp)
+        write_manifest(root, manifest)
+    return track
 
 
 def insert_bare_track(session: Session, dataset_id: int, key: str) -> int:

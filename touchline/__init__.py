@@ -18,6 +18,7 @@ from touchline.opening import open_version as open  # noqa: A004  `touchline.ope
 from touchline.pitch import markings
 from touchline.recordings import Link, Recording, Shot
 from touchline.samples import Samples
+from touchline.track import Track, TrackEvent
 from touchline.view import Group, View
 
 __all__ = [
@@ -33,6 +34,8 @@ __all__ = [
     "Samples",
     "Shot",
     "TouchlineError",
+    "Track",
+    "TrackEvent",
     "View",
     "markings",
     "open",

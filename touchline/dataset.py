@@ -14,7 +14,10 @@ from touchline.frames import Frames
 from touchline.packages import package
 from touchline.samples import Samples
 from touchline.tables import NEEDED, OPTIONAL, TABLE, balls_table, groups_table
+from touchline.track import Track, tracks_of
 from touchline.view import Group, View
+
+TABLES = ("views", "groups", "balls", "tracks", "events")
 
 
 class Dataset:
@@ -37,17 +40,30 @@ class Dataset:
                 f"({export.manifest.get('format')})",
                 "Export with --format parquet.",
             )
-        pyarrow, parquet = package("pyarrow"), package("pyarrow.parquet")
-        try:
-            self._table = parquet.read_table(pyarrow.BufferReader(export.read(TABLE)))
-        except pyarrow.ArrowException as error:
-            raise DataError(f"{TABLE} is not a sound Parquet file ({error})") from None
+        self._table = self._read(TABLE)
         missing = [name for name in NEEDED if name not in self._table.column_names]
         if missing:
             raise DataError(
                 f"{TABLE} lacks the column {missing[0]}",
                 "Export the version again with this version of Touchline.",
             )
+
+    def _read(self, name: str) -> Any:
+        """A table of the export.
+
+        Raises:
+            DataError: It is not there, or damaged.
+        """
+        if not self._export.lists(name):
+            raise DataError(
+                f"{self._export.files.path} holds no {name}",
+                "Accept tracks, freeze a version, and export it with --format parquet.",
+            )
+        pyarrow, parquet = package("pyarrow"), package("pyarrow.parquet")
+        try:
+            return parquet.read_table(pyarrow.BufferReader(self._export.read(name)))
+        except pyarrow.ArrowException as error:
+            raise DataError(f"{name} is not a sound Parquet file ({error})") from None
 
     @property
     def manifest(self) -> dict[str, Any]:
@@ -91,6 +107,13 @@ class Dataset:
         """The 3D balls, one a group that has one."""
         return tuple(group.ball for group in self.groups if group.ball is not None)
 
+    @cached_property
+    def tracks(self) -> tuple[Track, ...]:
+        """The ball over time, one track a stretch; none where the version was frozen without tracks."""
+        if not self._export.lists("tracks.parquet"):
+            return ()
+        return tracks_of(self.table("tracks").to_pylist(), self.table("events").to_pylist())
+
     @property
     def splits(self) -> tuple[str, ...]:
         """Names of the splits that views are in."""
@@ -100,7 +123,11 @@ class Dataset:
         """An Arrow table.
 
         Args:
-            what: ``views`` (all columns of docs/formats.md), ``groups`` or ``balls``.
+            what: ``views`` (all columns of docs/formats.md), ``groups`` or ``balls``; ``tracks`` (a row a
+                frame) or ``events``, where there are some.
+
+        Raises:
+            DataError: There are no tracks.
         """
         if what == "views":
             return self._table
@@ -108,7 +135,9 @@ class Dataset:
             return groups_table(self.groups)
         if what == "balls":
             return balls_table(self.balls)
-        raise ValueError(f'a table is "views", "groups" or "balls", not "{what}"')
+        if what in ("tracks", "events"):
+            return self._read(f"{what}.parquet")
+        raise ValueError(f'a table is {", ".join(TABLES)}, not "{what}"')
 
     def pandas(self, what: str = "views") -> Any:
         """The same as a pandas data frame.

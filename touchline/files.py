@@ -109,8 +109,8 @@ class Export:
 
     @property
     def has_frames(self) -> bool:
-        """Whether there is more than one table in it."""
-        return len(self._sha256) > 1
+        """Whether there is more in it than tables."""
+        return any(not name.endswith(".parquet") for name in self._sha256)
 
     def lists(self, name: str) -> bool:
         """Whether the manifest lists a file."""

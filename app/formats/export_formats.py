@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
@@ -26,7 +26,12 @@ from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import labels_frame_path, write_soccernet_v3
 from app.formats.soccernet_v3d_writer import write_soccernet_v3d
 from app.formats.tracking_writer import write_cdf, write_tracab
-from app.formats.tracks_writer import TrackRecord, write_track_arrays, write_tracks
+from app.formats.tracks_writer import (
+    TrackRecord,
+    write_track_arrays,
+    write_track_tables,
+    write_tracks,
+)
 from app.formats.view_files import PutText
 from app.formats.yolo_writer import write_yolo
 from app.plural import plural
@@ -84,6 +89,7 @@ class WriteOptions:
         provenance: Where the groups come from, by the names of ``parquet.PROVENANCE``.
         unassigned: People of frames that are no view of a group.
         tracks: Makes tracks of the groups, for the formats of ``TRACKS``.
+        kept: Tracks that were frozen with the groups, for ``parquet``.
     """
 
     format: str
@@ -93,6 +99,7 @@ class WriteOptions:
     provenance: Mapping[str, str | None] = field(default_factory=dict)
     unassigned: Iterable[FramePersons] = ()
     tracks: Callable[[Iterable[ExportRecord]], Iterable[TrackRecord]] | None = None
+    kept: Sequence[TrackRecord] = ()
 
 
 _TRACK_WRITERS = {
@@ -156,13 +163,14 @@ def write_format(
         case "yolo":
             return write_yolo(root, records, put, boxes=boxes)
         case _:
-            return write_parquet(
+            found = write_parquet(
                 root,
                 records,
                 everything=everything,
                 boxes=boxes,
                 provenance=options.provenance,
             )
+            return found | (write_track_tables(root, options.kept) if options.kept else {})
 
 
 def _count_groups(records: Iterable[ExportRecord], counts: dict[str, int]) -> Iterator[Group]:

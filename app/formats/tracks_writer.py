@@ -20,6 +20,7 @@ from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 
 BALL, EVENTS, NPZ = "ball.csv", "events.csv", "ball.npz"
+TRACK_TABLE, EVENT_TABLE = "tracks.parquet", "events.parquet"
 COLUMNS = ("frame", "time_s", "x_m", "y_m", "z_m", "sigma_m", "state", "cameras")
 EVENT_COLUMNS = ("frame", "time_s", "kind", "x_m", "y_m", "z_m", "sigma_s")
 _TO_Z_UP = np.array([1.0, -1.0, -1.0])
@@ -188,6 +189,11 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
     return counts
 
 
+def folder_name(key: str) -> str:
+    """What the folder of a stretch is called where an export has several."""
+    return _UNSAFE.sub("_", key).strip(" .") or "track"
+
+
 def track_folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[Path, TrackRecord]]:
     """Where each track goes: a single one to ``root``."""
     whole = list(records)
@@ -196,7 +202,7 @@ def track_folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[
         if len(whole) == 1:
             yield root, record
             continue
-        name = _UNSAFE.sub("_", record.key).strip(" .") or "track"
+        name = folder_name(record.key)
         other = taken.setdefault(name.casefold(), record.key)
         if other != record.key:
             raise InputError(
@@ -222,7 +228,44 @@ def _event_rows(record: TrackRecord) -> Iterator[tuple[Any, ...]]:
 
 
 def _write_parquet(path: Path, record: TrackRecord) -> None:
+    _, parquet = import_pyarrow()
+    table = _frames_table(record).replace_schema_metadata({"verdict": record.verdict})
+    parquet.write_table(table, path, compression="zstd")
+
+
+def write_track_tables(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
+    """Write ``tracks.parquet`` and ``events.parquet``: all tracks, each row with its stretch.
+
+    Returns:
+        Counts: ``tracks`` and ``events``.
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
     pyarrow, parquet = import_pyarrow()
+    whole = list(records)
+    numbers, text = pyarrow.float64(), pyarrow.string()
+    tables = []
+    rows: list[dict[str, Any]] = []
+    for record in whole:
+        frames = _frames_table(record)
+        stretch = pyarrow.array([record.key] * frames.num_rows, text)
+        tables.append(frames.add_column(0, "stretch", stretch))
+        rows += [
+            dict(zip(("stretch", *EVENT_COLUMNS), (record.key, *row), strict=True))
+            for row in _event_rows(record)
+        ]
+    kinds = {"stretch": text, "kind": text, "frame": pyarrow.int32()}
+    fields = [(name, kinds.get(name, numbers)) for name in ("stretch", *EVENT_COLUMNS)]
+    events = pyarrow.Table.from_pylist(rows, pyarrow.schema(fields))
+    parquet.write_table(pyarrow.concat_tables(tables), root / TRACK_TABLE, compression="zstd")
+    parquet.write_table(events, root / EVENT_TABLE, compression="zstd")
+    return {"tracks": len(whole), "events": len(rows)}
+
+
+def _frames_table(record: TrackRecord) -> Any:
+    """A row a frame, as an Arrow table."""
+    pyarrow, _ = import_pyarrow()
     track = record.track
     numbers, whole, text = pyarrow.float64(), pyarrow.int32(), pyarrow.string()
 
@@ -237,7 +280,7 @@ def _write_parquet(path: Path, record: TrackRecord) -> None:
         rows = [row if there else None for row, there in zip(flat.tolist(), known, strict=True)]
         return pyarrow.array(rows, pyarrow.list_(numbers, length))
 
-    table = pyarrow.table(
+    return pyarrow.table(
         {
             "frame": pyarrow.array(track.frames.tolist(), whole),
             "time_s": pyarrow.array(track.times.tolist(), numbers),
@@ -256,5 +299,3 @@ def _write_parquet(path: Path, record: TrackRecord) -> None:
             "cameras": pyarrow.array([list(names) for names in track.views], pyarrow.list_(text)),
         }
     )
-    table = table.replace_schema_metadata({"verdict": record.verdict})
-    parquet.write_table(table, path, compression="zstd")

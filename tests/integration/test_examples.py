@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.flights import write_flight_export
 from tests.videos import write_video
 from touchline import Client
 
@@ -86,6 +87,12 @@ class TestExamples:
     def test_a_match_is_plotted(self, export: Path, tmp_path: Path) -> None:
         assert "balls of" in run(tmp_path, EXAMPLES / "plot_match.py", export)
         assert (tmp_path / "match.png").read_bytes().startswith(b"\x89PNG")
+
+    def test_the_highest_flight_is_plotted(self, tmp_path: Path) -> None:
+        write_flight_export(tmp_path / "v1.zip")
+        told = run(tmp_path, EXAMPLES / "plot_flight.py", tmp_path / "v1.zip")
+        assert re.search(r"rig: 2\.\d m high, \d+ km/h; uncertainty 0\.\d\d m", told), told
+        assert (tmp_path / "flight.png").read_bytes().startswith(b"\x89PNG")
 
     def test_a_detector_is_evaluated(self, address: str, export: Path, tmp_path: Path) -> None:
         script = EXAMPLES / "evaluate_detector.py"

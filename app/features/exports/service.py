@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import get_args
 
+from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
@@ -21,7 +22,7 @@ from app.features.groups.view_queries import frame_files
 from app.features.imports.edits_export import FORMAT as CARRY
 from app.features.imports.edits_export import export_edits
 from app.features.imports.unassigned import unassigned_persons
-from app.features.tracks.export import TrackSource
+from app.features.tracks.export import TrackSource, frozen_records
 from app.features.tracks.service import track_source
 from app.features.versions.frozen_queries import json_of, read_frozen
 from app.features.versions.service import find_version
@@ -44,6 +45,7 @@ from app.formats.file_tree import Root
 from app.formats.issia import FramePersons
 from app.formats.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
 from app.formats.store_output import output_anywhere
+from app.formats.tracks_writer import TrackRecord
 from app.formats.view_files import PutText, ViewFiles
 from app.media.frames import make_picture
 from app.object_store.address import is_address
@@ -191,6 +193,8 @@ def export(
             run = _Run(source, options, frames, names, progress)
             # A version is the same every time; unassigned frames are the dataset's as it is.
             run.tracks = _tracks(session, source, options)
+            if format == "parquet" and source.tracks:
+                run.kept = frozen_records(_frozen(session, source))
             if format == "issia" and isinstance(source, LiveSource):
                 run.unassigned = unassigned_persons(session, dataset)
             with _view_files(root, out) as put:
@@ -376,13 +380,19 @@ def _tracks(
     """What makes the tracks of an export; None where its format holds none."""
     if options.format not in TRACKS:
         return None
-    frozen = None
-    if source.tracks is not None:
-        bodies = read_frozen(session, source.dataset_id, source.tracks.values())
-        frozen = {key: json_of(bodies[name]) for key, name in source.tracks.items()}
+    frozen = None if source.tracks is None else _frozen(session, source)
     found = track_source(session, source.dataset_id, source.dataset, source.policy, frozen)
     everything = options.everything or frozen is not None
     return replace(found, everything=everything, try_only=try_only)
+
+
+def _frozen(
+    session: Session, source: LiveSource | VersionSource | _SampleSource
+) -> dict[str, Json]:
+    """The tracks of a version by stretch, as they were frozen."""
+    names = source.tracks or {}
+    bodies = read_frozen(session, source.dataset_id, names.values())
+    return {key: json_of(bodies[name]) for key, name in names.items()}
 
 
 class _Run:
@@ -403,6 +413,7 @@ class _Run:
         self._overrides: list[dict[str, str | None]] = []
         self.unassigned: Iterable[FramePersons] = ()
         self.tracks: TrackSource | None = None
+        self.kept: Sequence[TrackRecord] = ()
 
     def write(self, root: Path, put: PutText | None) -> dict[str, int]:
         """Write the format's files; returns its counts."""
@@ -423,6 +434,7 @@ class _Run:
             provenance,
             self.unassigned,
             None if self.tracks is None else self.tracks.records,
+            self.kept,
         )
         return write_format(root, self._records(), wanted, put)
 
