@@ -145,9 +145,11 @@ def _read_number_arrays(content: bytes, path: str, limits: Limits) -> dict[str, 
                     continue
                 found[name] = _read_array(archive, item, name, path)
     except (ValueError, OverflowError) as error:
-        raise DatasetFormatError(path, None, None, f"is no file of numpy's ({error})") from error
+        raise DatasetFormatError(path, None, None, f"is not a NumPy .npz file ({error})") from error
     except BROKEN as error:
-        raise DatasetFormatError(path, None, None, "is no file of numpy's, or damaged") from error
+        raise DatasetFormatError(
+            path, None, None, "is not a NumPy .npz file, or damaged"
+        ) from error
     return found
 
 
@@ -161,7 +163,7 @@ def _read_array(
             read = np.lib.format.read_array_header_2_0
         shape, fortran, kind = read(file, max_header_size=_MAX_HEADER)
         if kind.hasobject or kind.kind not in "fiu":
-            raise ValueError("holds something else than numbers")
+            raise ValueError("holds values that are not numbers")
         numbers = math.prod(shape)
         if numbers * kind.itemsize != item.file_size - file.tell():
             raise ValueError("holds an array of another size than it says")
@@ -231,4 +233,6 @@ def read_opencv_storage(content: bytes, path: str) -> Any:
         text = re.sub(r"\A%YAML:[^\n]*\n", "", content.decode("utf-8-sig"))
         return yaml.load(text, _OpenCVStorageLoader)
     except _NO_YAML as error:
-        raise DatasetFormatError(path, None, None, "is no YAML of OpenCV's FileStorage") from error
+        raise DatasetFormatError(
+            path, None, None, "is not a YAML file of OpenCV's FileStorage"
+        ) from error

@@ -188,7 +188,7 @@ def _decompose_projection_matrix(matrix: FloatArray) -> tuple[FloatArray, FloatA
     """K, R and the position of a projection matrix. Source: Hartley & Zisserman, sec. 6.2.4."""
     determinant = np.linalg.det(matrix[:, :3])
     if determinant == 0:
-        raise ValueError("has no place for a camera")
+        raise ValueError("determines no position of a camera")
     matrix = matrix * np.sign(determinant)
     # An RQ decomposition by the QR decomposition of the matrix turned upside down.
     q, r = np.linalg.qr(np.flipud(matrix[:, :3]).T)

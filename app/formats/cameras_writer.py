@@ -66,7 +66,8 @@ def write_camera_files(
             if first != owner:
                 raise InputError(
                     f"the cameras of two frames ({', '.join(first)} and {', '.join(owner)})"
-                    f" would both be called {name}"
+                    f" would both be called {name}",
+                    hint="Rename one of them in the source, and import it again.",
                 )
             if len(written) > counts["cameras"]:
                 put(name, camera_file_text(camera, record.covariance(view), view.size))

@@ -309,7 +309,7 @@ class _CocoFile:
         try:
             if not parts:
                 require_safe_path(text)
-                raise image.error("file_name", "is no name of a file")
+                raise image.error("file_name", "is not a file name")
             if not _is_relative_path(text) and self._joined.is_alone(parts[-1]):
                 key = parts[-1]
             return require_safe_path(key)
@@ -372,7 +372,7 @@ class _CocoFile:
         if view is None:
             view = PurePosixPath(key).name
         if isinstance(view, bool) or not isinstance(view, str | int | float):
-            raise image.error("view", "is no name of a view")
+            raise image.error("view", "is not a name that a view can have")
         return _require_safe_path(image, "group_id", group), _require_safe_path(image, "view", view)
 
 

@@ -60,7 +60,7 @@ class FrameList:
         value = read_json(content, shown, max_bytes=limits.file_bytes)
         items = value.get("frames") if isinstance(value, dict) else None
         if not isinstance(items, list):
-            raise DatasetFormatError(shown, None, "frames", "is missing or no list")
+            raise DatasetFormatError(shown, None, "frames", "is missing or not a list")
         for number, item in enumerate(items):
             try:
                 self._add_frame(item)
@@ -71,7 +71,7 @@ class FrameList:
         def text(name: str) -> str | None:
             found = item.get(name) if isinstance(item, dict) else None
             if found is not None and not (isinstance(found, str) and 0 < len(found) <= 1000):
-                raise InputError(f"{name} is no text")
+                raise InputError(f"{name} is not a text of 1 to 1000 characters")
             return found
 
         group, view, path = text("group"), text("view"), text("path")
@@ -89,7 +89,9 @@ class FrameList:
     def _resolve_address(self, path: str) -> str:
         if not is_address(path):
             if self._folder is None:
-                raise InputError(f"{path[:200]} is no address in a store (s3://NAME/...)")
+                raise InputError(
+                    f"{path[:200]} is not an address in an object store (s3://NAME/...)"
+                )
             return str(self._folder / require_safe_path(path))
         require_safe_path(path.removeprefix("s3://"))
         return str(target_path(self._settings, path))

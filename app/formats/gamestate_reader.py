@@ -149,7 +149,7 @@ class _LabelledSequence:
                 image = fields.require_object(record)
                 key = image.get("file_name")
                 if not isinstance(key, str) or "/" in require_safe_path(key):
-                    raise ValueError("has no file_name that is a file's name")
+                    raise ValueError("has no file_name, or one that is not a file name")
                 if "image_id" not in image and "id" not in image:
                     raise ValueError("has no image_id")
                 if PurePosixPath(key).stem in names:
@@ -236,7 +236,7 @@ class _LabelledSequence:
 def _read_side_length(image: Mapping[str, Any], name: str) -> int:
     side = fields.whole_number(image.get(name))
     if not 2 <= side <= MAX_SIDE:
-        raise ValueError(f"has a {name} of {side} pixels")
+        raise ValueError(f"has a {name} of {side} pixels, not of 2 to {MAX_SIDE:,}")
     return side
 
 

@@ -137,7 +137,10 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
                     # Whatever its split, a sequence is known by the name of its folder.
                     other = matches.setdefault(fold_file_name(path.parent.name), match)
                     if other != match:
-                        raise InputError(f"the matches {other} and {match} would be one sequence")
+                        raise InputError(
+                            f"the matches {other} and {match} would have one folder, {path.parent.name}",
+                            hint="Rename one of them in the source, and import it again.",
+                        )
                     if path in files:
                         _reload_file(files[path], path)
                     else:
@@ -158,7 +161,10 @@ def _reserve_image_name(
     whose = f"{record.group.key}, {view.key}"
     first = names.setdefault((record.group.match, fold_file_name(PurePosixPath(name).stem)), whose)
     if first != whose:
-        raise InputError(f"the images of two frames ({first} and {whose}) would be called {name}")
+        raise InputError(
+            f"the images of two frames ({first} and {whose}) would both be called {name}",
+            hint="Rename one of them in the source, and import it again.",
+        )
 
 
 def _write_file(file: _LabelsFile, path: Path) -> None:

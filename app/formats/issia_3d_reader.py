@@ -92,7 +92,7 @@ def _report_unpaired_columns(columns: Mapping[str, str], shown: str, report: Rep
 def _parse_frame_number(cells: Mapping[str, str]) -> int:
     frame = fields.whole_number(cells.get("frame", ""))
     if abs(frame) >= 10**9:
-        raise ValueError("is too large")
+        raise ValueError("is too large for a frame number")
     return frame
 
 

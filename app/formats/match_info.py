@@ -41,7 +41,9 @@ def read_match_info(
         try:
             value = read_json(tree.read_bytes(name), tree.shown(name))
             if not isinstance(value, dict):
-                raise DatasetFormatError(tree.shown(name), None, None, "is not an object of images")
+                raise DatasetFormatError(
+                    tree.shown(name), None, None, "is not an object with a record for each image"
+                )
         except DatasetFormatError as error:
             report.skip(error)
             continue

@@ -187,7 +187,7 @@ def lines_from_json(
         DatasetFormatError: The file is no object at all.
     """
     if not isinstance(value, dict):
-        raise DatasetFormatError(path, None, None, "is not an object of lines")
+        raise DatasetFormatError(path, None, None, "is not an object that maps lines to points")
     known: dict[str, list[ImagePoint]] = {}
     others = []
     points = {name: _read_points(item, path, name, report) for name, item in value.items()}

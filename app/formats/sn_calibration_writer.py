@@ -170,12 +170,18 @@ class _FrameNames:
         first = self._owners.setdefault(place, owner)
         if first != owner:
             whose = f"{', '.join(first)} and {', '.join(owner)}"
-            raise InputError(f"two frames ({whose}) would both be called {place}")
+            raise InputError(
+                f"two frames ({whose}) would both be called {place}",
+                hint="Rename one of them in the source, and import it again.",
+            )
         if place in self.of_place:
             return self.of_place[place]
         name = f"{split_folder_name(split, size)}/{flat_frame_name(place, split)}"
         other = self._place_of.setdefault(fold_file_name(name), place)
         if other != place:
-            raise InputError(f"the frames {other} and {place} would both be called {name}")
+            raise InputError(
+                f"the frames {other} and {place} would both be called {name}",
+                hint="Rename one of them in the source, and import it again.",
+            )
         self.of_place[place] = name
         return name

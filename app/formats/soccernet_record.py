@@ -109,7 +109,9 @@ def _read_image_size(metadata: Mapping[str, Any], path: str, record: str) -> Ima
         except ValueError as error:
             raise DatasetFormatError(path, record, where, str(error)) from error
         if not 2 <= side <= MAX_SIDE:
-            raise DatasetFormatError(path, record, where, f"is {side} pixels")
+            raise DatasetFormatError(
+                path, record, where, f"is {side} pixels, not 2 to {MAX_SIDE:,}"
+            )
         sides.append(side)
     return ImageSize(*sides)
 

@@ -186,7 +186,7 @@ class _RowCells:
     def _side_length(self, name: str) -> int:
         side = self._whole_number(name)
         if not 2 <= side <= MAX_SIDE:
-            raise self._cell_error(name, f"is {side} pixels")
+            raise self._cell_error(name, f"is {side} pixels, not 2 to {MAX_SIDE:,}")
         return side
 
     def _truth_value(self, name: str) -> bool:

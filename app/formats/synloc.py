@@ -93,12 +93,12 @@ def _rotation_and_position(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotation, pitch to camera, and position in our pitch frame of ``s [R | -R C]``."""
     scale = np.cbrt(np.linalg.det(matrix[:, :3]))
     if not np.isfinite(scale) or scale == 0:
-        raise ValueError("has no place for a camera")
+        raise ValueError("determines no position of a camera")
     found = matrix / scale
     left, _, right = np.linalg.svd(found[:, :3])
     rotation = left @ right
     if np.abs(rotation - found[:, :3]).max() > MAX_SKEWNESS:
-        raise ValueError("is no rotation and translation, so angles off the axis mean nothing")
+        raise ValueError("is not a rotation with a translation")
     position = -rotation.T @ found[:, 3]
     return rotation @ _TO_PITCH.T, _TO_PITCH @ position
 
@@ -116,5 +116,5 @@ def _polynomial_terms(value: Any) -> FloatArray:
 def _read_side_length(value: Any) -> int:
     side = fields.whole_number(value)
     if not 2 <= side <= MAX_SIDE:
-        raise ValueError(f"is {side} pixels")
+        raise ValueError(f"is {side} pixels, not 2 to {MAX_SIDE:,}")
     return side

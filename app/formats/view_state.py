@@ -126,7 +126,7 @@ class StateReader:
             return default
         if not isinstance(found, str) or len(found) > MAX_TEXT:
             raise self.error(
-                name, "is no text, or too long" if name in self.value else "is missing"
+                name, "is not a text, or too long" if name in self.value else "is missing"
             )
         return found
 
@@ -152,7 +152,7 @@ class StateReader:
             except ValueError as error:
                 raise self.error(name, str(error)) from error
             if not 2 <= side <= MAX_SIDE:
-                raise self.error(name, f"is {side} pixels")
+                raise self.error(name, f"is {side} pixels, not 2 to {MAX_SIDE:,}")
             sides.append(side)
         return ImageSize(*sides)
 
@@ -266,7 +266,7 @@ class StateReader:
         try:
             found = set(fields.require_list(self.value.get("proposed") or []))
         except (TypeError, ValueError) as error:
-            raise self.error("proposed", "is no list of markings") from error
+            raise self.error("proposed", "is not a list of markings") from error
         return tuple(name for name in lines if name in found)
 
     def balls(self) -> tuple[BallAnnotation, ...]:

@@ -240,7 +240,7 @@ class _ViperFileReader:
         balls = self.tracks[-1].balls
         fresh = sum(frame not in balls for frame in frames)
         if self._frames + fresh > MAX_FRAMES:
-            raise ValueError(f"is beyond {MAX_FRAMES:,} frames with a ball")
+            raise ValueError(f"has more than {MAX_FRAMES:,} frames with a ball")
         self._frames += fresh
         for frame in frames:
             _add_distinct_ball(balls.setdefault(frame, []), ball)

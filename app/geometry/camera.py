@@ -49,7 +49,7 @@ class Camera:
     def __post_init__(self) -> None:
         if self.lens not in LENSES:
             raise DegenerateGeometryError(
-                f'"{self.lens}" is no lens that is known',
+                f'"{self.lens}" is not a known lens',
                 hint=f"Lenses are {', '.join(LENSES)}.",
             )
         shapes = (("rotation", (3, 3)), ("position", (3,)), ("distortion", (self.model.count,)))
@@ -271,15 +271,15 @@ def camera_covariance(values: Iterable[float]) -> tuple[float, ...]:
     """
     covariance = tuple(map(float, values))
     if len(covariance) != 8 * 8 or not all(map(math.isfinite, covariance)):
-        raise ValueError("the covariance of a camera is 64 numbers")
+        raise ValueError("the covariance of a camera must have 64 numbers, all finite")
     matrix = np.array(covariance).reshape(8, 8)
     variances = matrix.diagonal()
     if not (variances > 0).all():
-        raise ValueError("the variance of each number of a camera is above zero")
+        raise ValueError("every variance in the covariance of a camera must be above zero")
     scale = np.sqrt(variances)
     shares = matrix / np.outer(scale, scale)
     if not (np.abs(shares - shares.T) < _CORRELATION_ROUNDING).all():
-        raise ValueError("the covariance of a camera is symmetric")
+        raise ValueError("the covariance of a camera must be symmetric")
     if np.linalg.eigvalsh(shares)[0] < -_CORRELATION_ROUNDING:
-        raise ValueError("no variance of a camera is negative")
+        raise ValueError("the covariance of a camera must have no negative eigenvalue")
     return covariance

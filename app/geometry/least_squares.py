@@ -102,7 +102,9 @@ def require_determined(information: FloatArray) -> None:
         raise DegenerateGeometryError("a parameter has no influence on the residuals")
     values = np.linalg.eigvalsh(information / np.outer(scale, scale))
     if values[0] < 1e-14 * values[-1]:
-        raise DegenerateGeometryError("a combination of parameters is not determined")
+        raise DegenerateGeometryError(
+            "the residuals do not determine a combination of the parameters"
+        )
 
 
 def covariance(information: FloatArray) -> FloatArray:

@@ -76,7 +76,9 @@ def optimal_diameter(
     offset = require_shape(point, (3,), "point") - camera.position
     depth = float(ray @ offset / (ray @ ray))
     if camera.is_wide and not np.isfinite(ideal).all():
-        raise DegenerateGeometryError("the centre lies beyond what the lens shows")
+        raise DegenerateGeometryError(
+            "the centre of the ball lies outside the field of view of the lens"
+        )
     if depth <= 0:
         raise DegenerateGeometryError("the point lies behind the camera")
     off_ray = float(np.linalg.norm(offset - depth * ray))
@@ -135,7 +137,9 @@ def tight_box(camera: Camera, center: FloatArray, radius: float) -> FloatArray:
     if camera.distorts:
         outline = camera.project(_outline(in_camera, radius) @ camera.rotation + camera.position)
         if camera.is_wide and np.isnan(outline).any():
-            raise DegenerateGeometryError("the ball does not lie wholly in what the lens shows")
+            raise DegenerateGeometryError(
+                "the ball does not lie wholly in the field of view of the lens"
+            )
         return np.concatenate([outline.min(axis=0), outline.max(axis=0)])
     # A line l touches the outline when the plane K^T l is at distance r from the centre.
     dual = camera.K @ (np.outer(in_camera, in_camera) - radius**2 * np.eye(3)) @ camera.K.T

@@ -100,7 +100,7 @@ def _truth_from_json(key: str, value: Any, path: str) -> SceneTruth:
 
 def _fault_from_json(value: dict[str, Any]) -> PlantedFault:
     if value["kind"] not in PRACTICE_KINDS:
-        raise ValueError(f"{value['kind']} is no kind of fault")
+        raise ValueError(f"{value['kind']} is not a known kind of fault")
     index, amount = value.get("index"), value.get("amount")
     return PlantedFault(
         kind=value["kind"],

@@ -142,7 +142,7 @@ def reading_from_json(value: Any) -> PaintReading:
             str(value.get("people", "")),
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"this is no reading of paint: {error}") from error
+        raise InputError(f"this is not a reading of paint: {error}") from error
 
 
 def reading_from_text(text: str) -> PaintReading:
@@ -154,7 +154,7 @@ def reading_from_text(text: str) -> PaintReading:
     try:
         reading = reading_from_json(json.loads(text))
     except json.JSONDecodeError as error:
-        raise InputError(f"this is no reading of paint: {error}") from error
+        raise InputError(f"this is not a reading of paint: {error}") from error
     # It need not be written again to be digested.
     vars(reading)["text"] = text
     return reading
@@ -180,11 +180,11 @@ def evidence_from_json(value: Any) -> PaintEvidence:
         }
         return PaintEvidence(points, str(value["version"]))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this is no evidence of paint: {error}") from error
+        raise InputError(f"this is not evidence of paint: {error}") from error
 
 
 def _points(rows: Any) -> tuple[PaintPoint, ...]:
     points = tuple(PaintPoint(float(x), float(y), float(sigma)) for x, y, sigma in rows)
     if not math.isfinite(sum(map(sum, points))) or any(not point.sigma_px > 0 for point in points):
-        raise ValueError("some point is no place with a standard deviation")
+        raise ValueError("a point is not x, y and a standard deviation above zero")
     return points

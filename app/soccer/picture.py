@@ -39,11 +39,17 @@ class PictureGeometry:
     def __post_init__(self) -> None:
         numbers = (self.aspect, *self.shift, *self.sigma)
         if not all(map(math.isfinite, numbers)) or min(self.sigma) < 0:
-            raise InputError("the geometry of a picture has finite numbers, no sigma below zero")
+            raise InputError(
+                "the geometry of a picture must have finite numbers and no negative sigma"
+            )
         if not ASPECTS[0] <= self.aspect <= ASPECTS[1]:
-            raise InputError(f"the aspect of a pixel lies from {ASPECTS[0]:g} to {ASPECTS[1]:g}")
+            raise InputError(
+                f"the aspect of a pixel must lie from {ASPECTS[0]:g} to {ASPECTS[1]:g}"
+            )
         if max(map(abs, self.shift)) > MAX_SHIFT:
-            raise InputError(f"the axis lies within {MAX_SHIFT:g} half diagonals of the middle")
+            raise InputError(
+                f"the optical axis must lie within {MAX_SHIFT:g} half diagonals of the middle"
+            )
 
     @property
     def is_known(self) -> bool:

@@ -43,9 +43,11 @@ class Split:
                 pointer="/split/kind",
             )
         if not 0 < self.test_share < 1:
-            raise InputError("test_share lies between 0 and 1", pointer="/split/test_share")
+            raise InputError("test_share must lie between 0 and 1", pointer="/split/test_share")
         if self.kind == "camera" and not self.test_cameras:
-            raise InputError("a split by camera needs a camera", pointer="/split/test_cameras")
+            raise InputError(
+                "a split by camera needs at least one test camera", pointer="/split/test_cameras"
+            )
 
     def values(self) -> dict[str, Any]:
         """What of it counts, as plain values."""

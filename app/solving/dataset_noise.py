@@ -75,7 +75,7 @@ def _problem_at(
     calibration: Calibration, size: ImageSize, policy: CalibrationPolicy
 ) -> tuple[ResectionProblem, FloatArray]:
     if calibration.camera is None:
-        raise DegenerateGeometryError("without a camera there are no residuals")
+        raise DegenerateGeometryError("the view has no camera, so its lines have no residuals")
     problem = ResectionProblem.of(size, policy)
     return problem, problem.parameters(calibration.camera)
 

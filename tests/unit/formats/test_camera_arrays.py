@@ -46,7 +46,7 @@ class TestCamerasOfArrays:
         [
             ({"R": np.zeros((2, 3, 3))}, "arrays of different lengths"),
             ({"t": np.zeros((3, 4))}, "t: has the shape"),
-            ({"K": np.array([{"a": 1}], dtype=object)}, "something else than numbers"),
+            ({"K": np.array([{"a": 1}], dtype=object)}, "values that are not numbers"),
             ({"K": np.array(3.0)}, "K: has the shape one number"),
             ({"R": np.array(3.0)}, "R: has the shape one number"),
             ({"t": np.array(3.0)}, "t: has the shape one number"),
@@ -118,7 +118,7 @@ class TestCamerasOfArrays:
         with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
             archive.writestr("K.npy", buffer.getvalue())
         assert read_cameras(tmp_path, report) == {}
-        assert "no file of numpy's" in str(report.problems[0])
+        assert "not a NumPy .npz file" in str(report.problems[0])
 
 
 class TestOpencvStorage:
@@ -153,7 +153,7 @@ class TestOpencvStorage:
     ) -> None:
         (tmp_path / "x.yaml").write_text(text)
         assert read_cameras(tmp_path, report) == {}
-        assert "no YAML of OpenCV" in str(report.problems[0])
+        assert "not a YAML file of OpenCV" in str(report.problems[0])
 
     @pytest.mark.parametrize(
         ("text", "key"),

@@ -129,7 +129,7 @@ class TestReadViper:
         assert sorted(_read(tmp_path, HEAD + ball(points) + TAIL, report).balls) == [*range(10)]
         (problem,) = report.problems
         assert problem.field == "framespan 9:10"
-        assert problem.problem == "is beyond 10 frames with a ball"
+        assert problem.problem == "has more than 10 frames with a ball"
 
     def test_two_balls_in_one_frame_are_both_kept_and_a_repeated_one_once(
         self, tmp_path: Path, report: Report

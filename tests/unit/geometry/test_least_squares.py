@@ -76,7 +76,7 @@ class TestCovariance:
 
 class TestRequireDetermined:
     def test_an_open_combination_is_said(self):
-        with pytest.raises(DegenerateGeometryError, match="not determined"):
+        with pytest.raises(DegenerateGeometryError, match="do not determine"):
             require_determined(np.array([[1.0, 1.0], [1.0, 1.0]]))
 
     def test_a_parameter_without_influence_is_said(self):
