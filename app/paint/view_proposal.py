@@ -75,8 +75,9 @@ def proposal_of(
         size: Annotated size; the lines are in its pixels.
         known: Cameras of other frames of the match, whose positions are tried first.
         pitch: The pitch.
-        policy: Prior of the distortion.
+        policy: Prior of the distortion, and which line of the paint its markings are.
     """
+    pitch = policy.painted(pitch)
     why = why_unreadable(image, size)
     if why is not None:
         return ViewProposal("nothing", why, {})

@@ -146,6 +146,10 @@ class CalibrationPolicy:
         """A pitch with the goals and lines that are fitted."""
         return pitch.with_goal(self.goal)
 
+    def painted(self, pitch: Pitch) -> Pitch:
+        """A pitch with the lines that paint is fitted to where nothing was clicked; goals are not painted."""
+        return pitch.with_goal(self.goal) if self.goal == "laws" else pitch
+
     @cached_property
     def spelling(self) -> str:
         """The ``repr``, which every key of a calibration has: spelt out once."""

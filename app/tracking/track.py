@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -83,14 +83,16 @@ def track_clip(
         clip: The video, or a stretch of it.
         lines: Annotated lines by number of their frame in the video, pixels of the video.
         pitch: The pitch.
-        policy: Prior of the distortion.
+        policy: Prior of the distortion, and which line of the paint its markings are.
         tell: Called with frames done.
 
     Raises:
         InputError: The lines of a frame make no camera, or there is no such frame.
         ImageError: The clip cannot be read.
     """
-    pitch, policy = pitch or Pitch(), policy or CalibrationPolicy()
+    policy = policy or CalibrationPolicy()
+    pitch = policy.painted(pitch or Pitch())
+    clicked = replace(CLICKED, goal=pitch.goal) if pitch.goal == "laws" else CLICKED
     clip = clip if isinstance(clip, Clip) else Clip.open(clip)
     given: dict[int, Given] = {}
     for number, drawn in lines.items():
@@ -99,7 +101,7 @@ def track_clip(
                 f"{clip.path.name} has {clip.count} frames, and none of the number {number}",
                 hint="Frames count from 0.",
             )
-        found = calibrate(drawn, pitch, clip.size, CLICKED)
+        found = calibrate(drawn, pitch, clip.size, clicked)
         if found.camera is None:
             raise InputError(
                 f"the lines of frame {number} make no camera: {found.reason}",

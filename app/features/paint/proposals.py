@@ -203,10 +203,12 @@ def _task(
     if view is None or view.media is None:
         return None
     station, pitch = view.station, stored.group.pitch
+    # Which line of the paint is sought, where that is another than it always was.
+    lines = [policy.goal] if policy.painted(pitch) != pitch else []
     inputs = [
         SEARCH_VERSION,
         [camera_to_json(camera) for camera in known],
-        [float(pitch.length), float(pitch.width)],
+        [float(pitch.length), float(pitch.width), *lines],
         [view.size.width, view.size.height, station.flipped],
         [float(policy.distortion_mean), float(policy.distortion_sigma)],
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from app.paint.propose import propose
 from app.paint.view_proposal import proposal_of
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import POINTS_PER_MARKING
+from app.soccer.pitch import GoalEdge, Pitch
 from app.soccer.policy import PAPER
 from app.solving.calibrate import calibrate
 from tests.unit.paint.lawns import PITCH, SMALL, TRUE, drawn, lawn
@@ -81,3 +84,18 @@ def test_a_single_line_is_unsure() -> None:
     found = proposal_of(lawn(mask.astype(np.bool_)), SMALL, (), PITCH, POLICY)
     assert found.outcome == "unsure"
     assert found.lines == {} and found.sentence
+
+
+@pytest.mark.parametrize(("goal", "sought"), [("middle", "inner"), ("laws", "laws")])
+def test_a_policy_whose_lines_lie_by_the_laws_is_followed(
+    monkeypatch: pytest.MonkeyPatch, goal: GoalEdge, sought: GoalEdge
+) -> None:
+    tried: list[str] = []
+
+    def keep(_image: object, pitch: Pitch, *_: object) -> None:
+        tried.append(pitch.goal)
+        raise GeometryError("that was all")
+
+    monkeypatch.setattr(view_proposal, "propose", keep)
+    proposal_of(lawn(drawn(TRUE, 3)), SMALL, (), PITCH, replace(POLICY, goal=goal))
+    assert tried == [sought]

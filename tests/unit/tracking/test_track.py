@@ -11,8 +11,10 @@ import pytest
 from app.errors import ImageError, InputError
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.pitch import Pitch
+from app.soccer.pitch import GoalEdge, Pitch
+from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
+from app.tracking import track
 from app.tracking.track import FrameCamera, track_clip
 from tests.tripod_films import Film
 
@@ -123,3 +125,19 @@ def test_what_is_no_video_is_refused(tmp_path: Path):
     path.write_bytes(b"no video")
     with pytest.raises(ImageError, match=r"clip\.mp4 is no video"):
         track_clip(path, {})
+
+
+@pytest.mark.parametrize(("goal", "followed"), [("middle", "inner"), ("laws", "laws")])
+def test_a_policy_whose_lines_lie_by_the_laws_is_followed(
+    film: Film, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, goal: GoalEdge, followed: GoalEdge
+):
+    seen: list[str] = []
+
+    def keep(_clip: object, _given: object, pitch: Pitch, *_: object) -> None:
+        seen.append(pitch.goal)
+        raise InputError("that was all")
+
+    monkeypatch.setattr(track, "follow_shot", keep)
+    with pytest.raises(InputError, match="that was all"):
+        track_clip(film.write(tmp_path), {0: drawn(film, 0)}, None, CalibrationPolicy(goal=goal))
+    assert seen == [followed]
