@@ -41,9 +41,9 @@ async function askDevice(ask) {
 		if (found) return found.toJSON();
 	} catch (error) {
 		if (!(error instanceof DOMException)) throw error;
-		if (error.name === 'InvalidStateError') throw new ApiError(400, { detail: 'this device has a passkey of yours already' });
+		if (error.name === 'InvalidStateError') throw new ApiError(400, { detail: 'this device already has one of your passkeys' });
 	}
-	throw new ApiError(400, { detail: 'no passkey was used', hint: 'The device did not answer, or it was cancelled.' });
+	throw new ApiError(400, { detail: 'no passkey was used', hint: 'The device did not respond, or the request was cancelled.' });
 }
 
 /** The parts of an answer that are sent. @param {any} credential @param {object} response */

@@ -31,7 +31,7 @@ function detailOf(status, body) {
 	if (status === 0) return 'The server cannot be reached. Is it still running?';
 	if (typeof body?.detail === 'string') return body.detail;
 	if (typeof body?.title === 'string') return body.title;
-	return `The server answered ${status} without saying why.`;
+	return `The server responded with status ${status} and no explanation.`;
 }
 
 /** The sentence of what went wrong, for people. @param {unknown} error @returns {string} */

@@ -54,7 +54,7 @@ function record(fields) {
 export async function packFiles(files, name, signal) {
 	const bytes = files.reduce((sum, { path, file }) => sum + file.size + 2 * path.length + 200, 0);
 	if (files.length > MOST_FILES || bytes > MOST_BYTES) {
-		throw new Error('These are too many files to send at once: put them into several zips, or into a folder that the server may read.');
+		throw new Error('Too many files for one upload: split them into several zip files, or import them from a folder on the server.');
 	}
 	/** @type {BlobPart[]} */
 	const parts = [];

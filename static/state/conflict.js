@@ -125,7 +125,7 @@ export function keepMine() {
 
 /** Make again what they did not touch; where both changed the same, theirs stays. */
 export function mergeBoth() {
-	resolve((field) => !field.overlaps && !same(field.mine, field.theirs), 'Both were kept.');
+	resolve((field) => !field.overlaps && !same(field.mine, field.theirs), 'Both changes were kept.');
 }
 
 /** Drop my edits and go on with theirs. */

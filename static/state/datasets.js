@@ -46,7 +46,7 @@ export function noiseWords(policy) {
 }
 
 /** What these words mean. */
-export const NOISE_ASSUMED = 'σ follows from the noise of clicks that the policy assumes. The page Statistics shows what this dataset’s is; the policy “touchline” uses that';
+export const NOISE_ASSUMED = 'σ is computed from the annotation noise that the policy assumes. The page Statistics shows the noise measured in this dataset; the policy “touchline” uses the measured noise';
 
 /** Read the list again. */
 export async function loadDatasets() {

@@ -21,7 +21,7 @@ export function dismiss(finding, dismissed) {
 	const at = group.value;
 	if (!at || !submitDismissal(nameOf(finding), dismissed)) return;
 	did({ kind: 'dismissal', dataset: at.dataset.name, group: at.id, number: at.number, finding: nameOf(finding), dismissed });
-	announce(dismissed ? 'Finding dismissed: checked, fine.' : 'Finding open again.');
+	announce(dismissed ? 'Finding dismissed.' : 'Finding reopened.');
 }
 
 /** Dismiss the finding that the card speaks about, else the first that is open. */
@@ -37,7 +37,7 @@ export async function undoDismissal(action) {
 	if (!(await returnTo(action.group))) return;
 	if (submitDismissal(action.finding, !action.dismissed)) {
 		tookBack(action);
-		announce(action.dismissed ? 'Finding open again.' : 'Finding dismissed again.');
+		announce(action.dismissed ? 'Finding reopened.' : 'Finding dismissed again.');
 	} else complain(`The finding of group ${action.number} stays as it is.`);
 }
 
@@ -45,5 +45,5 @@ export async function undoDismissal(action) {
 export async function dismissAgain(action) {
 	if (!(await returnTo(action.group)) || !submitDismissal(action.finding, action.dismissed)) return;
 	didAgain(action);
-	announce(action.dismissed ? 'Finding dismissed again.' : 'Finding open again.');
+	announce(action.dismissed ? 'Finding dismissed again.' : 'Finding reopened.');
 }

@@ -9,7 +9,7 @@ import { REASONS } from './reasons.js';
 const MOST_NAMES = 3;
 const TOLD = { said: 'Commented', edited: 'Changed a comment', deleted: 'Deleted a comment', resolved: 'Resolved a thread', reopened: 'Reopened a thread' };
 const PLAIN = /** @type {Record<string, string>} */ ({
-	import: 'Imported', camera: 'A camera was imported', pitch: 'Set the size of the pitch', position: 'Set where cameras stand', paint: 'Read the paint of its pictures',
+	import: 'Imported', camera: 'Imported a camera', pitch: 'Set the size of the pitch', position: 'Set the camera positions', paint: 'Read the paint in its pictures',
 });
 
 /** @param {string[]} names */
@@ -34,14 +34,14 @@ function editWords(edit, letterOf) {
 		case 'set_lines': return `${lineWords(edit.lines, edit.source)}${where}`;
 		case 'set_station_lines': return `${lineWords(edit.lines, edit.source)} of a static camera`;
 		case 'set_balls': return `${edit.balls?.length ? 'placed the ball' : 'removed the ball'}${where}`;
-		case 'include_view': return edit.included ? `used view ${letterOf(edit.view)}` : `left view ${letterOf(edit.view)} out${edit.reason ? `: ${reasonWords(edit.reason)}` : ''}`;
+		case 'include_view': return edit.included ? `included view ${letterOf(edit.view)}` : `left view ${letterOf(edit.view)} out${edit.reason ? `: ${reasonWords(edit.reason)}` : ''}`;
 		case 'set_calibration': return `chose the ${edit.calibration} calibration${where}`;
 		case 'set_picture': return `set how the picture was changed${where}`;
 		case 'set_pitch': return `set the pitch to ${edit.length} × ${edit.width} m`;
-		case 'set_noise': return 'set the noise of its cameras and people';
+		case 'set_noise': return 'set the annotation noise of cameras and people';
 		case 'several': return edit.edits.map((/** @type {any} */ one) => editWords(one, letterOf)).join('; ');
 		case 'set_station_camera': return 'set the camera of a static camera';
-		default: return words(String(edit.edit ?? 'changed it')).toLowerCase();
+		default: return words(String(edit.edit ?? 'edited')).toLowerCase();
 	}
 }
 
@@ -59,8 +59,8 @@ function verdictWords({ state, reason, note, override }) {
 /** What became of somebody's own annotation. @param {string} kind @param {any} body */
 function ownWords(kind, { did, person, reason, of = [] }) {
 	if (did === 'handed back') return `Returned to ${person}${reason ? `: “${reason}”` : ''}`;
-	if (kind === 'take') return `Took over ${person}’s independent annotation`;
-	return did === 'agreed' ? `${of.join(' and ')} agree: ${person}’s annotation is used` : `Decided for ${person}’s annotation`;
+	if (kind === 'take') return `Applied ${person}’s independent annotation`;
+	return did === 'agreed' ? `${of.join(' and ')} agree: ${person}’s annotation is used` : `Chose ${person}’s annotation`;
 }
 
 /** @param {LogEntryJson} entry @param {(view: string) => string} letterOf letter of a view's key @returns {string} */

@@ -5,15 +5,15 @@
 /** @typedef {{name: string, label: string, note: string, options: FormatOption[], lines?: boolean, keepsPolicy?: boolean}} ImportFormat   `lines`: static cameras, whose lines are files of their own; `keepsPolicy`: no policy is chosen for it */
 
 /** @type {FormatOption} */
-const CALIBRATION = { name: 'calibration', label: 'Where a view has a given camera and lines', hint: 'which of them is used', kind: 'calibration' };
+const CALIBRATION = { name: 'calibration', label: 'If a view has both a camera and lines', hint: 'which of the two is used', kind: 'calibration' };
 /** @type {FormatOption} */
-const SIZE = { name: 'size', label: 'Size of the images', hint: 'width x height, for example 960x540; empty: the usual one', kind: 'size' };
+const SIZE = { name: 'size', label: 'Size of the images', hint: 'width x height, for example 960x540; empty: the usual size of the format', kind: 'size' };
 /** @type {FormatOption} */
-const CATEGORY = { name: 'ball_category', label: 'Category of the ball', hint: 'name or id, where the file calls it neither ball nor anything alike', kind: 'text' };
+const CATEGORY = { name: 'ball_category', label: 'Category of the ball', hint: 'name or id, if the category is not called ball or similar', kind: 'text' };
 /** @type {FormatOption} */
 const OFFSET = { name: 'frame_offset', label: 'Frame offset', hint: 'number in the ground truth minus number in the video: 8, or by camera 1=8,2=9', kind: 'offset' };
 /** @type {FormatOption} */
-const FLIPPED = { name: 'flipped', label: 'Mirrored cameras', hint: 'numbers, for example 2,6', kind: 'cameras' };
+const FLIPPED = { name: 'flipped', label: 'Mirrored cameras', hint: 'camera numbers, for example 2,6', kind: 'cameras' };
 
 /** @type {FormatOption} */
 const GROUPING = { name: 'grouping', label: 'Which pictures are one group', hint: 'a pattern of their names, with {instant} and {camera}', kind: 'grouping' };
@@ -28,7 +28,7 @@ export const IMPORT_FORMATS = [
 	{ name: 'issia', label: 'ISSIA', note: 'XGTF ground truth of the static cameras', options: [CALIBRATION, SIZE, OFFSET, FLIPPED], lines: true },
 	{ name: 'issia-3d', label: 'ISSIA-3D', note: 'ISSIA-3D.csv and issia_calibration.json', options: [CALIBRATION, SIZE, FLIPPED], lines: true },
 	{ name: 'sn-calibration', label: 'sn-calibration', note: 'a JSON of lines for each frame', options: [CALIBRATION, SIZE] },
-	{ name: 'cameras', label: 'Cameras', note: 'cameras for known frames', options: [{ ...SIZE, hint: 'for which the cameras were made, for example 960x540; empty: that of each view' }], keepsPolicy: true },
+	{ name: 'cameras', label: 'Cameras', note: 'cameras of frames that are imported already', options: [{ ...SIZE, hint: 'the image size that the cameras belong to, for example 960x540; empty: the size of each view' }], keepsPolicy: true },
 	{ name: 'gamestate', label: 'sn-gamestate', note: 'Labels-GameState.json', options: [CALIBRATION] },
 	{ name: 'coco', label: 'COCO', note: 'as Touchline, CVAT, Label Studio, Roboflow or FiftyOne export it', options: [CALIBRATION, CATEGORY] },
 	{ name: 'parquet', label: 'Parquet', note: 'as Touchline exports it', options: [] },

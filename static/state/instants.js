@@ -50,7 +50,7 @@ async function show(view, items, by) {
 	const ahead = items.map(({ offset }) => offset).concat(0).filter((offset) => (offset - present) * by > 0);
 	const offset = ahead.sort((a, b) => (a - b) * by)[0];
 	if (offset === undefined) {
-		inform(`There is no frame ${by < 0 ? 'before' : 'after'} this one to show: at most five each way, as far as they are on disk.`);
+		inform(`There is no frame ${by < 0 ? 'before' : 'after'} this one to show: at most five before and after, as far as they are on disk.`);
 		return;
 	}
 	const next = items.find((item) => item.offset === offset);

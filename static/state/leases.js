@@ -160,7 +160,7 @@ function goTo(answer, group) {
 /** @param {BatchJson} one */
 function sayDone(one) {
 	const left = one.groups - one.settled;
-	const more = left > 0 ? ' Others have the rest open, or it waits for other people.' : '';
+	const more = left > 0 ? ' Other people have the remaining groups open, or have to work on them first.' : '';
 	inform(`No more groups for you in “${one.name}”.${more}`, { label: 'My work', run: () => navigate('/work') });
 }
 
@@ -193,7 +193,7 @@ export async function submitAndOpenNext() {
 	settle();
 	await arrived(held.group);
 	if (outbox.value.some((item) => item.group === held.group)) {
-		announce('First choose which version to keep.');
+		announce('First resolve the conflict: choose which version to keep.');
 		return;
 	}
 	try {

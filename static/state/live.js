@@ -45,7 +45,7 @@ async function catchUp() {
 		if (newer.etag === at.etag || groupDocument.value?.id !== at.id) return;
 		renew(newer);
 		changedElsewhere.value = { group: at.id, actor: told.actor, at: Date.now() };
-		announce('This group was changed elsewhere and is shown as it is now.');
+		announce('Another person or window changed this group; the page shows the new state.');
 	} catch (error) {
 		// The next visit reads it again.
 		if (!(error instanceof ApiError)) throw error;

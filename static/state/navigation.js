@@ -122,7 +122,7 @@ async function go(step, otherwise, stillWanted = () => true) {
 	}
 	if (id === undefined) {
 		const unknown = neighbours.value?.id !== from;
-		announce(unknown ? 'The queue cannot be read while the server is away.' : otherwise);
+		announce(unknown ? 'The queue cannot be read while the server is unreachable.' : otherwise);
 		return unknown;
 	}
 	leaveFor(id);

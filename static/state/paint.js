@@ -165,6 +165,6 @@ function stageProposed({ lines: proposed, sentence }) {
 	const there = Object.keys(lines.value).length > 0;
 	const { all, added } = besideDrawn(lines.value, proposed);
 	stageLines(all, 'Lines proposed from the paint', PROPOSED);
-	const next = there ? 'What was drawn stays; check, then save.' : 'Check the sides, then save. Swap sides (M) turns them round.';
+	const next = there ? 'Lines already drawn are kept; check, then save.' : 'Check left and right, then save. Swap sides (M) exchanges them.';
 	announce(`${plural(added.length, 'marking')} proposed. ${sentence ? `${sentence} ` : ''}${next}`);
 }

@@ -152,7 +152,7 @@ function isHidden() {
 export function acceptMark(view, mark, replace = false) {
 	if (isHidden()) return;
 	if (view.balls.length > 0 && !replace) {
-		complain(`View ${view.letter} has a ball already. Delete it first, or put the prediction in its place.`, {
+		complain(`View ${view.letter} has a ball already. Delete it first, or replace it by the prediction.`, {
 			label: 'Replace it', run: () => acceptMark(view, mark, true),
 		});
 		return;
@@ -170,8 +170,8 @@ export function acceptInHand() {
 	const marks = marksIn(view);
 	const mark = object?.kind === 'prediction' ? marks.find(({ id }) => id === object.prediction) : surest(marks);
 	if (mark) acceptMark(view, mark);
-	else if (marks.length) announce(`No prediction in view ${view.letter} is sure enough: select one to accept it.`);
-	else announce(`Nothing is predicted in view ${view.letter}.`);
+	else if (marks.length) announce(`No prediction in view ${view.letter} is above the threshold: select one to accept it.`);
+	else announce(`There is no prediction in view ${view.letter}.`);
 }
 
 /** Give every view of the group that has no ball its surest prediction; each is an edit of its own. */
@@ -181,5 +181,5 @@ export function acceptAll() {
 	if (!present || !shown || isHidden()) return;
 	const edits = acceptEdits(present, shown.views);
 	for (const edit of edits) submit(edit);
-	announce(edits.length ? `${plural(edits.length, 'prediction')} accepted.` : 'Every view with a sure prediction has a ball already.');
+	announce(edits.length ? `${plural(edits.length, 'prediction')} accepted.` : 'Every view with a prediction above the threshold has a ball already.');
 }

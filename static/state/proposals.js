@@ -83,8 +83,8 @@ async function ask(state, abort) {
 /** Why there is no proposal for a view. @param {ViewJson} view */
 function whyNone(view) {
 	if (!waitsForLines(view, groupDocument.value?.solution ?? null)) return `View ${view.letter} has a camera already.`;
-	const looked = `Nothing was proposed for view ${view.letter} yet: “Propose lines” in the result searches its picture, Statistics those of all.`;
-	return view.station.shared ? `${looked} Of a static camera the first view with a picture has the proposal, maybe in another group.` : looked;
+	const looked = `No lines are proposed for view ${view.letter} yet. “Propose lines” on the result card searches this picture; the page Statistics searches all pictures.`;
+	return view.station.shared ? `${looked} For a static camera, the proposal is shown at the first view with a picture, perhaps in another group.` : looked;
 }
 
 /** Look at the picture of a view for lines; what is found is shown as proposed. @param {ViewJson} view */
@@ -112,13 +112,13 @@ export function acceptProposal(view) {
 	const item = proposals.peek().get(view.key);
 	if (!item) announce(whyNone(view));
 	else if (item.outcome !== 'proposed') complain(`No lines are proposed for view ${view.letter}. ${item.sentence}`);
-	else if (overlaysHidden.value) complain('What is proposed is hidden. H shows what you would accept.');
+	else if (overlaysHidden.value) complain('The proposed lines are hidden. Press H to see what you would accept.');
 	else {
 		const names = Object.keys(item.lines);
 		submit({ kind: 'lines', view: view.key, lines: item.lines, proposed: names });
 		const drawn = Object.keys(view.lines).length;
 		const beside = drawn ? `, beside the ${plural(drawn, 'marking')} that ${drawn === 1 ? 'is' : 'are'} drawn` : '';
-		announce(`${plural(names.length, 'marking')} of view ${view.letter} accepted as proposed${beside}. Undo takes them back; M swaps the sides.`);
+		announce(`${plural(names.length, 'marking')} of view ${view.letter} accepted as proposed${beside}. Undo removes them; M swaps left and right.`);
 	}
 }
 

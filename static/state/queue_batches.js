@@ -18,7 +18,7 @@ import { openQueue, queue } from './queue.js';
 export function announceBatch({ batch, changed, refused }, state, dataset) {
 	const left = refused.reduce((sum, { groups }) => sum + groups, 0);
 	const text = batchText(changed, state);
-	const rest = left ? ` ${count(left)} ${left === 1 ? 'stays as it was' : 'stay as they were'}.` : '';
+	const rest = left ? ` ${count(left)} ${left === 1 ? 'is unchanged' : 'are unchanged'}.` : '';
 	if (batch === null) {
 		inform(`${text}.${rest}`);
 		return;
@@ -76,7 +76,7 @@ export async function redoBatch(action) {
 /** Groups that stay as they are, as a sentence; '' for none. @param {number} groups @param {string} why */
 function stayed(groups, why) {
 	if (groups === 0) return '';
-	return ` ${plural(groups, 'group')} ${groups === 1 ? 'was' : 'were'} ${why} and ${groups === 1 ? 'stays as it is' : 'stay as they are'}.`;
+	return ` ${plural(groups, 'group')} ${groups === 1 ? 'was' : 'were'} ${why} and ${groups === 1 ? 'is unchanged' : 'are unchanged'}.`;
 }
 
 /** What is on screen, as it is now. */

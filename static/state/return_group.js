@@ -38,7 +38,7 @@ export const frozen = computed(() => {
 	if (one === null || one.group !== groupDocument.value?.id) return '';
 	if (one.settled !== null) return 'This annotation was adjudicated already; it can no longer be changed.';
 	const mine = !isTeam || one.person === myName.value;
-	if (one.submitted !== null) return mine ? 'This is submitted; only a lead can return it.' : `${one.person} has submitted this; return it, or take it over.`;
+	if (one.submitted !== null) return mine ? 'This annotation is submitted; only a lead can return it.' : `${one.person} has submitted this group; return it, or take it over.`;
 	return mine ? '' : `${one.person} reviews this annotation.`;
 });
 
@@ -91,11 +91,11 @@ export function askTakeOver() {
 	if (!canTakeOver.value || !one) return;
 	question.value = {
 		kind: 'over', person: one.person,
-		says: `What ${one.person} changed here, and their verdict${one.verdict ? ` (${one.verdict})` : ''}, go into the group under their name. This annotation can then no longer be changed; annotations of others are set aside. Undo in the group reverts the change.`,
+		says: `The changes of ${one.person}, and their verdict${one.verdict ? ` (${one.verdict})` : ''}, are applied to the group under their name. This annotation can then no longer be changed, and other people’s annotations of the group are not used. Undo in the group reverts the change.`,
 		send: async () => {
 			const { id } = await postAdoption(one.group);
 			navigate(reviewAddress(id));
-			inform(`${one.person}’s annotation is in the group now. Undo (Ctrl Z) reverts the change.`);
+			inform(`${one.person}’s annotation is applied to the group. Undo (Ctrl Z) reverts the change.`);
 		},
 	};
 }

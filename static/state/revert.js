@@ -33,8 +33,8 @@ export async function revertSelected() {
 /** @param {Selection} object @param {Entry[]} entries */
 function revert(object, entries) {
 	const edit = originalOf(object, entries);
-	if (edit === null) announce('Nothing to reset: nobody has edited this.');
-	else if (edit === 'several') complain('The dataset brought several balls here: undo brings them back.');
+	if (edit === null) announce('Nothing to reset: this object was never edited.');
+	else if (edit === 'several') complain('The imported data has several balls in this view: use undo to restore them.');
 	else if (group.value) {
 		selected.value = object.kind === 'ball' ? object : null;
 		submit(edit);

@@ -25,8 +25,8 @@ export function swapWarning(group, solution, view) {
 	const here = nearness(solution, view);
 	// Back to the near side is where broadcast cameras stand.
 	if (here === null || here <= 0 || swappedViews(solution).includes(view.key)) return null;
-	if (view === group.views[0]) return `${view.letter} is the main camera: it would move across the pitch, to the side where no main camera stands.`;
+	if (view === group.views[0]) return `${view.letter} is the main camera: the swap would move it to the other side of the pitch, where no main camera stands.`;
 	const beyond = group.views.filter((other) => other.key !== view.key && (nearness(solution, other) ?? 0) < 0);
 	if (beyond.length === 0) return null;
-	return `Two cameras, ${[...beyond, view].map(({ letter }) => letter).join(' and ')}, would then stand on the far side of the pitch.`;
+	return `After the swap, two cameras, ${[...beyond, view].map(({ letter }) => letter).join(' and ')}, would stand on the far side of the pitch.`;
 }

@@ -69,8 +69,8 @@ function missingBalls(shown, solved) {
 		// Where there is no 3D ball yet, another view's ball may bring it.
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
 		const seen = shown.views.some((other) => other !== view && other.balls.length > 0 && solved.views.some((one) => one.view === other.key && one.calibration.camera));
-		const where = seen ? 'The dotted line is the ray of another view: the ball lies on it.' : 'No other view shows where it is.';
-		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With it ${view.letter} may form the missing pair.` : '';
+		const where = seen ? 'The dotted line is the ray of another view: the ball lies on it.' : 'No other view shows where the ball is.';
+		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With a ball, ${view.letter} may form the missing pair of views.` : '';
 		return [{
 			view: view.key, caption: '',
 			...(place ? { label: 'Place it there', run: placeExpected } : { label: 'Draw it', guide: { ball: true } }),
@@ -98,7 +98,7 @@ function proposedLines(shown, proposed) {
 	return shown.views.flatMap((view) => {
 		const item = proposed.get(view.key);
 		if (item?.outcome !== 'proposed') return [];
-		const drawn = Object.keys(view.lines).length && !item.sentence ? ' What is drawn stays.' : '';
+		const drawn = Object.keys(view.lines).length && !item.sentence ? ' Lines already drawn are kept.' : '';
 		return [{
 			view: view.key, label: 'Accept the lines', caption: '', passes: false,
 			run: (at) => import('./proposals.js').then(({ acceptProposal }) => acceptProposal(at)),

@@ -115,7 +115,7 @@ function decide(state, reason, note) {
 		return;
 	}
 	if (conflict.value) {
-		announce('First choose which version to keep.');
+		announce('First resolve the conflict: choose which version to keep.');
 		return;
 	}
 	asking.value = null;

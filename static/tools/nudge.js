@@ -38,7 +38,7 @@ function moved(dx, dy) {
 		return ball && moveBall(view, ball, dx, dy);
 	}
 	if (object.kind === 'prediction') {
-		announce('A prediction does not move before it is accepted.');
+		announce('Accept the prediction first: it cannot be moved before.');
 		return null;
 	}
 	const point = view.lines[object.marking]?.[object.index];
@@ -64,7 +64,7 @@ export function deleteSelected() {
 	if (!object || !group.value) return;
 	const view = viewOf(group.value, object.view);
 	if (object.kind === 'prediction') {
-		announce('A prediction is not deleted here: it counts for nothing until it is accepted.');
+		announce('A prediction cannot be deleted here. It is not used unless a person accepts it.');
 		return;
 	}
 	selected.value = null;

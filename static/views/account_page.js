@@ -49,7 +49,7 @@ function PasswordForm({ changed }) {
 			<form class="form" onSubmit=${send}>
 				<input class="hidden-text" name="username" autocomplete="username" value=${me.value?.name ?? ''} readonly tabindex="-1" aria-hidden="true" />
 				<div class="form__row"><label for="password-old">Current password</label><input class="field" id="password-old" name="old" type="password" required maxlength="200" autocomplete="current-password" /></div>
-				<div class="form__row"><label for="password-new">New password</label><input class="field" id="password-new" name="new" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 letters. All your other sessions end.</small></div>
+				<div class="form__row"><label for="password-new">New password</label><input class="field" id="password-new" name="new" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 characters. All your other sessions end.</small></div>
 				<${FormError} error=${error} />
 				<p class="buttons"><button class="button" type="submit" aria-disabled=${busy}>Change password</button><span role="status">${done ? 'Password changed.' : ''}</span></p>
 			</form>

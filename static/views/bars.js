@@ -15,9 +15,9 @@ function BarredBar() {
 	if (waiting.length === 0) return null;
 	return html`
 		<div class="bar" data-tone="bad" role="alert">
-			<p>${plural(waiting.length, 'change')} of yours ${waiting.length === 1 ? 'waits' : 'wait'} here: ${waiting[0].barred}. ${waiting.length === 1 ? 'It is' : 'They are'} sent once you have the right.</p>
+			<p>${plural(waiting.length, 'change')} of yours ${waiting.length === 1 ? 'is' : 'are'} not saved yet: ${waiting[0].barred}. This browser keeps ${waiting.length === 1 ? 'it' : 'them'} until your role allows it.</p>
 			<button class="button" type="button" onClick=${tryBarred}>Try again</button>
-			<button class="button" type="button" onClick=${() => discard((item) => Boolean(item.barred))}>Drop ${waiting.length === 1 ? 'it' : 'them'}</button>
+			<button class="button" type="button" onClick=${() => discard((item) => Boolean(item.barred))}>Discard ${waiting.length === 1 ? 'it' : 'them'}</button>
 		</div>
 	`;
 }

@@ -21,10 +21,10 @@ import { FormDialog } from './dialog.js';
 /** @typedef {{count: number, q: string} | null} Ticked   what is ticked, and the query that finds it */
 
 const STATES = [
-	{ state: 'accepted', verb: 'Accept', note: 'they may enter a version' },
-	{ state: 'rejected', verb: 'Reject', note: 'they stay out, with a reason' },
+	{ state: 'accepted', verb: 'Accept', note: 'can be part of a version' },
+	{ state: 'rejected', verb: 'Reject', note: 'left out of versions, with a reason' },
 	{ state: 'deferred', verb: 'Defer', note: 'to be reviewed later' },
-	{ state: 'unreviewed', verb: 'Withdraw', note: 'back to unreviewed' },
+	{ state: 'unreviewed', verb: 'Withdraw', note: 'remove the verdict' },
 ];
 
 /** Why a group is left alone. */
@@ -32,8 +32,8 @@ const REFUSALS = /** @type {{[reason: string]: string}} */ ({
 	submitted: 'they are independent annotations that were submitted',
 	unsolved: 'they are not solved yet',
 	needs_note: 'they fail a gate, and accepting that needs a note',
-	unusable_ball: 'their ball cannot be used (below the grass, or known to metres only), and accepting that needs a note',
-	no_picture: 'no view of them has a picture, and accepting that needs a note',
+	unusable_ball: 'their 3D ball is unusable (below the grass, or uncertain by metres), and accepting that needs a note',
+	no_picture: 'none of their views has a picture, and accepting that needs a note',
 });
 
 /** @param {{preview: BulkPreview, q: string}} props */
@@ -95,7 +95,7 @@ function Which({ q, total, ticked, chosen, choose }) {
 			<legend>Groups</legend>
 			<label>
 				<input type="radio" name="which" checked=${chosen} onChange=${() => choose(true)} />
-				<span>${count(ticked.count)} ticked<small>those with a tick in the list</small></span>
+				<span>${count(ticked.count)} ticked<small>the groups ticked in the list</small></span>
 			</label>
 			<label>
 				<input type="radio" name="which" checked=${!chosen} onChange=${() => choose(false)} />
@@ -120,7 +120,7 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 		: preview.waiting ? 'Counting' : would === 0 ? 'Nothing would change' : '';
 	async function send() {
 		if (why) return;
-		setState({ busy: 'Deciding…', error: '' });
+		setState({ busy: 'Saving the verdicts…', error: '' });
 		try {
 			announceBatch(await postVerdicts(dataset.id, { q: asked, ...ask, expected: would }), verdict, dataset.name);
 			onClose();

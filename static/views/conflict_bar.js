@@ -70,7 +70,7 @@ export function ConflictBar() {
 	return html`
 		<section class="bar conflict" data-tone="warn" role="alert" aria-label="Conflict">
 			<div class="conflict__words">
-				<p><strong>Another person changed this group first.</strong> Their version is drawn, yours is dotted beside it. Choose which to keep.</p>
+				<p><strong>Another person changed this group first.</strong> Their version is shown solid, yours dotted. Choose which to keep.</p>
 				<table class="conflict__fields">
 					<thead><tr><th scope="col">what</th><th scope="col">before</th><th scope="col">theirs</th><th scope="col">yours</th><th scope="col"><span class="hidden-text">overlap</span></th></tr></thead>
 					<tbody>${present.fields.map((field) => html`<${FieldRow} key=${field.key} field=${field} />`)}</tbody>
@@ -78,7 +78,7 @@ export function ConflictBar() {
 			</div>
 			<button class="button button--primary" type="button" onClick=${keepMine}>Keep mine</button>
 			<button class="button" type="button" onClick=${takeTheirs}>Take theirs</button>
-			${present.mergeable ? html`<button class="button" type="button" onClick=${mergeBoth}>Merge what does not overlap</button>` : null}
+			${present.mergeable ? html`<button class="button" type="button" onClick=${mergeBoth}>Merge changes that do not overlap</button>` : null}
 		</section>
 	`;
 }

@@ -94,7 +94,7 @@ function MenuBody({ current, name }) {
 			<ul>${plainPages().map((page) => html`
 				<li key=${page.name}><a href=${page.href} aria-current=${mark(page.name)}>${page.label}</a></li>`)}
 			</ul>
-			<p class="empty-note"><kbd>Ctrl K</kbd> finds everything</p>
+			<p class="empty-note"><kbd>Ctrl K</kbd> searches everything</p>
 		</section>
 	`;
 }

@@ -57,8 +57,8 @@ function Choice({ legend, name, options, why = '', onChoose = () => {} }) {
 /** @param {DatasetJson} one */
 function groupChoices(one) {
 	return [
-		{ name: 'accepted', label: `Accepted groups · ${count(one.accepted)}`, note: 'accepted by people' },
-		{ name: 'all', label: `All groups · ${count(one.groups)}`, note: 'with the verdict as a column where there is room' },
+		{ name: 'accepted', label: `Accepted groups · ${count(one.accepted)}`, note: 'groups that people accepted' },
+		{ name: 'all', label: `All groups · ${count(one.groups)}`, note: 'with the verdict in a column, if the format has one' },
 	];
 }
 
@@ -73,7 +73,7 @@ function Result({ made }) {
 	const counts = Object.entries(made.counts ?? {}).map(([name, n]) => counted(n, name));
 	return html`
 		<p class="export__result" role="status">
-			${made.incomplete ? 'Written, but not complete' : 'Ready'}${counts.length ? `: ${counts.join(', ')}` : ''}.
+			${made.incomplete ? 'Export finished, but incomplete' : 'Ready'}${counts.length ? `: ${counts.join(', ')}` : ''}.
 			${made.incomplete ? html`${' '}<strong data-grade="warn">${made.incomplete}.</strong>${' '}` : null}
 			<a href=${made.content} download>Download again</a>
 		</p>
@@ -103,9 +103,9 @@ export function ExportDialog({ one, version = null, onClose }) {
 	const used = reasons.find(({ format }) => format === chosen)?.options;
 	/** Why the chosen format has no use for an option; empty: it has. @param {string} option @param {string} sentence */
 	const unused = (option, sentence) => (used && !used.includes(option) ? sentence : '');
-	const noFrames = unused('images', 'This format holds no frames');
-	const noViews = unused('views', 'COCO and YOLO alone leave balls out');
-	const none = !version && !all && one.accepted === 0 && chosen !== 'touchline' ? 'Nobody has accepted a group yet' : '';
+	const noFrames = unused('images', 'This format contains no frames');
+	const noViews = unused('views', 'Only COCO and YOLO leave out unconfirmed balls');
+	const none = !version && !all && one.accepted === 0 && chosen !== 'touchline' ? 'No group is accepted yet' : '';
 	const why = state.busy ? 'Under way' : isPossible(chosen) ? none : reasons.find(({ format }) => format === chosen)?.reason ?? '';
 	/** @param {FormData} form */
 	async function send(form) {
@@ -142,7 +142,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 					<div class="export__column">
 						${version ? html`<p class="note">${plural(version.counts.groups, 'group')} as frozen: always the same bytes.</p>`
 							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} onChoose=${(/** @type {string} */ name) => setAll(name === 'all')} />`}
-						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} why=${unused('boxes', 'This format holds no box to choose')} />
+						<${Choice} legend="Ball boxes" name="boxes" options=${BOXES} why=${unused('boxes', 'This format contains no ball boxes')} />
 						<label class="form__check" data-disabled=${noFrames !== ''} title=${noFrames || undefined}><input type="checkbox" name="images" disabled=${noFrames !== ''} />Copy the frames into the zip</label>
 						<label class="form__check" data-disabled=${noViews !== ''} title=${noViews || undefined}><input type="checkbox" name="views" disabled=${noViews !== ''} />COCO and YOLO: include balls that no other view confirms</label>
 					</div>

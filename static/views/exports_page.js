@@ -48,7 +48,7 @@ function Row({ row, remove, again }) {
 			<td><${When} at=${row.created} /></td>
 			<td><span class="table__actions">
 				${row.content ? html`<a class="button button--small" href=${row.content} download>Download<span class="hidden-text"> export ${row.id}</span></a>` : null}
-				${row.status === 'expired' ? html`<button class="button button--small" type="button" data-needs="review" data-of=${row.request.dataset} title="Its file was deleted after some days. This writes it again, as the dataset is now" onClick=${again}>Export again<span class="hidden-text">: export ${row.id}</span></button>` : null}
+				${row.status === 'expired' ? html`<button class="button button--small" type="button" data-needs="review" data-of=${row.request.dataset} title="The file was deleted after some days. Export the dataset again, in its present state" onClick=${again}>Export again<span class="hidden-text">: export ${row.id}</span></button>` : null}
 				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : ['ready', 'failed', 'cancelled'].includes(row.status) ? html`<button class="button button--small" type="button" data-needs="lead" data-of=${row.request.dataset} onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
 			</span></td>
 		</tr>
@@ -77,7 +77,7 @@ export function ExportsPage() {
 			${exports.error ? html`<${Trouble} title="The exports cannot be shown" error=${exports.error} retry=${exports.reload} />` : null}
 			${!exports.value && !exports.error ? html`<${Loading} what="exports" />` : null}
 			${error ? html`<${FormError} error=${error} card=${true} />` : null}
-			${exports.value && items.length === 0 ? html`<section class="card empty"><h2>No export yet</h2><p>An export is a zip with a manifest: what is in it, by which policy, with the digest of each file.</p></section>` : null}
+			${exports.value && items.length === 0 ? html`<section class="card empty"><h2>No export yet</h2><p>An export is a zip file of a dataset in a format of your choice. Its manifest lists the contents, the policy and the digest of each file.</p></section>` : null}
 			${items.length ? html`
 				<section class="card card--flush" aria-label="Exports">
 					<table class="table">

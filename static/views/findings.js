@@ -28,11 +28,11 @@ function Finding({ group, finding }) {
 				${view ? html`<button class="row-button" type="button" aria-label=${`Focus view ${view.letter}`} onClick=${() => pointTo(group, { ...finding, index: finding.fix?.index ?? null })}><${Letter} letter=${view.letter} /></button>` : null}
 				${checked ? html`<s><strong>${title}${sure}.</strong> ${finding.sentence}</s>` : html`<strong>${title}${sure}.</strong> ${finding.sentence}`}
 			</p>
-			${checked ? html`<p class="finding__checked">Checked, fine${checked.by === 'local' ? '' : `: ${checked.by}`}, <${When} at=${checked.at} />${checked.note ? ` · “${checked.note}”` : ''}</p>` : null}
+			${checked ? html`<p class="finding__checked">Dismissed${checked.by === 'local' ? '' : ` by ${checked.by}`}, <${When} at=${checked.at} />${checked.note ? ` · “${checked.note}”` : ''}</p>` : null}
 			${finding.kind === 'pitch_size' ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			${html`
 				<p class="finding__fixes">
-					<button type="button" data-needs="review" class="button button--small" title=${checked ? 'Let this finding count again' : 'This finding was checked and is fine: it no longer flags the group'} onClick=${() => dismiss(finding, !checked)}>${checked ? 'Look again' : 'Checked, fine'}<span class="hidden-text"> ${title}</span></button>
+					<button type="button" data-needs="review" class="button button--small" title=${checked ? 'Make this finding flag the group again' : 'You checked this finding and it is fine: it no longer flags the group'} onClick=${() => dismiss(finding, !checked)}>${checked ? 'Reopen' : 'Dismiss'}<span class="hidden-text"> ${title}</span></button>
 					${offered.map((suggestion) => html`<button type="button" data-needs="annotate" class="button button--fix" onClick=${() => carryOut(suggestion)}>${suggestion.label}</button>`)}
 				</p>`}
 		</li>
@@ -52,7 +52,7 @@ export function Findings({ group, solution }) {
 	const open = openFindings({ ...solution, findings }).length;
 	return html`
 		<section class="card" aria-label="Findings">
-			<h2>${more ? 'More findings' : 'Findings'} · ${open}${open < findings.length ? ` open, ${findings.length - open} checked` : ''}</h2>
+			<h2>${more ? 'More findings' : 'Findings'} · ${open}${open < findings.length ? ` open, ${findings.length - open} dismissed` : ''}</h2>
 			<ul class="findings">
 				${findings.map((finding, i) => html`<${Finding} key=${i} group=${group} finding=${finding} />`)}
 			</ul>

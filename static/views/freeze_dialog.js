@@ -31,7 +31,7 @@ const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: s
 const SPLITS = /** @type {{kind: SplitRequest['kind'], label: string, note: string}[]} */ ([
 	{ kind: 'given', label: 'As given', note: 'the split of the source' },
 	{ kind: 'match', label: 'By match', note: 'random by seed; each match is on one side' },
-	{ kind: 'camera', label: 'By camera', note: 'some static cameras are for testing' },
+	{ kind: 'camera', label: 'By camera', note: 'the views of some static cameras are for testing' },
 ]);
 
 /** @param {{split: SplitRequest, change: (split: SplitRequest) => void}} props */
@@ -73,7 +73,7 @@ function Plan({ plan, split }) {
 	return html`
 		<div class="bulk__outcome" role="status">
 			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group is' : 'groups are'} included${plan.groups ? html`: ${splitTexts(plan.splits).join(', ')}` : ''}.</p>
-			${split.kind === 'match' && plan.groups ? html`<p class="note">A match is in one split with all its groups, so the share of groups is near that of matches, not equal to it.</p>` : null}
+			${split.kind === 'match' && plan.groups ? html`<p class="note">All groups of a match are in the same split, so the share of groups can differ a little from the share of matches.</p>` : null}
 			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} ${plan.unsolved === 1 ? 'is' : 'are'} not solved yet.</p>` : null}
 			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} ${n === 1 ? 'stays' : 'stay'} out: ${words(why).replace(': ', ', ')}</li>`)}</ul>` : null}
 		</div>
@@ -99,7 +99,7 @@ function FreezeFields({ ask, change }) {
 		<div class="form__row">
 			<label for="freeze-licence">Licence</label>
 			<textarea class="field" id="freeze-licence" rows="3" value=${ask.licence} onInput=${withValue((licence) => change({ licence }))}></textarea>
-			<small>Empty: the licences of the sources.</small>
+			<small>If empty: the licences of the sources.</small>
 		</div>
 	`;
 }

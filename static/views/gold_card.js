@@ -19,7 +19,7 @@ import { Term } from './term.js';
 /** What annotators of a gold group may begin with. */
 export const STARTS = [['imported', 'the imported annotations'], ['without_balls', 'lines without balls'], ['bare', 'pictures only']];
 /** Where the truth of a group is from. */
-const FROM = { verdict: 'its annotations when it was marked', sample: 'the values it was generated from', version: 'a frozen version' };
+const FROM = { verdict: 'its annotations at the time it was marked', sample: 'the values it was generated from', version: 'a frozen version' };
 const WIDE = 160, HIGH = 28;
 
 /** A median with its interval; few numbers have none. @param {MedianIntervalJson} one @param {number} digits */
@@ -84,7 +84,7 @@ export function GoldCard({ dataset }) {
 			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
 			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} with known truth.` : 'None yet.'} Review a group, then choose <em>Mark as gold group</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> use groups of a sample or a version. Batches mix them in without marking them.</p>
-			<p class="gold__about">While a batch is open, its annotators see neither the originals of its groups nor gold groups, every copy begins alike, and their first submission is measured. This cannot hide what a person remembers, finds in another dataset, or hears from others: make gold groups of frames that annotators have not seen.</p>
+			<p class="gold__about">While a batch is open, its annotators see neither the originals of its groups nor gold groups, every copy starts with the same kind of content, and their first submission is measured. People may still remember a frame or find it in another dataset: make gold groups of frames that the annotators have not seen.</p>
 			${value?.people.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="People and gold groups"><table class="table">
 					<thead><tr><th>Person</th><th data-numeric="true">groups</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">ball, m</th><th data-numeric="true">correct verdicts</th><th>over time</th></tr></thead>

@@ -23,7 +23,7 @@ function Past({ found, group }) {
 	const judged = state !== 'unreviewed' && at ? versionAt(versions, at) : number;
 	if (versions.length < 2) return null;
 	return html`
-		${judged !== number ? html`<p class="guidelines__past" role="status">${judged === null ? 'There were no guidelines' : `Version ${judged} was in force`} when ${by ?? 'a reviewer'} reviewed this group.</p>` : null}
+		${judged !== number ? html`<p class="guidelines__past" role="status">${judged === null ? 'There were no guidelines yet' : `Version ${judged} was in force`} when ${by ?? 'a reviewer'} reviewed this group.</p>` : null}
 		<details open=${judged !== number}><summary>Versions, and what each changed</summary><${GuidelinesVersions} found=${found} may=${false} inForce=${judged} /></details>
 	`;
 }

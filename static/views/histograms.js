@@ -14,8 +14,8 @@ import { BinAxis, endsOf, noneOf, short } from './bin_axis.js';
 /** @import {Histogram} from '../api/types.js' */
 
 const COLUMNS = [
-	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', title: 'The lowest share of field lines that fit, of the views of a group' },
-	{ name: 'agreement', field: 'agreement', label: 'paint agrees', title: 'The least agreement of a camera with the paint of its picture, of the views of a group: supported times explained' },
+	{ name: 'jac', field: 'jac', label: 'min JaC 0.5 %', title: 'Share of field lines that fit, in the worst view of a group' },
+	{ name: 'agreement', field: 'agreement', label: 'paint agrees', title: 'How well camera and paint agree, in the worst view of a group: supported times explained' },
 	{ name: 'error_percent', field: 'error_percent', label: 'ball error, %', title: 'Reprojection error of the best pair of views, in per cent of the picture’s diagonal; logarithmic' },
 	{ name: 'sigma', field: 'sigma', label: 'σ, m', title: 'Uncertainty of the ball’s position, metres; logarithmic' },
 	{ name: 'parallax', field: 'parallax', label: 'parallax, °', title: 'The largest angle between two rays to the ball' },

@@ -24,9 +24,9 @@ import { SourceChoice, UploadField } from './source_choice.js';
 /** @typedef {{[name: string]: any}} Options */
 
 const POLICIES = [
-	{ name: '', label: 'by the pictures: touchline where most views have one, else paper' },
+	{ name: '', label: 'automatic: touchline if most views have a picture, otherwise paper' },
 	{ name: 'touchline', label: 'touchline: cameras from the paint of the pictures, noise estimated' },
-	{ name: 'paper', label: 'paper: cameras from the clicks, thresholds and noise of the paper' },
+	{ name: 'paper', label: 'paper: cameras from the annotated lines, thresholds and noise of the paper' },
 	{ name: 'strict', label: 'strict: as paper, with rays 5° apart and σ below 0.5 m' },
 ];
 
@@ -44,10 +44,10 @@ function GroupingField({ option, change }) {
 		<div class="form__row">
 			<label for="option-grouping">${option.label}</label>
 			<select class="field" id="option-grouping" onChange=${withValue((next) => tell(next, pattern))}>
-				<option value="">each picture is a group</option><option value="folder">those of a folder are one group</option><option value="pattern">by their names</option>
+				<option value="">each picture is a group</option><option value="folder">the pictures of a folder are one group</option><option value="pattern">by their names</option>
 			</select>
 			${how === 'pattern' ? html`<input class="field" id="option-pattern" aria-label="Pattern of the names" autocomplete="off" maxlength="200" value=${pattern} onInput=${withValue((names) => tell(how, names))} />` : null}
-			<small>${how === 'pattern' ? option.hint : 'A group is one instant, seen by one camera or more. The dry run says what they become.'}</small>
+			<small>${how === 'pattern' ? option.hint : 'A group is one instant, seen by one camera or more. The dry run shows the resulting groups.'}</small>
 		</div>
 	`;
 }
@@ -68,8 +68,8 @@ function OptionField({ option, apart, change }) {
 			<div class="form__row">
 				<label for=${id}>${option.label}</label>
 				<select class="field" id=${id} onChange=${withValue((choice) => change(choice || undefined))}>
-					<option value="">the given camera${apart ? ', measured by the lines' : ''}</option>
-					${apart ? html`<option value="given">the given camera, lines left aside</option>` : null}
+					<option value="">the given camera${apart ? '; lines check it' : ''}</option>
+					${apart ? html`<option value="given">the given camera; lines are ignored</option>` : null}
 					<option value="lines">the lines</option>
 				</select>
 			</div>
@@ -104,10 +104,10 @@ function PolicyField({ kept, change }) {
 	return html`
 		<div class="form__row">
 			<label for="import-policy">Policy</label>
-			<select class="field" id="import-policy" disabled=${kept} title=${kept ? 'The dataset is there and keeps its policy' : ''} onChange=${withValue(change)}>
+			<select class="field" id="import-policy" disabled=${kept} title=${kept ? 'This dataset exists already and keeps its policy' : ''} onChange=${withValue(change)}>
 				${POLICIES.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
 			</select>
-			<small>${kept ? 'This dataset is there and keeps its policy; it is changed on the page Policy.' : 'The thresholds of the new dataset, and whether cameras come from the paint of its pictures. It can be changed later.'}</small>
+			<small>${kept ? 'This dataset exists already and keeps its policy. Change it on the page Policy.' : 'The thresholds of the new dataset, and whether cameras come from the paint of its pictures. It can be changed later.'}</small>
 		</div>
 	`;
 }

@@ -29,8 +29,8 @@ function Skipped({ report }) {
 
 /** What is said over the numbers, by what came of the import. @param {string | undefined} outcome @param {boolean} dry */
 function heading(outcome, dry) {
-	if (outcome === 'nothing') return dry ? 'Nothing could be read: an import would bring nothing' : 'Nothing was imported';
-	if (outcome === 'partial') return dry ? 'An import would bring a part; nothing is saved yet' : 'Imported in part: something is missing';
+	if (outcome === 'nothing') return dry ? 'No record could be read: an import would add nothing' : 'Nothing was imported';
+	if (outcome === 'partial') return dry ? 'Some records would be left out; nothing is saved yet' : 'Imported, but some records were left out';
 	return dry ? 'This is what an import would do; nothing is saved yet' : 'Imported';
 }
 
@@ -42,7 +42,7 @@ function WithoutPicture({ report, dry, dataset }) {
 	return html`
 		<p data-grade="warn">
 			${dry ? which : html`<a href=${queueAddress(dataset, 'pictures:none')}>${which}</a>`}.
-			Nobody can look at ${groups === 1 ? 'it' : 'them'}, so accepting ${groups === 1 ? 'it' : 'one'} needs a note. Are the frames (for SoccerNet, Frames-v3.zip) beside the labels?
+			Reviewers cannot see ${groups === 1 ? 'it' : 'them'}, so accepting ${groups === 1 ? 'it' : 'one'} needs a note. Check that the frames (for SoccerNet, Frames-v3.zip) are beside the labels.
 		</p>
 	`;
 }

@@ -40,7 +40,7 @@ function Bar({ group }) {
 	if (error || !take) return null;
 	const mine = !isTeam || take.person === myName.value;
 	const whose = mine ? 'your independent annotation' : `${take.person}’s annotation`;
-	const state = take.settled ? 'It is done: it is used in its group, or another one is.' : take.submitted ? `It is submitted and can no longer be changed${mine && isTeam ? '; only a lead can return it' : ''}.` : mine ? 'Only you and the leads see it.' : 'It is not submitted yet.';
+	const state = take.settled ? 'The group is decided: this annotation, or another one, is used.' : take.submitted ? `It is submitted and can no longer be changed${mine && isTeam ? '; only a lead can return it' : ''}.` : mine ? 'Only you and the leads see it.' : 'It is not submitted yet.';
 	return html`
 		<div class="bar take-bar" data-tone=${take.returned ? 'info' : undefined} role="status">
 			<p><strong>${take.number === null || mine ? take.title : `${take.number} · ${take.title}`}</strong>, ${whose}. ${take.returned ? html`<${ReturnedNote} back=${take.returned} />` : state}</p>

@@ -28,7 +28,7 @@ function Ways({ meant, token }) {
 	const { password, sign_on: provider } = ways.value;
 	const said = meant.name === null ? { name } : {};
 	return html`
-		${meant.name === null ? html`<div class="form"><div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} value=${name} onInput=${withValue(setName)} /><small>Small letters and digits; history and verdicts will name you so.</small></div></div>` : null}
+		${meant.name === null ? html`<div class="form"><div class="form__row"><label for="join-name">Name</label><input class="field" id="join-name" name="name" required maxlength="40" autocomplete="username" autocapitalize="none" spellcheck=${false} value=${name} onInput=${withValue(setName)} /><small>Small letters and digits; history and verdicts show this name.</small></div></div>` : null}
 		${provider ? html`<${SignOnButton} primary=${!password} begin=${() => beginSignOn({ link: token, ...said })}>Continue with ${provider}<//>` : null}
 		${provider && password ? html`<p class="login__or">or choose a password of this server</p>` : null}
 		${password ? html`<${JoinForm} meant=${meant} token=${token} said=${said} />` : null}
@@ -49,7 +49,7 @@ function JoinForm({ meant, token, said }) {
 	return html`
 		<form class="form" onSubmit=${send}>
 			<input class="hidden-text" name="username" autocomplete="username" value=${meant.name ?? said.name} readonly tabindex="-1" aria-hidden="true" />
-			<div class="form__row"><label for="join-password">Password</label><input class="field" id="join-password" name="password" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 letters. Three or four plain words do well.</small></div>
+			<div class="form__row"><label for="join-password">Password</label><input class="field" id="join-password" name="password" type="password" required minlength="10" maxlength="200" autocomplete="new-password" /><small>At least 10 characters. Three or four plain words make a good password.</small></div>
 			<${FormError} error=${error} />
 			<p><button class="button button--primary" type="submit" aria-disabled=${busy}>Set the password and log in</button></p>
 		</form>

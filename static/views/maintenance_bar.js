@@ -40,7 +40,7 @@ export function MaintenanceCard() {
 			<h2 id="people-maintenance">Maintenance notice</h2>
 			${one ? html`<p>Set now: “${one.text}”${one.starts ? `, from ${timeText(one.starts)}` : ''}${one.until ? `, until ${timeText(one.until)}` : ''}. <button class="button button--small" type="button" disabled=${busy} onClick=${() => attempt(deleteMaintenance(), () => publishBanner(null))}>Clear</button></p>` : null}
 			<form class="form" onSubmit=${set}>
-				<div class="form__row"><label for="maintenance-text">Text</label><input class="field" id="maintenance-text" name="text" required maxlength="300" autocomplete="off" placeholder="Upgrade at 18:00, about ten minutes" /><small>Everybody sees it on every page, also before they log in.</small></div>
+				<div class="form__row"><label for="maintenance-text">Text</label><input class="field" id="maintenance-text" name="text" required maxlength="300" autocomplete="off" placeholder="Upgrade at 18:00, about ten minutes" /><small>All people see it on every page, even before login.</small></div>
 				<div class="form__columns">
 					<div class="form__row"><label for="maintenance-starts">From (optional)</label><input class="field" id="maintenance-starts" name="starts" type="datetime-local" /></div>
 					<div class="form__row"><label for="maintenance-until">Until (optional)</label><input class="field" id="maintenance-until" name="until" type="datetime-local" /></div>

@@ -61,7 +61,7 @@ function SourceRow({ of, one }) {
 			<th scope="row">Balls ${of} ${one.source}<small> px at 1920x1080</small></th>
 			<td data-numeric="true">${one.sigma_px.toFixed(2)}</td>
 			<td data-numeric="true">${one.low.toFixed(2)} to ${one.high.toFixed(2)}</td>
-			<td data-numeric="true">${one.differs ? 'differs from the dataset’s' : 'like the dataset’s'}</td>
+			<td data-numeric="true">${one.differs ? 'differs from the dataset' : 'same as the dataset'}</td>
 		</tr>`;
 }
 
@@ -88,7 +88,7 @@ export function NoiseCard({ dataset, version = '', children }) {
 			${found.error ? html`<${Trouble} title="The noise cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${noise ? html`
 				<table class="table noise">
-					<thead><tr><th>noise</th><th data-numeric="true">estimate</th><th data-numeric="true">interval</th><th data-numeric="true">policy</th></tr></thead>
+					<thead><tr><th>noise of</th><th data-numeric="true">estimate</th><th data-numeric="true">interval</th><th data-numeric="true">policy</th></tr></thead>
 					<tbody>
 						${noise.advice.map((item) => html`<${Row} key=${item.name} item=${item} />`)}
 						${noise.stations?.map((one) => html`<${SourceRow} key=${`camera ${one.source}`} of="of camera" one=${one} />`)}

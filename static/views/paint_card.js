@@ -31,9 +31,9 @@ function leftToRead({ views, without_picture: without, read, old, no_frame: gone
 function Numbers({ items }) {
 	const sum = (/** @type {(one: MatchPaintJson) => number} */ of) => items.reduce((total, one) => total + of(one), 0);
 	const numbers = [
-		['views with lines', sum(({ views }) => views)], ['read', sum(({ read }) => read)], ['on their paint', sum(({ painted }) => painted)],
-		['too little paint', sum((one) => one.no_paint)], ['paint elsewhere', sum((one) => one.paint_disagrees)],
-		['to be read again', items.some(({ old }) => old === null) ? null : sum(({ old }) => old ?? 0)],
+		['views with lines', sum(({ views }) => views)], ['read', sum(({ read }) => read)], ['camera from paint', sum(({ painted }) => painted)],
+		['too little paint', sum((one) => one.no_paint)], ['paint disagrees', sum((one) => one.paint_disagrees)],
+		['outdated', items.some(({ old }) => old === null) ? null : sum(({ old }) => old ?? 0)],
 		['picture missing', sum((one) => one.no_frame)], ['without picture', sum((one) => one.without_picture)],
 	];
 	return html`<dl class="number-list paint-card__numbers">${numbers.map(([name, n]) => html`<div key=${name}><dt>${name}</dt><dd>${n === null ? '?' : count(Number(n))}</dd></div>`)}</dl>`;
@@ -82,7 +82,7 @@ export function PaintCard({ dataset }) {
 				<p class="buttons paint-card__actions">
 					<${JobButton}
 						busy=${busy} act=${() => send(() => readDatasetPaint(dataset.id, null))} kind=${left ? 'button--primary' : ''}
-						title=${left ? `${plural(left, 'picture')} to read; pictures that fit are only compared` : 'Every picture is compared with what was read of it'}
+						title=${left ? `${plural(left, 'picture')} to read; the others are only checked` : 'Every picture is checked against its last reading'}
 					>${isRead ? 'Read again' : 'Read the pictures'}<//>
 					${isRead ? html`<${JobButton} busy=${busy} act=${() => send(() => revertPaint(dataset.id))} title="Restores the previous cameras of all groups">Undo the last reading<//>` : null}
 				</p>` : html`

@@ -30,22 +30,22 @@ const ROLES = /** @type {{name: Role, note: string}[]} */ ([
 	{ name: 'none', note: 'sees only datasets in which they have a role' },
 	{ name: 'viewer', note: 'views groups and numbers' },
 	{ name: 'annotator', note: 'changes lines, balls and cameras' },
-	{ name: 'reviewer', note: 'reviews groups, makes exports' },
-	{ name: 'lead', note: 'thresholds, versions, imports, evaluations' },
-	{ name: 'admin', note: 'people, deleting datasets' },
+	{ name: 'reviewer', note: 'reviews groups, exports datasets' },
+	{ name: 'lead', note: 'manages thresholds, versions, imports, evaluations' },
+	{ name: 'admin', note: 'manages people, deletes datasets' },
 ]);
 
 /** @param {UserJson} one */
 function stateOf(one) {
 	if (one.disabled) return 'disabled';
 	if (one.joined) return one.invited ? 'has a link for a new password' : 'active';
-	return one.invited ? 'invited' : 'invitation is too old';
+	return one.invited ? 'invited' : 'invitation has expired';
 }
 
 /** Who let somebody in; whoever did it themselves was the first admin, or came by single sign-on. @param {UserJson} one */
 function cameBy({ name, created_by: by, sign_on: identity }) {
 	if (by !== name) return `invited by ${by}`;
-	return identity ? 'came by single sign-on' : 'first admin of this server';
+	return identity ? 'joined by single sign-on' : 'first admin of this server';
 }
 
 /** A link that is shown once, or was sent by mail. @param {{made: UserWithLink, close: () => void}} props */
@@ -54,7 +54,7 @@ function LinkCard({ made, close }) {
 		return html`
 			<section class="card" role="status" aria-labelledby="people-link">
 				<h2 id="people-link">${made.user.joined ? `${made.user.name} has a link for a new password` : `${made.user.name} is invited`}</h2>
-				<p>The link was sent by mail. Did it not arrive? <em>New link</em> below makes another one.</p>
+				<p>The link was sent by mail. If it does not arrive, press <em>New link</em> below.</p>
 				<p class="buttons"><button class="button" type="button" onClick=${close}>Done</button></p>
 			</section>
 		`;
@@ -106,7 +106,7 @@ function FactorRule({ act }) {
 	return html`
 		<p class="people__rule"><label class="form__check">
 			<input type="checkbox" checked=${asked ?? on} onChange=${withTick(ask)} />
-			<span>Require a second factor: people without one set it up at their next login</span>
+			<span>Require a second factor: people without one must set it up at their next login</span>
 		</label></p>
 	`;
 }
@@ -132,7 +132,7 @@ function InviteCard({ invite, mail, error }) {
 	});
 	return html`
 		<section class="card" aria-labelledby="people-invite">
-			<h2 id="people-invite">Invite somebody</h2>
+			<h2 id="people-invite">Invite a person</h2>
 			<form class="form" onSubmit=${send}>
 				<div class="form__columns">
 					<div class="form__row"><label for="people-name">Name</label><input class="field" id="people-name" name="name" required maxlength="40" autocomplete="off" autocapitalize="none" spellcheck=${false} /><small>Small letters and digits; the history keeps it permanently.</small></div>
@@ -159,11 +159,11 @@ function PersonRow({ one, change, link, tokens, factor, unlink }) {
 				</select>
 			</td>
 			<td>${stateOf(one)}${one.sign_on ? html`<small>single sign-on: ${one.sign_on}</small>` : null}</td>
-			<td>${one.seen ? html`<${When} at=${one.seen} />` : 'not logged in'}</td>
+			<td>${one.seen ? html`<${When} at=${one.seen} />` : 'never'}</td>
 			<td><span class="table__actions">
 				${one.tokens ? html`<button class="button button--small" type="button" aria-label=${`Tokens of ${one.name}`} onClick=${tokens}>${plural(one.tokens, 'token')}</button>` : null}
-				${one.second_factor && !mine ? html`<button class="button button--small" type="button" aria-label=${`Second factor off for ${one.name}`} title="For somebody who has lost it" onClick=${factor}>Second factor off</button>` : null}
-				${one.sign_on && !mine ? html`<button class="button button--small" type="button" aria-label=${`Unlink ${one.name}`} title="They can then no longer log in with their account of the provider" onClick=${unlink}>Unlink</button>` : null}
+				${one.second_factor && !mine ? html`<button class="button button--small" type="button" aria-label=${`Remove second factor of ${one.name}`} title="For a person who has lost it" onClick=${factor}>Remove second factor</button>` : null}
+				${one.sign_on && !mine ? html`<button class="button button--small" type="button" aria-label=${`Unlink ${one.name}`} title="This person can then no longer log in with the account of the provider" onClick=${unlink}>Unlink</button>` : null}
 				${one.disabled || mine ? null : html`<button class="button button--small" type="button" aria-label=${`New link for ${one.name}`} onClick=${link}>New link</button>`}
 				<button class="button button--small ${one.disabled ? '' : 'button--danger'}" type="button" disabled=${mine} title=${why} aria-label=${`${one.disabled ? 'Enable' : 'Disable'} ${one.name}`} onClick=${() => change({ disabled: !one.disabled })}>${one.disabled ? 'Enable' : 'Disable'}</button>
 			</span></td>
@@ -212,13 +212,13 @@ function InOneDataset() {
 function LocalWork({ people, adoptedBy, give }) {
 	return html`
 		<section class="card" aria-labelledby="people-local">
-			<h2 id="people-local">Work from before accounts</h2>
-			${adoptedBy ? html`<p>It is assigned to ${adoptedBy}. The log keeps the name local.</p>` : html`
+			<h2 id="people-local">Work done before accounts existed</h2>
+			${adoptedBy ? html`<p>It is assigned to ${adoptedBy}. The log keeps the name “local”.</p>` : html`
 				<form class="form" onSubmit=${withForm((said) => give(Number(said.get('person'))))}>
 					<div class="form__row">
 						<label for="people-adopter">Assign the earlier work of “local” to</label>
 						<select class="field" id="people-adopter" name="person">${people.map((one) => html`<option key=${one.id} value=${one.id}>${one.name}</option>`)}</select>
-						<small>This can be done once. The log keeps the name local.</small>
+						<small>This can be done only once. The log keeps the name “local”.</small>
 					</div>
 					<p><button class="button" type="submit">Assign earlier work</button></p>
 				</form>`}
@@ -243,9 +243,9 @@ export function PeoplePage() {
 				<${InviteCard} error=${error} mail=${mail} invite=${(/** @type {string} */ name, /** @type {Role} */ role, /** @type {string} */ email) => act(postUser(name, role, email), setMade)} />
 				<${InviteManyCard} mail=${mail} invited=${found.reload} />
 				<section class="card card--flush" aria-labelledby="people-all">
-					<h2 id="people-all">Everybody</h2>
+					<h2 id="people-all">All people</h2>
 					<div class="table__scroll"><table class="table">
-						<thead><tr><th>Name</th><th>In all datasets</th><th>State</th><th>Seen</th><td></td></tr></thead>
+						<thead><tr><th>Name</th><th>In all datasets</th><th>State</th><th>Last seen</th><td></td></tr></thead>
 						<tbody>${people.map((one) => html`
 							<${PersonRow}
 								key=${one.id} one=${one} tokens=${() => setShown(one)} factor=${() => act(deleteSecondFactorOf(one.id))} unlink=${() => act(deleteIdentityOf(one.id))} link=${() => (mail ? setLinked(one) : renew(one))}

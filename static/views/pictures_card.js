@@ -21,12 +21,12 @@ const [LEAST_PERCENT, LEAST_SHIFT] = [0.05, 0.0005];
 
 /** What was done to a picture, for people. @param {PictureJson | null} picture @returns {string} */
 function pictureWords(picture) {
-	if (!picture) return 'as taken';
+	if (!picture) return 'unchanged';
 	const wide = 100 * (picture.aspect - 1), [right, down] = picture.shift;
 	const said = [];
 	if (Math.abs(wide) >= LEAST_PERCENT) said.push(`pixels ${fixed(Math.abs(wide), 1)} % ${wide > 0 ? 'wide' : 'narrow'}`);
-	if (Math.max(Math.abs(right), Math.abs(down)) >= LEAST_SHIFT) said.push(`axis ${fixed(right, 3)} right, ${fixed(down, 3)} down`);
-	return said.join(', ') || 'changed, estimated from its lines';
+	if (Math.max(Math.abs(right), Math.abs(down)) >= LEAST_SHIFT) said.push(`principal point ${fixed(right, 3)} right, ${fixed(down, 3)} down`);
+	return said.join(', ') || 'changed; the amount is estimated from its lines';
 }
 
 /** @param {{one: MatchPictureJson, shown: PictureEstimateJson | undefined, busy: boolean, onSet: (picture: PictureJson | null) => void}} props */
@@ -37,16 +37,16 @@ function MatchPicture({ one, shown, busy, onSet }) {
 	return html`
 		<tr>
 			<${MatchHead} name=${name} aside=${aside} />
-			<td>${one.mixed ? 'several kinds' : pictureWords(one.picture)}</td>
+			<td>${one.mixed ? 'varies within the match' : pictureWords(one.picture)}</td>
 			<td>${shown ? shown.sentence : '–'}${shown?.estimate && !proposed ? html`<small>not certain enough</small>` : null}</td>
 			<td><span class="table__actions">
 				${isNew ? html`
 					<${MatchButton}
 						name=${name} busy=${busy} act=${() => onSet(proposed)} kind="button--primary"
 						title=${`Solve the ${plural(one.frames, 'picture')} of this main camera with ${pictureWords(proposed)}`}
-					>Use it<//>` : null}
+					>Accept<//>` : null}
 				${one.picture || one.mixed ? html`
-					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(null)} title="Treat the pictures as neither stretched nor cropped">As taken<//>` : null}
+					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(null)} title="Treat the pictures as neither stretched nor cropped">Set to unchanged<//>` : null}
 			</span></td>
 		</tr>`;
 }
@@ -62,7 +62,7 @@ export function Pictures({ dataset }) {
 	/** @param {() => Promise<import('../api/jobs.js').JobJson>} put */
 	const ask = (put) => { if (!busy) { setFound(shown); send(put); } };
 	const title = html`Stretched and cropped pictures
-		<span class="card__aside"><${JobButton} busy=${busy} act=${() => ask(() => estimateMatchPictures(dataset))} kind="button--small" title="Look at up to thirty frames of each match together">Estimate<//></span>`;
+		<span class="card__aside"><${JobButton} busy=${busy} act=${() => ask(() => estimateMatchPictures(dataset))} kind="button--small" title="Estimate from up to thirty frames of each match together">Estimate<//></span>`;
 	return html`
 		<${MatchCard}
 			id="pictures" title=${title} columns=${['in use', 'estimated from lines']} card=${card} refused=${refused}
@@ -73,7 +73,7 @@ export function Pictures({ dataset }) {
 					shown=${shown.find((/** @type {PictureEstimateJson} */ { match }) => match === one.match)}
 					onSet=${(/** @type {PictureJson | null} */ picture) => ask(() => setMatchPicture(dataset, one.match, picture))}
 				/>`)}
-			note=${html`<p class="note">Of the main cameras; a replay has the finding “picture geometry” where its own lines show it. Accept a proposal where you know that pictures were scaled or cropped: lens and pitch can look alike.</p>`}
+			note=${html`<p class="note">For main cameras; a replay gets the finding “picture geometry” instead. Accept a proposal only if you know that the pictures were scaled or cropped: an unusual lens or pitch can look the same.</p>`}
 		/>
 	`;
 }

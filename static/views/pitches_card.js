@@ -26,7 +26,7 @@ function MatchPitch({ one, busy, onSet }) {
 	return html`
 		<tr>
 			<${MatchHead} name=${name} aside=${aside} />
-			<td>${one.mixed ? 'several sizes' : pitchSize(one)}</td>
+			<td>${one.mixed ? 'varies within the match' : pitchSize(one)}</td>
 			<td>${one.problem ?? shownSize(one.estimate)}</td>
 			<td><span class="table__actions">
 				${proposed ? html`
@@ -35,7 +35,7 @@ function MatchPitch({ one, busy, onSet }) {
 						title=${`Solve the ${count(one.groups)} ${one.match ? 'groups of this match' : 'groups without a match'} on this pitch`}
 					>Use ${pitchSize(proposed)}<//>` : null}
 				${previous && changed ? html`
-					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(previous)} title=${`Back to ${pitchSize(previous)}`}>Take back<//>` : null}
+					<${MatchButton} name=${name} busy=${busy} act=${() => onSet(previous)} title=${`Restore the previous pitch size, ${pitchSize(previous)}`}>Restore previous<//>` : null}
 			</span></td>
 		</tr>`;
 }

@@ -24,9 +24,9 @@ function MatchPosition({ one, used, busy, onShare, onBack }) {
 			<td>${one.sentence}</td>
 			<td><span class="table__actions">
 				${used && one.current !== true ? html`
-					<${MatchButton} name=${name} busy=${busy} act=${onShare} kind="button--primary" title="Solve the groups of this match with it">${one.current === null ? 'Share' : 'Share again'}<//>` : null}
+					<${MatchButton} name=${name} busy=${busy} act=${onShare} kind="button--primary" title="Solve the groups of this match with one common camera position">${one.current === null ? 'Share position' : 'Share position again'}<//>` : null}
 				${one.current === null ? null : html`
-					<${MatchButton} name=${name} busy=${busy} act=${onBack} title="Restore the position before the last sharing">Take back<//>`}
+					<${MatchButton} name=${name} busy=${busy} act=${onBack} title="Restore the camera position that was used before">Restore previous<//>`}
 			</span></td>
 		</tr>`;
 }
@@ -47,7 +47,7 @@ export function Positions({ dataset }) {
 					onShare=${() => send(() => sharePositions(dataset, one.match))}
 					onBack=${() => send(() => revertPositions(dataset, one.match))}
 				/>`)}
-			note=${value.used ? null : html`<p>The policy does not use them: switch on <em>Use the shared position of a match</em>.</p>`}
+			note=${value.used ? null : html`<p>The policy does not use these positions. To use them, switch on <em>Use the shared position of a match</em>.</p>`}
 		/>
 	`;
 }

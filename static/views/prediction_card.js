@@ -50,7 +50,7 @@ function Offered({ view, mark, sets }) {
 		</span>
 		<button
 			class="button button--small" type="button"
-			title=${there ? 'Put the prediction in the place of the ball that is there' : 'Make it the ball of this view (Y)'}
+			title=${there ? 'Replace the annotated ball by the prediction' : 'Make it the ball of this view (Y)'}
 			aria-label=${`${there ? 'Replace the ball of' : 'Accept the prediction in'} ${view.letter}${there ? ' by the prediction' : ''}`}
 			onClick=${() => acceptMark(view, mark, there)}
 		>${there ? 'Replace' : 'Accept'}</button>
@@ -80,10 +80,10 @@ export function PredictionCard({ group }) {
 	const found = predicted.value;
 	if (!found) return null;
 	const ready = acceptEdits(group, found.views).length;
-	const why = ready ? '' : 'Every view with a sure prediction has a ball already';
+	const why = ready ? '' : 'Every view with a prediction above the threshold has a ball already';
 	return html`
 		<section class="card predictions" aria-label="Predictions">
-			<h2 title="Corner brackets: predicted, dotted below the threshold. A solid box is a person's, a dashed one fits the 3D ball."><${Brackets} /> Predictions</h2>
+			<h2 title="Corner brackets: predicted, dotted below the threshold. Solid box: drawn by a person. Dashed box: fits the 3D ball."><${Brackets} /> Predictions</h2>
 			<${Choice} predicted=${found} />
 			<ul class="predictions__views">
 				${group.views.map((view) => html`<${Row} key=${view.key} view=${view} own=${found.views.get(view.key) ?? { marks: [], fewer: 0, origin: null }} sets=${found.set === '' ? found.sets.length : 1} />`)}

@@ -74,7 +74,7 @@ export function Proposals({ dataset, name }) {
 	return html`
 		<section class="card card--flush statistics__matches proposals-card" aria-labelledby="proposals-title" ref=${card}>
 			<h2 id="proposals-title" tabindex="-1"><${Term} word="proposal">Proposed lines<//></h2>
-			<p>Views without a camera: without lines, or with lines that do not determine one. Their paint may show where the camera stands. Proposals are not used until a person accepts them, in review or in the calibration editor.</p>
+			<p>Touchline can propose lines, read from the painted lines in the picture, for views without a camera. A proposal is not used until a person accepts it, in review or in the calibration editor.</p>
 			<table class="table">
 				<thead><tr><th>match</th><th data-numeric="true">no camera</th><th data-numeric="true">proposed</th><th data-numeric="true">unsure</th><th data-numeric="true">nothing</th><th data-numeric="true">accepted</th></tr></thead>
 				<tbody>${items.map((one) => html`<${MatchProposals} key=${one.match} one=${one} dataset=${name} />`)}</tbody>

@@ -12,7 +12,7 @@ import { queue } from '../state/queue.js';
 import { NoDatasets, mayImport } from './no_datasets.js';
 
 /** What is told to people from whom groups are hidden: that it is so and why, neither which nor how many. */
-export const HIDDEN_WHY = 'While you annotate a batch of this dataset independently, some of its groups are hidden from you. Lists and counts are without them until the batch is closed.';
+export const HIDDEN_WHY = 'While you annotate a batch of this dataset independently, some of its groups are hidden from you. Lists and counts do not include them until the batch is closed.';
 
 /** The query with the word that cannot be read marked. @param {{q: string, pointer: string | null}} props */
 function Marked({ q, pointer }) {
@@ -51,7 +51,7 @@ export function QueueEmpty({ q }) {
 		return html`
 			<section class="card empty">
 				<h2>There is no dataset “${param('dataset')}”</h2>
-				${mayImport() ? html`<p>It may have been deleted, or its import may have brought nothing; the list of jobs says which. Open another dataset, or import the files again.</p>`
+				${mayImport() ? html`<p>It may have been deleted, or its import may have failed; see the list of jobs. Open another dataset, or import the files again.</p>`
 					: html`<p>It may have been deleted, or you have no role in it: ask a lead or an admin for one. You can open another dataset.</p>`}
 				<p class="buttons"><a class="button button--primary" href="/datasets">All datasets</a>${mayImport() ? html`<a class="button" href=${`/import?dataset=${encodeURIComponent(param('dataset'))}`}>Import</a>` : null}<a class="button" href="/jobs">Jobs</a></p>
 			</section>
@@ -60,7 +60,7 @@ export function QueueEmpty({ q }) {
 	if (dataset.value.hides_groups && !q) {
 		return html`
 			<section class="card empty">
-				<h2>No group is shown to you</h2>
+				<h2>All groups are hidden from you</h2>
 				<p>${HIDDEN_WHY}</p>
 				<p><a class="button button--primary" href="/work">My work</a></p>
 			</section>

@@ -43,7 +43,7 @@ function QueueHeader({ field }) {
 	const error = failure.value ?? queue.value.error;
 	// Which dataset is meant is known before its rows are: one that is not there has none to wait for.
 	const gone = datasets.value !== null && !one;
-	const state = error ? (error.status === 400 ? 'Query not understood' : 'No answer')
+	const state = error ? (error.status === 400 ? 'Invalid query' : 'No answer')
 		: gone ? 'No such dataset' : loaded && one ? `${count(total)} of ${count(one.groups)} match` : 'Loading…';
 	return html`
 		<${Header} current="queue">

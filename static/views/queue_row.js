@@ -49,8 +49,8 @@ const CAME_TO = { agreed: 'agree', open: 'differ', decided: 'differed' };
 function OwnAnnotations({ row }) {
 	if (!row.submissions) return null;
 	const text = row.annotations ? `${row.submissions} ${CAME_TO[row.annotations]}` : row.submissions === 1 ? '1 annotation' : `${row.submissions} annotations`;
-	const open = row.annotations === 'agreed' && row.status === 'unreviewed' ? '; they agree and the first one is used, but nobody has accepted or rejected the group' : '';
-	const title = `${row.submissions === 1 ? 'One person has' : `${row.submissions} people have`} submitted an independent annotation${row.annotations === 'open' ? '; they differ and need a decision' : open}`;
+	const open = row.annotations === 'agreed' && row.status === 'unreviewed' ? '; they agree and the first one is used, but the group has no verdict yet' : '';
+	const title = `${row.submissions === 1 ? 'One person has' : `${row.submissions} people have`} submitted an independent annotation${row.annotations === 'open' ? '; they differ, and a reviewer has to decide' : open}`;
 	if (row.annotations !== 'open') return html`<span class="own-annotations" title=${title}>${text}</span>`;
 	return html`<a class="own-annotations" data-state="open" href=${`/adjudicate/${row.id}`} tabindex="-1" title=${title}>${text}</a>`;
 }

@@ -68,7 +68,7 @@ function HeadTick() {
 	const ticked = countOf(ticks.value, total);
 	return html`
 		<div role="columnheader" class="queue-cell queue-cell--tick">
-			<label class="tick" title=${ticked === total ? 'Tick nothing' : `Tick all ${count(total)} that match`}>
+			<label class="tick" title=${ticked === total ? 'Untick all' : `Tick all ${count(total)} that match`}>
 				<input
 					type="checkbox" disabled=${!loaded || total === 0} checked=${ticked > 0 && ticked === total}
 					indeterminate=${ticked > 0 && ticked < total} onChange=${turnAll} aria-label="Tick all groups that match"
@@ -103,14 +103,14 @@ function openActive() {
 const KEYS = [
 	{ keys: ['ArrowDown', 'j'], label: 'Next row', group: 'Queue', run: () => step(1) },
 	{ keys: ['ArrowUp', 'k'], label: 'Previous row', group: 'Queue', run: () => step(-1) },
-	{ keys: ['PageDown'], label: 'Ten rows on', group: 'Queue', run: () => step(10) },
-	{ keys: ['PageUp'], label: 'Ten rows back', group: 'Queue', run: () => step(-10) },
+	{ keys: ['PageDown'], label: 'Ten rows down', group: 'Queue', run: () => step(10) },
+	{ keys: ['PageUp'], label: 'Ten rows up', group: 'Queue', run: () => step(-10) },
 	{ keys: ['Home'], label: 'First row', group: 'Queue', run: () => step(-Infinity) },
 	{ keys: ['End'], label: 'Last row', group: 'Queue', run: () => step(Infinity) },
 	{ keys: ['Enter'], label: 'Open the row', group: 'Queue', run: openActive },
 	{ keys: [' '], label: 'Tick the row, or untick it', group: 'Queue', run: () => turnTick(activeRow.value) },
-	{ keys: ['Shift+ArrowDown'], label: 'Tick on downwards', group: 'Queue', run: () => extend(1) },
-	{ keys: ['Shift+ArrowUp'], label: 'Tick on upwards', group: 'Queue', run: () => extend(-1) },
+	{ keys: ['Shift+ArrowDown'], label: 'Extend the ticks downwards', group: 'Queue', run: () => extend(1) },
+	{ keys: ['Shift+ArrowUp'], label: 'Extend the ticks upwards', group: 'Queue', run: () => extend(-1) },
 ];
 
 /** First pixel in sight, as near as can be, with which a row is. @param {number} top @param {number} height @param {number} row */

@@ -32,7 +32,7 @@ const FLAGS = [
 ];
 const ORDERS = [
 	{ sort: '', label: 'Order of the dataset', title: 'As the groups were imported' }, { sort: 'value', label: 'Value of review', title: VALUE_OF_REVIEW },
-	{ sort: 'sigma-desc', label: 'Largest σ first', title: 'First the balls whose position is least certain' }, { sort: 'newest-desc', label: 'Newest change first', title: 'First the groups that were changed or judged last' },
+	{ sort: 'sigma-desc', label: 'Largest σ first', title: 'The least certain ball positions come first' }, { sort: 'newest-desc', label: 'Newest change first', title: 'The groups changed or reviewed last come first' },
 ];
 
 /** @param {{dataset: string, q: string, onQuery: (q: string) => void}} props */

@@ -68,8 +68,8 @@ export function SaveState() {
 	const quick = state === 'saving' && !slow;
 	const text = quick ? (savedAt.value === null ? 'No changes' : `Saved ${ago(savedAt.value, now)}`) : words(now);
 	const title = state !== 'away' ? '' : lasting.value
-		? 'Kept in this browser and sent when the server can be reached'
-		: 'This browser cannot keep what is not sent yet: do not close the page';
+		? 'Stored in this browser, and sent when the server can be reached'
+		: 'This browser cannot store unsaved changes: do not close the page';
 	return html`
 		<${ConflictLink} />
 		<span class="save" data-state=${quick ? 'saved' : state} data-unsaved=${unsaved.value} title=${title}>

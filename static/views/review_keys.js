@@ -138,7 +138,7 @@ function takeBall() {
 	const view = viewInHand();
 	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
 	if (predicted || !view || view.balls.length > 0) acceptInHand();
-	else if (!placeExpected(view)) announce(`The other views do not see one place for the ball of ${view.letter}: draw it with N.`);
+	else if (!placeExpected(view)) announce(`The other views do not agree on one place for the ball of ${view.letter}: draw it with N.`);
 }
 
 /** Make the group of the view in hand, too. */
@@ -210,7 +210,7 @@ const VERDICT = [
 	{ keys: ['s'], label: 'Defer and next', group: 'Verdict', needs: 'review', run: defer },
 	{ keys: ['Shift+a'], label: 'Use the focused view', group: 'Verdict', needs: 'annotate', run: useView },
 	{ keys: ['Shift+x'], label: 'Leave the focused view out; then a digit for the reason', group: 'Verdict', needs: 'annotate', run: askViewReason },
-	{ keys: ['Shift+s'], label: 'Dismiss the finding on the card: checked, fine', group: 'Verdict', needs: 'review', run: dismissShown },
+	{ keys: ['Shift+s'], label: 'Dismiss the finding on the card (checked, it is fine)', group: 'Verdict', needs: 'review', run: dismissShown },
 	{ keys: ['Shift+n'], label: 'Note at the pointer', group: 'Verdict', needs: 'review', run: askNote },
 	{ keys: ['Shift+c'], label: 'Comment at the pointer, or on the group', group: 'Verdict', needs: 'annotate', run: compose },
 ];
@@ -219,10 +219,10 @@ const VERDICT = [
 const NAVIGATE = [
 	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
 	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
-	{ keys: ['Shift+f'], label: 'Submit the group and go to the next, in a batch that you annotate', group: 'Navigate', needs: 'annotate', when: () => canSubmit.value, run: () => { submitAndNext(); } },
+	{ keys: ['Shift+f'], label: 'Submit the group and go to the next one of the batch', group: 'Navigate', needs: 'annotate', when: () => canSubmit.value, run: () => { submitAndNext(); } },
 	{ keys: ['Shift+u'], label: 'Return the group to its annotator, with a reason', group: 'Verdict', needs: 'review', when: () => canReturn.value, run: askReturn },
-	{ keys: ['Shift+r'], label: 'Take over an independent annotation into the group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
-	{ keys: ['v'], label: 'Ten groups on', group: 'Navigate', run: () => { goBy(1, FAR); } },
+	{ keys: ['Shift+r'], label: 'Apply an independent annotation to its group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
+	{ keys: ['v'], label: 'Ten groups forward', group: 'Navigate', run: () => { goBy(1, FAR); } },
 	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', run: () => { goBy(-1, FAR); } },
 	{ keys: ['r'], label: 'Next flagged group', group: 'Navigate', run: () => { goFlagged(1); } },
 	{ keys: ['e'], label: 'Previous flagged group', group: 'Navigate', run: () => { goFlagged(-1); } },
@@ -239,14 +239,14 @@ const VIEW = [
 		shown: i === 0 ? 'Shift + 1 … 6' : 'hidden', run: () => toggleIncluded(i),
 	})),
 	{
-		keys: ['z'], label: 'Zoom to the ball, again: whole image; held: magnifying glass', group: 'View',
+		keys: ['z'], label: 'Zoom to the ball; again: whole image; hold: magnifying glass', group: 'View',
 		run: zoomToBall,
 		hold: { start: () => { loupe.value = true; }, end: () => { loupe.value = false; } },
 	},
 	{ keys: ['0'], label: 'Leave the zoom, and show all views', group: 'View', run: showAll },
 	{ keys: ['Shift+z'], label: 'Crop the images to fill their panels, or show them whole', group: 'View', run: fillPanels },
 	{
-		keys: ['h'], label: 'Hide or show all that stands on the pictures; held: peek below', group: 'View',
+		keys: ['h'], label: 'Hide or show all overlays; hold: hide them briefly', group: 'View',
 		run: flipOverlays, hold: { start: flipOverlays, end: flipOverlays },
 	},
 	{
@@ -278,7 +278,7 @@ const VIEW = [
 		run: () => { equalViews.value = !equalViews.value; },
 	},
 	{
-		keys: ['l'], label: 'Fold the strip with ball, lines and pitch', group: 'View',
+		keys: ['l'], label: 'Collapse the strip with ball, lines and pitch', group: 'View',
 		run: () => { stripCollapsed.value = !stripCollapsed.value; },
 	},
 ];
@@ -287,11 +287,11 @@ const VIEW = [
 const EDIT = [
 	{ keys: ['n'], label: 'Draw a ball, a marking, or one more point', group: 'Edit', needs: 'annotate', run: () => startDrawing() },
 	{
-		keys: ['Enter'], label: 'Put a point at the pointer', group: 'Edit', needs: 'annotate', shown: 'hidden',
+		keys: ['Enter'], label: 'Add a point at the pointer', group: 'Edit', needs: 'annotate', shown: 'hidden',
 		when: isDrawing, run: drawHere,
 	},
 	{
-		keys: [], label: 'Put a point on the line there', group: 'Edit', shown: 'Alt click', run: () => {},
+		keys: [], label: 'Add a point on the line, at the click', group: 'Edit', shown: 'Alt click', run: () => {},
 	},
 	{
 		keys: ['Enter'], label: 'Apply the fix that the card on the right offers', group: 'Edit', needs: 'annotate', once: true,
@@ -307,7 +307,7 @@ const EDIT = [
 		when: () => !editing.value,
 		run: () => { editing.value = true; },
 	},
-	{ keys: ['Escape'], label: 'Leave, or cancel the drag', group: 'Edit', typing: true, run: escape },
+	{ keys: ['Escape'], label: 'Close, or cancel the drag', group: 'Edit', typing: true, run: escape },
 	{
 		keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓',
 		run: () => {},
@@ -327,13 +327,13 @@ const EDIT = [
 		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit', needs: 'annotate',
 		run: () => changeBall(toggleOutOfView, ''),
 	},
-	{ keys: ['y'], label: 'Accept the predicted ball, else place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
+	{ keys: ['y'], label: 'Accept the predicted ball, or place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
 	{ keys: ['u'], label: 'Reset object', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },
-	{ keys: ['m'], label: 'Swap left and right, in the view that a finding names', group: 'Edit', needs: 'annotate', run: swap },
+	{ keys: ['m'], label: 'Swap left and right (first in the view named by a finding)', group: 'Edit', needs: 'annotate', run: swap },
 	{ keys: ['Shift+g'], label: 'Guidelines of the dataset', group: 'View', run: () => { guidelinesShown.value = !guidelinesShown.value; } },
-	{ keys: ['Shift+o'], label: 'Start an independent annotation, on a copy', group: 'Edit', needs: 'annotate', run: annotateOwn },
+	{ keys: ['Shift+o'], label: 'Start an independent annotation on a copy of the group', group: 'Edit', needs: 'annotate', run: annotateOwn },
 	{ keys: ['Shift+k'], label: 'Mark as gold group', group: 'Edit', needs: 'lead', run: markGold },
 	{ keys: ['Ctrl+z'], label: 'Undo', group: 'Edit', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Edit', run: redo },

@@ -68,7 +68,7 @@ function useFactor(again = 0) {
 
 /** What there is, and how it goes. @param {{state: SecondFactorJson, error: ApiError | null, remove: (password: string) => void}} props */
 function Remove({ state, error, remove }) {
-	const told = html`<p>A code is asked for after your password. ${state.codes_left} of 10 recovery codes are left.</p>`;
+	const told = html`<p>The login asks for a code after your password. ${state.codes_left} of 10 recovery codes are left.</p>`;
 	if (state.required) return html`${told}<p class="note">This server requires one. If you have lost the device, an admin can remove it; then you set up another one.</p>`;
 	return html`<${OneField} key="remove" id="factor-remove" ...${proof()} button="Remove it" name="password" type="password" complete="current-password" error=${error} send=${remove}>${told}<//>`;
 }
@@ -84,7 +84,7 @@ export function SecondFactorCard({ changed = () => {}, again = 0 }) {
 			${made ? html`<${Scan} made=${made} error=${error} confirm=${confirm} />` : null}
 			${state && !made && !codes && !state.authenticator ? html`
 				<${OneField} key="begin" id="factor-begin" ...${proof()} button="Begin" name="password" type="password" complete="current-password" error=${error} send=${begin}>
-					${state.on ? html`<p>Your passkeys are asked for after your password; ${state.codes_left} of 10 recovery codes are left.</p>` : null}
+					${state.on ? html`<p>The login asks for a passkey after your password; ${state.codes_left} of 10 recovery codes are left.</p>` : null}
 					<p>With an authenticator (an app on your phone), a stolen password alone gives no access.</p>
 				<//>` : null}
 			${state && !made && !codes && state.authenticator ? html`<${Remove} state=${state} error=${error} remove=${remove} />` : null}

@@ -17,7 +17,7 @@ import { OneField } from './second_factor.js';
 
 /** What the provider says where it does not let somebody through (RFC 6749, section 4.1.2.1). */
 const SAYS = /** @type {{[error: string]: {detail: string, hint: string}}} */ ({
-	access_denied: { detail: 'the provider did not let you through, or you have cancelled', hint: 'Log in again; the administrator of the provider decides who may use Touchline.' },
+	access_denied: { detail: 'the provider refused the login, or you cancelled it', hint: 'Log in again; the administrator of the provider decides who may use Touchline.' },
 	login_required: { detail: 'you are not logged in at the provider', hint: 'Log in again.' },
 	temporarily_unavailable: { detail: 'the provider is busy', hint: 'Try again in a while.' },
 	server_error: { detail: 'something went wrong at the provider', hint: 'Try again in a while.' },
@@ -27,7 +27,7 @@ const OTHERWISE = { detail: 'the provider refused the request of this server', h
 /** Of what the address may say, characters: this server's own part, and the provider's. */
 const LONGEST_STATE = 200;
 const LONGEST = 4096;
-const STRANGE = { detail: 'this is no address to which the provider sends anybody', hint: 'Log in again.' };
+const STRANGE = { detail: 'this address does not belong to a login at the provider', hint: 'Log in again.' };
 
 /** What the address says, which it then forgets. @returns {SignOnAnswer | ApiError | null} */
 function readAddress() {

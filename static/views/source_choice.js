@@ -129,8 +129,8 @@ export function UploadRoom({ sent }) {
 	if (!room) return null;
 	const { used_bytes: used, quota_bytes: quota, days, max_bytes: most } = room;
 	return html`
-		${quota === null ? null : html`<div class="meter" role="meter" aria-label="Room of your uploads" aria-valuemin="0" aria-valuemax=${quota} aria-valuenow=${used} aria-valuetext=${`${sizeText(used)} of ${sizeText(quota)}`}><span style=${{ width: `${Math.min(100, (100 * used) / quota)}%` }}></span></div>`}
-		<small>${quota === null ? `Your uploads take ${sizeText(used)}` : `Your uploads take ${sizeText(used)} of ${sizeText(quota)}`}; a file may have ${sizeText(most)}. What no dataset uses is deleted after ${plural(days, 'day')}.</small>
+		${quota === null ? null : html`<div class="meter" role="meter" aria-label="Space used by your uploads" aria-valuemin="0" aria-valuemax=${quota} aria-valuenow=${used} aria-valuetext=${`${sizeText(used)} of ${sizeText(quota)}`}><span style=${{ width: `${Math.min(100, (100 * used) / quota)}%` }}></span></div>`}
+		<small>${quota === null ? `Your uploads take ${sizeText(used)}` : `Your uploads take ${sizeText(used)} of ${sizeText(quota)}`}; largest file ${sizeText(most)}. Files that no dataset uses are deleted after ${plural(days, 'day')}.</small>
 	`;
 }
 
@@ -186,7 +186,7 @@ function FolderList({ chosen, choose, guess }) {
 						<button class="folders__entry" type="button" aria-pressed=${entry.path === chosen} onClick=${() => enter(entry)}>${entry.name}${entry.folder ? '/' : ''}</button>
 					</li>`)}
 			</ul>
-			${folders.value?.more ? html`<small>There is more than is listed here.</small>` : null}
+			${folders.value?.more ? html`<small>The folder contains more entries than are listed here.</small>` : null}
 			${folders.value && items.length === 0 && trail.length === 0 ? html`<small>The operator has allowed no folder (TOUCHLINE_IMPORT_FOLDERS) and named no store (TOUCHLINE_STORES).</small>` : null}
 		</div>
 	`;
@@ -211,8 +211,8 @@ export function SourceChoice({ onSource, guess, videos }) {
 	return html`
 		<fieldset class="choice import__choice">
 			<legend>Source</legend>
-			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>Files on this computer<small>${videos ? 'videos, which are sent' : 'zip, JSON, CSV or pictures'}</small></span></label>
-			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A ${videos ? 'file' : 'folder'} on the server<small>${videos ? 'it stays there' : 'or in an object store; frames stay there'}</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'upload'} onChange=${() => change('upload')} /><span>Files on this computer<small>${videos ? 'videos, which are uploaded' : 'zip, JSON, CSV or pictures'}</small></span></label>
+			<label><input type="radio" name="source" checked=${kind === 'folder'} onChange=${() => change('folder')} /><span>A ${videos ? 'file' : 'folder'} on the server<small>${videos ? 'the file stays there' : 'or in an object store; frames stay there'}</small></span></label>
 		</fieldset>
 		${kind === 'upload' && videos ? html`<${videos} dropped=${dropped} over=${over} />` : null}
 		${kind === 'upload' && !videos

@@ -37,10 +37,10 @@ export function SuggestionBox({ group, solution }) {
 					</button>` : null}
 			</p>
 			${reason?.name === 'not_same_instant' ? html`
-				<p class="suggestion__hint">To compare players and clock: <kbd>H</kbd> hides what is drawn on the pictures, <kbd>1</kbd> <kbd>1</kbd> and <kbd>2</kbd> show one alone, <kbd>0</kbd> all.</p>` : null}
+				<p class="suggestion__hint">To compare players and clock: <kbd>H</kbd> hides the overlays, <kbd>1</kbd> <kbd>1</kbd> shows view A alone, <kbd>2</kbd> view B, <kbd>0</kbd> all views.</p>` : null}
 			${reason ? html`
 				<p class="suggestion__reject">
-					${offered ? 'Not the cause? ' : 'Cannot be fixed here. '}
+					${offered ? 'If the fix is wrong: ' : 'No fix is known. '}
 					<button data-needs="review" class="suggestion__more" type="button" onClick=${askReason}>Reject: ${reason.label.toLowerCase()} <kbd>X</kbd> <kbd>Enter</kbd></button>
 				</p>` : null}
 		</div>

@@ -27,8 +27,8 @@ export function SwapAsk({ group }) {
 	const named = group.views.find(({ key }) => swappedViews(solution.value).includes(key));
 	const warning = view ? swapWarning(group, solution.value, view) : null;
 	useKeys(useMemo(() => [
-		{ keys: ['Enter'], label: 'Swap the view that is named', group: 'Edit', run: () => (named ? swap(named) : cancelAsking()) },
-		{ keys: ['m'], label: 'Swap the focused view all the same', group: 'Edit', run: () => swap(view) },
+		{ keys: ['Enter'], label: 'Swap the view named by the finding', group: 'Edit', run: () => (named ? swap(named) : cancelAsking()) },
+		{ keys: ['m'], label: 'Swap the focused view anyway', group: 'Edit', run: () => swap(view) },
 	], [view, named]));
 	if (!view) return null;
 	const title = named && named !== view ? `The finding is about view ${named.letter}, not ${view.letter}.` : `Swap left and right in ${view.letter}?`;
@@ -39,8 +39,8 @@ export function SwapAsk({ group }) {
 			<p class="ask__buttons">
 				${named && named !== view
 					? html`<button class="button button--primary" type="button" onClick=${() => swap(named)}>Swap ${named.letter} <kbd>Enter</kbd></button>`
-					: html`<button class="button button--primary" type="button" onClick=${cancelAsking}>Leave it <kbd>Enter</kbd></button>`}
-				<button class="button" type="button" onClick=${() => swap(view)}>Swap ${view.letter} all the same <kbd>M</kbd></button>
+					: html`<button class="button button--primary" type="button" onClick=${cancelAsking}>Do not swap <kbd>Enter</kbd></button>`}
+				<button class="button" type="button" onClick=${() => swap(view)}>Swap ${view.letter} anyway <kbd>M</kbd></button>
 			</p>
 		</section>
 	`;

@@ -47,7 +47,7 @@ function TokenForm({ make, error }) {
 	return html`
 		<form class="form tokens__form" onSubmit=${send}>
 			<div class="form__columns">
-				<div class="form__row"><label for="token-name">What it is for</label><input class="field" id="token-name" name="name" required maxlength="40" autocomplete="off" placeholder="nightly copy" /><small>The log has it beside your name.</small></div>
+				<div class="form__row"><label for="token-name">What it is for</label><input class="field" id="token-name" name="name" required maxlength="40" autocomplete="off" placeholder="nightly copy" /><small>The log shows it beside your name.</small></div>
 				<div class="form__row"><label for="token-dataset">Dataset</label><select class="field" id="token-dataset" name="dataset"><option value="">all datasets</option>${(datasets.value ?? []).map(({ name }) => html`<option key=${name} value=${name}>${name}</option>`)}</select></div>
 				<div class="form__row"><label for="token-days">Valid for</label><select class="field" id="token-days" name="days">${DAYS.map((days) => html`<option key=${days} value=${days} defaultSelected=${days === 90}>${days} days</option>`)}</select></div>
 			</div>

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 import { valueOf } from '../state/query.js';
 
-export const VALUE_OF_REVIEW = 'First the groups whose margin is smallest, on either side of a gate’s threshold: there a small mistake decides whether the group passes.';
+export const VALUE_OF_REVIEW = 'The groups closest to a gate’s threshold come first: there a small mistake decides whether the group passes.';
 
 /** The line, while the queue has this order. @param {{q: string}} props */
 export function ValueOfReview({ q }) {

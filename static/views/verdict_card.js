@@ -50,7 +50,7 @@ export function VerdictCard({ group, solution, live }) {
 			${remarks.map((remark) => html`<p class="verdict-card__text" data-remark=${remark.letter}><${RemarkLink} group=${group} solution=${solution} remark=${remark} />${' '}${remark.text}</p>`)}
 			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
 			<${SuggestionBox} group=${group} solution=${solution} />
-			${shownFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="This finding was checked and is fine; Ctrl Z opens it again" onClick=${dismissShown}>Checked, fine <kbd>⇧S</kbd></button></p>` : null}
+			${shownFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="You checked this finding and it is fine; Ctrl Z reopens it" onClick=${dismissShown}>Dismiss finding <kbd>⇧S</kbd></button></p>` : null}
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}
 			${verdict.state === 'unreviewed' && !verdict.note ? null : html`
 				<p class="verdict-card__verdict">

@@ -63,7 +63,7 @@ function sentences(group, solution, offered) {
 			text: told?.sentence ?? missing(group, solution),
 		};
 	}
-	if (told) return { tone: 'warn', over: 'Passes, worth a look', title: told.title ?? '', text: told.sentence };
+	if (told) return { tone: 'warn', over: 'Passes, but has a finding', title: told.title ?? '', text: told.sentence };
 	return {
 		tone: isUnlikely(solution) ? 'warn' : 'ok', over: 'Passes every gate', title: agreement(all === 2 ? 'Both views' : `All ${all} views`, solution),
 		text: spread(solution), remarks: unused(group, solution),
@@ -131,7 +131,7 @@ function unused(group, solution) {
 	return group.views.flatMap((view) => {
 		const markings = solution.views.find((one) => one.view === view.key)?.calibration.markings ?? [];
 		return markings.filter(({ marking, used, outcome }) => view.lines[marking] && (!used || outcome !== 'tp'))
-			.map(({ marking }) => ({ view: view.key, letter: view.letter, marking, text: 'does not fit; it does not block.' }));
+			.map(({ marking }) => ({ view: view.key, letter: view.letter, marking, text: 'does not fit; the group passes without it.' }));
 	});
 }
 

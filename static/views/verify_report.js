@@ -25,7 +25,7 @@ function Kept({ found }) {
 	const { differences, different } = found;
 	return html`
 		<p data-grade=${found.ok ? 'ok' : 'bad'} role="status"><span aria-hidden="true">${found.ok ? '✓' : '✗'}</span> ${found.sentence}</p>
-		<p class="note">Verified <${When} at=${found.at} />${found.actor && found.actor !== 'local' ? ` by ${found.actor}` : ''} with solver ${found.solver_version}. The result stays here until somebody verifies the version again.</p>
+		<p class="note">Verified <${When} at=${found.at} />${found.actor && found.actor !== 'local' ? ` by ${found.actor}` : ''} with solver ${found.solver_version}. The result is shown until the version is verified again.</p>
 		${differences.length ? html`
 			<div class="table__scroll" tabindex="0" role="region" aria-label="Differences">
 				<table class="table">

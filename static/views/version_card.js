@@ -40,7 +40,7 @@ export function VersionCard({ one }) {
 		<section class="card" aria-labelledby="versions-title">
 			<h2 id="versions-title">Versions</h2>
 			${versions.error ? html`<p class="form__error">${sentenceOf(versions.error)}</p>` : null}
-			${versions.value && items.length === 0 ? html`<p class="empty-note">Nothing is frozen yet. A version never changes and can be cited.</p>` : null}
+			${versions.value && items.length === 0 ? html`<p class="empty-note">No version yet. A version is a frozen copy of the dataset: it never changes and can be cited.</p>` : null}
 			${items.slice(0, SHOWN).map((version) => html`<${Line} key=${version.id} version=${version} address=${address} />`)}
 			${items.length > SHOWN ? html`<p><a class="link" href=${address}>All ${items.length} versions</a></p>` : null}
 			<p class="version-card__freeze"><button data-needs="lead" class="button button--primary" type="button" onClick=${() => setFreezing(true)}>Freeze a version…</button></p>

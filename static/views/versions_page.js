@@ -35,7 +35,7 @@ function Facts({ version }) {
 	return html`
 		<dl class="facts">
 			<dt>Hash</dt><dd class="mono">${version.hash}</dd>
-			<dt>Groups</dt><dd>${count(counts.groups)}${splits.length ? ` (${splits.join(', ')})` : ''} · ${plural(counts.views ?? 0, 'view')} · ${plural(counts.balls ?? 0, 'ball')}${counts.overrides ? ` · ${count(counts.overrides)} accepted against a gate` : ''}</dd>
+			<dt>Groups</dt><dd>${count(counts.groups)}${splits.length ? ` (${splits.join(', ')})` : ''} · ${plural(counts.views ?? 0, 'view')} · ${plural(counts.balls ?? 0, 'ball')}${counts.overrides ? ` · ${count(counts.overrides)} accepted although a gate fails` : ''}</dd>
 			<dt>Split</dt><dd>${splitText(version.split)}</dd>
 			<dt>Policy</dt><dd>${version.policy?.name ?? ''} <span class="mono">${version.policy?.hash ?? ''}</span></dd>
 			<dt>Computed by</dt><dd>solver ${version.solver_version}, Touchline ${version.software_version}</dd>
@@ -110,13 +110,13 @@ function VersionsOf({ one }) {
 	const close = () => setAsked(null);
 	return html`
 		<div class="page__title">
-			<p>A version never changes: its hash says what is in it, and anybody can compute it again.</p>
+			<p>A version never changes: its hash identifies the content, and it can be recomputed at any time.</p>
 			<button data-needs="lead" class="button button--primary" type="button" onClick=${() => setAsked('freeze')}>Freeze a version…</button>
 		</div>
 		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
 		${diff ? html`<${VersionDiff} ...${diff} dataset=${one.name} onClose=${() => setDiff(null)} />` : null}
 		${items.length === 0 ? html`
-			<section class="card empty"><h2>Nothing is frozen yet</h2><p>${count(one.accepted)} of ${plural(one.groups, 'group')} accepted so far. A version takes those, or all that pass.</p></section>` : null}
+			<section class="card empty"><h2>Nothing is frozen yet</h2><p>${count(one.accepted)} of ${plural(one.groups, 'group')} accepted so far. A version contains the accepted groups, or all groups that pass.</p></section>` : null}
 		<ul class="page__list">
 			${items.map((version) => html`
 				<${VersionSection}

@@ -36,7 +36,7 @@ function leftOut(one) {
 /** @param {Influence | undefined} one */
 function leftOutWords(one) {
 	if (!one) return '';
-	if (!one.jac_without) return 'Without this marking there is no camera';
+	if (!one.jac_without) return 'Without this marking, the view has no camera';
 	return `Without it: JaC ${one.jac_without['0.5'].toFixed(2)} instead of ${one.jac['0.5'].toFixed(2)}`;
 }
 
@@ -70,7 +70,7 @@ export function Undrawn({ picture: { view, markings } }) {
 		${missing.length ? html`
 			<p class="view-lines__missing">${missing.length} visible, not drawn:</p>
 			<ul class="view-lines__undrawn">${missing.map(({ marking }) => html`
-				<li key=${marking}>${marking} <button class="suggestion__more" type="button" data-needs="annotate" title="Something hides it, or it is worn: JaC does not count it as missing" aria-label=${`${marking} is not visible`} onClick=${() => submit(markNotVisible(view, marking, true))}>not visible</button></li>`)}
+				<li key=${marking}>${marking} <button class="suggestion__more" type="button" data-needs="annotate" title="The marking is hidden or worn away: JaC then does not count it as missing" aria-label=${`${marking} is not visible`} onClick=${() => submit(markNotVisible(view, marking, true))}>not visible</button></li>`)}
 			</ul>` : null}
 		${hidden.length ? html`
 			<p class="view-lines__missing">Marked as not visible:</p>

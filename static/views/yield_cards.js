@@ -24,7 +24,7 @@ function Unmeasured() {
 	return html`
 		<section class="card" aria-labelledby="curves-title">
 			<h2 id="curves-title">Groups that qualify, by JaC threshold</h2>
-			<p class="yield__unmeasured"><strong>JaC was not measured here: the cameras were given.</strong> It compares a camera with the field lines drawn in its pictures, and this dataset has no lines. Every group therefore passes this gate, whatever its threshold. Draw field lines, or import them, to measure it.</p>
+			<p class="yield__unmeasured"><strong>JaC was not measured here: the cameras were given.</strong> It compares a camera with the field lines drawn in its pictures, and this dataset has no lines. So every group passes this gate at any threshold. Draw field lines, or import them, to measure it.</p>
 		</section>
 	`;
 }

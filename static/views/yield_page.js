@@ -29,7 +29,7 @@ function Difference({ answer, name, changed }) {
 	return html`
 		<div class="yield__difference" role="status">
 			<p><strong>+${count(answer.gained)}</strong> ${answer.gained === 1 ? 'group' : 'groups'} and <strong>−${count(answer.lost)}</strong> against <strong>${name}</strong>: ${count(answer.passing)} pass.</p>
-			${answer.needs_solving?.length ? html`<p data-grade="warn">What ${answer.needs_solving.map((field) => words(field)).join(', ')} would change shows only once it is saved and solved.</p>` : null}
+			${answer.needs_solving?.length ? html`<p data-grade="warn">The effect of ${answer.needs_solving.map((field) => words(field)).join(', ')} is shown only after saving and solving.</p>` : null}
 		</div>
 	`;
 }

@@ -437,7 +437,7 @@ class TestStation:
         until(page, lambda: page.request.get(station).json()["can_undo"])
 
         page.get_by_role("button", name="Adjust all static cameras").click()
-        dialog.get_by_role("button", name="Restore the cameras as they were").click()
+        dialog.get_by_role("button", name="Restore the previous cameras").click()
         expect(dialog).to_be_hidden()
         expect(page.locator(".station-card__work")).to_be_visible()
         # While the groups are solved anew, their state changes.

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.screen import Screen, holding, judge, passing, withdraw_verdict
 
-ANEW = "This group was changed elsewhere and is shown as it is now."
+ANEW = "Another person or window changed this group; the page shows the new state."
 
 
 def test_a_group_that_is_judged_before_the_page_listens_is_shown_as_it_is_then(

@@ -98,9 +98,9 @@ PEOPLE = [
     ),
     Row(
         "takes a lost second factor away",
-        [press("Second factor off for ines")],
+        [press("Remove second factor of ines")],
         {"DELETE /users/{ines}/second-factor": None},
-        hides="button[aria-label='Second factor off for ines']",
+        hides="button[aria-label='Remove second factor of ines']",
     ),
     Row(
         "unlinks an account of the provider",
@@ -110,7 +110,7 @@ PEOPLE = [
     ),
     Row(
         "asks a second factor of everybody",
-        [tick("Require a second factor: people without one set it up at their next login")],
+        [tick("Require a second factor: people without one must set it up at their next login")],
         {"PUT /team": {"require_second_factor": True}},
         {".people__rule:has(input:checked)": "Require a second factor"},
     ),
@@ -118,7 +118,7 @@ PEOPLE = [
         "asks it of nobody any more",
         [
             tick(
-                "Require a second factor: people without one set it up at their next login",
+                "Require a second factor: people without one must set it up at their next login",
                 on=False,
             )
         ],
@@ -192,10 +192,10 @@ class TestPeople:
             if one["seen"]:
                 expect(seen.locator("time")).to_have_attribute("datetime", one["seen"])
             else:
-                expect(seen).to_have_text("not logged in")
+                expect(seen).to_have_text("never")
             tokens = line.get_by_role("button", name="Tokens of")
             expect(tokens).to_have_count(1 if one["tokens"] else 0)
-            factor = line.get_by_role("button", name="Second factor off")
+            factor = line.get_by_role("button", name="Remove second factor")
             mine = one["name"] == "anna"
             expect(factor).to_have_count(1 if one["second_factor"] and not mine else 0)
 
@@ -350,7 +350,7 @@ class TestAccount:
 
 TRUTH = {
     "sample": "the values it was generated from",
-    "verdict": "its annotations when it was marked",
+    "verdict": "its annotations at the time it was marked",
 }
 GOLD = "section[aria-labelledby=gold-title]"
 MEMBERS = [

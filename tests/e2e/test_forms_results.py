@@ -83,7 +83,7 @@ EXPORTS = [
                 "version": None,
             }
         },
-        {".export__result": "Written, but not complete"},
+        {".export__result": "Export finished, but incomplete"},
     ),
 ]
 

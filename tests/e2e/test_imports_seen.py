@@ -288,6 +288,6 @@ class TestGivenCameras:
         page.locator("label", has_text="XGTF").click()
         assert choice.locator("option").all_inner_texts() == [
             "the given camera, measured by the lines",
-            "the given camera, lines left aside",
+            "the given camera; lines are ignored",
             "the lines",
         ]

@@ -411,7 +411,7 @@ class TestDismissing:
             page.keyboard.press("Shift+s")
             expect(struck).to_have_count(count)
         screen.saved()
-        expect(struck.first).to_contain_text("Checked, fine")
+        expect(struck.first).to_contain_text("Dismissed")
         row = page.request.get(f"/api/v1/groups?dataset=sample&q=id:{one['id']}").json()["items"][0]
         assert (row["findings"], row["dismissed"]) == ([], one["findings"])
         # Undone like a verdict, also from a page that is new; and by its button.
@@ -424,6 +424,6 @@ class TestDismissing:
         expect(card).to_have_attribute("data-tone", "warn")
         page.keyboard.press("Control+Shift+z")
         expect(struck).to_have_count(1)
-        struck.get_by_role("button", name="Look again").click()
+        struck.get_by_role("button", name="Reopen").click()
         expect(struck).to_have_count(0)
         screen.saved()

@@ -232,8 +232,8 @@ class TestSessions:
         for path, sentence in {
             f"/join#{'x' * 300}": "This link is not good any more",
             "/join#what%20is%20this?": "This link is not good any more",
-            f"/login?state={'x' * 300}&code=x": "This is no address to which the provider sends",
-            f"/login?state=x&code={'x' * 5000}": "This is no address to which the provider sends",
+            f"/login?state={'x' * 300}&code=x": "This address does not belong to a login",
+            f"/login?state=x&code={'x' * 5000}": "This address does not belong to a login",
             "/login?state=x&code=x": "That took too long, was answered before",
             "/login?error=KeyError": "The provider refused the request of this server",
         }.items():
@@ -254,7 +254,7 @@ class TestSessions:
             Screen(page).ready()
             streams.arrive()
             in_store(team_home, defer_the_fourth)
-        words = "This group was changed elsewhere and is shown as it is now."
+        words = "Another person or window changed this group; the page shows the new state."
         expect(page.get_by_text(words)).to_have_count(1)
         assert verdict(page, 4) == {"state": "deferred", "by": "local"}
 

@@ -24,7 +24,7 @@ from tests.e2e.team import (
 )
 from tests.e2e.test_access import serious_in_both
 
-SUBMITTED = "This is submitted; only a lead can return it."
+SUBMITTED = "This annotation is submitted; only a lead can return it."
 
 
 class TestWork:

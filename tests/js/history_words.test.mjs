@@ -21,10 +21,10 @@ describe('sentenceOfEntry', () => {
 		assert.equal(said('verdict', { state: 'rejected', reason: 'bad_field_lines', note: 'no', override: null }), 'Rejected because of bad field lines: “no”');
 	});
 	it('says whose independent annotation was taken over, and how that was decided', () => {
-		assert.equal(said('take', { did: 'adopted', take: 1, person: 'anna' }), 'Took over anna’s independent annotation');
+		assert.equal(said('take', { did: 'adopted', take: 1, person: 'anna' }), 'Applied anna’s independent annotation');
 		assert.equal(said('agreement', { did: 'agreed', person: 'anna', of: ['anna', 'bo'] }), 'anna and bo agree: anna’s annotation is used');
 		assert.equal(said('work', { did: 'handed back', person: 'bo', reason: 'the far line' }), 'Returned to bo: “the far line”');
-		assert.equal(said('agreement', { did: 'decided', person: 'bo', of: ['anna', 'bo'] }), 'Decided for bo’s annotation');
+		assert.equal(said('agreement', { did: 'decided', person: 'bo', of: ['anna', 'bo'] }), 'Chose bo’s annotation');
 	});
 	it('says nothing of the words of a comment', () => {
 		assert.equal(said('comment', { did: 'resolved', thread: 3 }), 'Resolved a thread');

@@ -45,7 +45,7 @@ describe('headline', () => {
 			last: { lines: { 'Side line left': [] } }, solved: { calibration: { camera: {}, source: 'lines', jac: null, markings } },
 		});
 		assert.equal(text, 'Every view sees the ball in the same place, within 0.1 px.');
-		assert.deepEqual(remarks, [{ view: 'c', letter: 'C', marking: 'Side line left', text: 'does not fit; it does not block.' }]);
+		assert.deepEqual(remarks, [{ view: 'c', letter: 'C', marking: 'Side line left', text: 'does not fit; the group passes without it.' }]);
 	});
 
 	it('says that a camera is uncertain, and why, whatever else there is to say', () => {

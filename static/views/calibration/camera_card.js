@@ -69,7 +69,7 @@ function PictureChoice({ view }) {
 	return html`
 		<button
 			class="button button--small" type="button" aria-pressed=${picture !== null}
-			title=${picture ? 'Take it as the camera took it: square pixels, the axis in the middle' : 'Let its lines say how much'}
+			title=${picture ? 'Treat the picture as unchanged: square pixels, principal point in the middle' : 'Estimate from the lines how the picture was changed'}
 			onClick=${() => submit({ kind: 'picture', view: view.key, picture: picture ? null : OPEN })}
 		>Stretched or cropped</button>
 	`;

@@ -50,9 +50,9 @@ function pictureNumbers(camera, { width, height }, row) {
 	const below = (100 * (camera.principal_point[1] - (height - 1) / 2)) / height;
 	if ([wide, aside, below].every((share) => Math.abs(share) < 0.1)) return [];
 	return [
-		row('wide', 'Pixels too wide', wide, 1, ' %'),
-		row('aside', 'Axis right of the middle', aside, 1, ' %'),
-		row('below', 'Axis below the middle', below, 1, ' %'),
+		row('wide', 'Pixel width error', wide, 1, ' %'),
+		row('aside', 'Principal point, right', aside, 1, ' %'),
+		row('below', 'Principal point, down', below, 1, ' %'),
 	];
 }
 

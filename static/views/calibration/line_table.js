@@ -36,12 +36,12 @@ function influenceOf(influence) {
 	const before = influence?.jac?.['0.5'];
 	if (!influence || before === undefined) return { text: '', grade: 'unseen', title: 'not known' };
 	const after = influence.jac_without?.['0.5'];
-	if (after === undefined) return { text: 'needed', grade: 'unseen', title: 'Without it the lines determine no camera' };
+	if (after === undefined) return { text: 'needed', grade: 'unseen', title: 'Without this line, the others do not determine a camera' };
 	const gained = after - before;
 	const text = Math.abs(gained) < WORTH ? '±0' : `${gained > 0 ? '+' : '−'}${Math.abs(gained).toFixed(2)}`;
 	const far = influence.largest_px_without;
-	const own = far === null ? '' : `; it is then ${pixelText(far)} off`;
-	const title = `Without it: JaC 0.5 % ${before.toFixed(2)} → ${after.toFixed(2)}${own}`;
+	const own = far === null ? '' : `; this line is then ${pixelText(far)} off`;
+	const title = `Without this line: JaC 0.5 % ${before.toFixed(2)} → ${after.toFixed(2)}${own}`;
 	return { text, grade: gained > WORTH ? 'warn' : 'unseen', title };
 }
 

@@ -33,7 +33,7 @@ function Proposal({ proposal }) {
 	return html`
 		<div class="table__scroll" tabindex="0" role="region" aria-label="Cameras and pairs, before and after">
 			<table class="table">
-				<thead><tr><th>Camera</th><th data-numeric="true">Moves</th><th data-numeric="true">Picture of the grass moves</th><th data-numeric="true">Field lines</th></tr></thead>
+				<thead><tr><th>Camera</th><th data-numeric="true">Moves</th><th data-numeric="true">Grass moves in the picture</th><th data-numeric="true">Field lines</th></tr></thead>
 				<tbody>${proposal.cameras.map((camera) => html`
 					<tr key=${camera.key} data-camera=${camera.key}>
 						<th scope="row">${camera.key}</th>
@@ -43,7 +43,7 @@ function Proposal({ proposal }) {
 					</tr>`)}</tbody>
 			</table>
 			<table class="table">
-				<thead><tr><th>Camera pair</th><th data-numeric="true">Instants</th><th data-numeric="true">Gap</th><th data-numeric="true">Held out</th></tr></thead>
+				<thead><tr><th>Camera pair</th><th data-numeric="true">Instants</th><th data-numeric="true" title="Distance between the balls of both cameras, before and after">Error</th><th data-numeric="true" title="The same for balls that the adjustment did not use">Error, test balls</th></tr></thead>
 				<tbody>${proposal.pairs.map((pair) => html`
 					<tr key=${`${pair.a} ${pair.b}`}>
 						<th scope="row">${pair.a} and ${pair.b}</th>
@@ -53,8 +53,8 @@ function Proposal({ proposal }) {
 					</tr>`)}</tbody>
 			</table>
 		</div>
-		<p>${plural(proposal.frames, 'instant')} ${proposal.frames === 1 ? 'was' : 'were'} used, ${count(proposal.gross)} left out, because their cameras do not show one ball. Balls move by ${metres(proposal.ball_moved_m)} in the median. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
-		${proposal.left_alone.length ? html`<p data-grade="warn">Too few common balls: ${proposal.left_alone.join(', ')}</p>` : null}
+		<p>${plural(proposal.frames, 'instant')} ${proposal.frames === 1 ? 'was' : 'were'} used, ${count(proposal.gross)} left out, because the rays of their cameras do not meet in one ball. The median ball moves by ${metres(proposal.ball_moved_m)}. The cameras are ${proposal.anchor}. ${capital(proposal.time)}.</p>
+		${proposal.left_alone.length ? html`<p data-grade="warn">Not adjusted, because too few balls are seen together with other cameras: ${proposal.left_alone.join(', ')}</p>` : null}
 	`;
 }
 
@@ -106,10 +106,10 @@ export function RigDialog({ dataset, station, onClose }) {
 		<${FormDialog}
 			wide=${true} title="Adjust static cameras together" onClose=${onClose} onSubmit=${send}
 			buttons=${html`
-				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Restore the cameras as they were</button>` : null}
+				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Restore the previous cameras</button>` : null}
 				<button class="button button--primary" type="submit" aria-disabled=${busy} title=${busy ? 'Under way' : ''}>${proposal ? 'Save' : 'Propose'}</button>`}
 		>
-			<p>Balls that several cameras show at once align the cameras with each other; field lines and the cameras in use keep them in place. You see what changes before anything is saved.</p>
+			<p>Balls that several cameras show at once align the cameras with each other; field lines and the cameras in use keep them in place. A preview shows what changes before anything is saved.</p>
 			${proposal ? html`
 				<${Proposal} proposal=${proposal} />
 				<fieldset class="choice choice--row">

@@ -81,7 +81,7 @@ export function CommitBar({ shared }) {
 			</p>
 			<div class="commit__buttons">
 				<${Action} label="Undo" keys="Ctrl Z" run=${undo} />
-				<${Action} label="Redo" keys="Ctrl ⇧ Z" run=${redo} off=${at < steps.length ? null : 'Nothing to do again'} />
+				<${Action} label="Redo" keys="Ctrl ⇧ Z" run=${redo} off=${at < steps.length ? null : 'Nothing to redo'} />
 				<${Action} label="Discard" keys="Ctrl Del" run=${discardStaged} off=${off} />
 				<button data-needs="annotate" class="button button--primary" type="button" aria-disabled=${off !== null} title=${off ?? 'Save everything staged as one edit (Ctrl S)'} onClick=${() => { if (off === null) save(); }}>
 					${shared ? 'Save for all its views' : 'Save'} <kbd>Ctrl S</kbd>

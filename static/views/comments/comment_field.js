@@ -85,7 +85,7 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 		<form class="talk__form" onSubmit=${submit}>
 			<label class="hidden-text" for=${id}>${label}</label>
 			<textarea
-				class="field talk__field" id=${id} ref=${field} rows="2" maxlength=${LONGEST} placeholder=${`${label}; @ mentions somebody`} defaultValue=${text}
+				class="field talk__field" id=${id} ref=${field} rows="2" maxlength=${LONGEST} placeholder=${`${label}; @ mentions a person`} defaultValue=${text}
 				aria-autocomplete="list" aria-controls=${names.length ? list : undefined} aria-activedescendant=${names.length ? `${list}-${active}` : undefined}
 				onInput=${offer} onKeyDown=${key} onBlur=${() => setTimeout(() => setNames([]), 150)}
 			></textarea>

@@ -38,9 +38,9 @@ async function goOn(dataset, after) {
 function DecisionCard({ found, chosen, third, busy, decide, flipThird, back }) {
 	const taken = chosen === null ? null : found.annotations[chosen];
 	const of = found.group.dataset.name;
-	const say = taken === null ? 'Compare both, then choose one: 1, 2 …' : third
-		? `${taken.person}’s annotation goes into the group, and you continue from it`
-		: taken.verdict ? `${taken.person}’s annotation goes into the group, with your verdict: ${words(taken.verdict)}` : `${taken.person}’s annotation goes into the group; it has no verdict yet and waits for one`;
+	const say = taken === null ? 'Compare the annotations, then choose one (keys 1, 2 …)' : third
+		? `${taken.person}’s annotation is applied to the group, and you edit it further`
+		: taken.verdict ? `${taken.person}’s annotation is applied to the group, with your verdict: ${words(taken.verdict)}` : `${taken.person}’s annotation is applied to the group, which then still needs a verdict`;
 	return html`
 		<section class="card compare__card" aria-labelledby="compare-decide">
 			<h2 id="compare-decide">Decide</h2>
@@ -48,8 +48,8 @@ function DecisionCard({ found, chosen, third, busy, decide, flipThird, back }) {
 				${found.own ? html`<p class="compare__own">You annotated this group yourself. No other reviewer is available, so you may decide; the history records it.</p>` : null}
 				<p class="compare__say" role="status">${say}${say.endsWith('…') ? '' : '.'}</p>
 				<p class="compare__links">
-					<button class="button" type="button" data-needs="review" data-of=${of} aria-pressed=${third} onClick=${flipThird}>Continue from it <kbd>${found.annotations.length + 1}</kbd></button>
-					${isTeam ? html`<button class="button" type="button" data-needs="review" data-of=${of} disabled=${taken === null} title=${taken === null ? 'Choose one first' : 'Its annotator changes it and submits it again'} onClick=${back}>Return… <kbd>⇧U</kbd></button>` : null}
+					<button class="button" type="button" data-needs="review" data-of=${of} aria-pressed=${third} onClick=${flipThird}>Apply, then edit <kbd>${found.annotations.length + 1}</kbd></button>
+					${isTeam ? html`<button class="button" type="button" data-needs="review" data-of=${of} disabled=${taken === null} title=${taken === null ? 'Choose one first' : 'Return it to its annotator, to be changed and submitted again'} onClick=${back}>Return… <kbd>⇧U</kbd></button>` : null}
 					<button class="button button--primary" type="button" data-needs="review" data-of=${of} disabled=${taken === null || busy} title=${taken === null ? 'Choose one first' : ''} onClick=${decide}>Decide <kbd>Enter</kbd></button>
 				</p>`}
 			<p class="compare__verdicts">${found.annotations.map(({ id, person, verdict }) => html`<span key=${id}>${person}: <strong>${words(verdict ?? 'no verdict')}</strong></span>`)}</p>
@@ -90,7 +90,7 @@ function Adjudication({ found }) {
 		const mine = take.person === myName.value;
 		question.value = {
 			kind: 'back', person: mine ? 'yourself' : take.person,
-			says: `${mine ? 'You' : take.person} can change it and submit it again. Until then the group needs no decision; it is then compared again, and settled automatically if all agree.`,
+			says: `${mine ? 'You' : take.person} can change it and submit it again. Then the annotations are compared again; if all agree, no decision is needed.`,
 			send: async (reason) => {
 				await postReturnForCorrection(group.id, take.id, reason);
 				announce(`Returned to ${take.person}.`);
@@ -104,7 +104,7 @@ function Adjudication({ found }) {
 			keys: [String(place + 1)], label: 'Choose that annotation', group: 'Decide', shown: place === 0 ? `1 … ${annotations.length}` : 'hidden',
 			needs: /** @type {const} */ ('review'), run: () => choose(place),
 		})),
-		{ keys: [String(annotations.length + 1)], label: 'Continue from the chosen annotation', group: 'Decide', needs: 'review', run: flipThird },
+		{ keys: [String(annotations.length + 1)], label: 'Apply the chosen annotation and edit it further', group: 'Decide', needs: 'review', run: flipThird },
 		{ keys: ['Enter'], label: 'Decide', group: 'Decide', needs: 'review', run: decide },
 		{ keys: ['Shift+u'], label: 'Return the chosen one to its annotator, with a reason', group: 'Decide', needs: 'review', run: back },
 		{ keys: ['Escape'], label: 'Back to the list', group: 'Decide', run: () => navigate(agreementAddress(group.dataset.name)) },

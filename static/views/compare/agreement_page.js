@@ -47,7 +47,7 @@ function WaitingCard({ dataset }) {
 				<p class="agreement__text"><a class="button button--primary" href=${`/adjudicate/${items[0].group}`}>Decide the worst one</a></p>
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Groups that wait for a decision">
 					<table class="table">
-						<thead><tr><th>group</th><th>annotated by</th><th data-numeric="true">differences</th><th data-numeric="true">worst, × limit</th><th>waits since</th></tr></thead>
+						<thead><tr><th>group</th><th>annotated by</th><th data-numeric="true">differences</th><th data-numeric="true">worst, × limit</th><th>waiting since</th></tr></thead>
 						<tbody>${items.map((/** @type {WaitingJson} */ one) => html`
 							<tr key=${`${one.group} ${one.batch}`}>
 								<th scope="row"><a href=${`/adjudicate/${one.group}`}>${one.number}</a></th><td>${one.people.join(', ')}</td>
@@ -82,7 +82,7 @@ function PeopleCard({ found, dataset, batch }) {
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-people">
 			<h2 id="agreement-people">Agreement<span class="card__aside">median · 95th percentile, of JaC the 5th</span></h2>
-			<p class="agreement__text">All agree, so that the first annotation is used: ${found.agreed}${unjudged ? html` (<a class="link" href=${queueAddress(dataset, 'annotations:agreed status:unreviewed')}>${unjudged} without a verdict</a>)` : null}; decided: ${found.decided}; waiting for a decision: ${found.open}. Krippendorff’s α of the verdicts: ${coefficient(found.alpha)}.</p>
+			<p class="agreement__text">Groups whose annotations agree (the first one is used): ${found.agreed}${unjudged ? html` (<a class="link" href=${queueAddress(dataset, 'annotations:agreed status:unreviewed')}>${unjudged} without a verdict</a>)` : null}; decided: ${found.decided}; waiting for a decision: ${found.open}. Krippendorff’s α of the verdicts: ${coefficient(found.alpha)}.</p>
 			<div class="table__scroll" tabindex="0" role="region" aria-label="Agreement by pair of people">
 				<table class="table">
 					<thead><tr><th>people</th><th data-numeric="true">groups</th><th data-numeric="true">κ of verdicts</th><th data-numeric="true">lines, px</th><th data-numeric="true">ball, px</th><th data-numeric="true">3D ball, m</th><th data-numeric="true">JaC</th><th data-numeric="true">cameras, m</th></tr></thead>
@@ -100,7 +100,7 @@ function PeopleCard({ found, dataset, batch }) {
 const LIMITS = /** @type {{name: keyof LimitsJson, label: string, step: string}[]} */ ([
 	{ name: 'line_px', label: 'lines, px', step: 'any' }, { name: 'markings', label: 'markings drawn by only one person', step: '1' },
 	{ name: 'ball_px', label: 'ball centre, px', step: 'any' }, { name: 'diameter_px', label: 'ball diameter, px', step: 'any' },
-	{ name: 'ball_m', label: '3D ball, m', step: 'any' }, { name: 'jac', label: 'least JaC', step: 'any' },
+	{ name: 'ball_m', label: '3D ball, m', step: 'any' }, { name: 'jac', label: 'lowest JaC', step: 'any' },
 ]);
 
 /** @param {{limits: LimitsJson, dataset: string, saved: () => void}} props */
@@ -122,7 +122,7 @@ function LimitsCard({ limits, dataset, saved }) {
 	return html`
 		<section class="card" aria-labelledby="agreement-limits">
 			<h2 id="agreement-limits">Limits</h2>
-			<p>Annotations agree when they have the same verdict and differ by no more than this. The first annotation of a group whose annotations agree is used automatically, with the verdict that they gave. Where they gave none, the group waits for a verdict in the queue.</p>
+			<p>Annotations agree when they have the same verdict and differ by no more than this. The first annotation of a group whose annotations agree is used automatically, with the verdict that they gave. Without a verdict in the annotations, the group waits in the queue for one.</p>
 			<form class="agreement__limits" onSubmit=${save}>
 				${LIMITS.map(({ name, label, step }) => html`
 					<label key=${name}><span>${label}</span><input class="field"
@@ -168,7 +168,7 @@ function GroupsCard({ found }) {
 
 /** @param {IndependentAnnotationJson} one */
 function stateOf({ submitted: handed, settled, returned: back }) {
-	if (settled) return html`<span title="It is used in its group, or another one is">done</span> <small><${When} at=${settled} /></small>`;
+	if (settled) return html`<span title="This annotation, or another one of the same group, is used">done</span> <small><${When} at=${settled} /></small>`;
 	if (handed) return html`<strong>submitted</strong> <small><${When} at=${handed} /></small>`;
 	return back ? html`returned by ${back.by}${back.reason ? html`<small>“${back.reason}”</small>` : null}` : 'in progress';
 }
@@ -185,7 +185,7 @@ function TakesCard({ dataset, batch }) {
 	return html`
 		<section class="card card--flush" aria-labelledby="agreement-takes">
 			<h2 id="agreement-takes">Independent annotations<span class="card__aside">${plural(items.length, 'annotation')}</span></h2>
-			<p class="agreement__text">Open one to take it over into its group, or to return it to its annotator.</p>
+			<p class="agreement__text">Open an annotation to apply it to its group, or to return it to its annotator.</p>
 			<div class="table__scroll agreement__takes" tabindex="0" role="region" aria-label="Independent annotations">
 				<table class="table">
 					<thead><tr><th>group</th><th>person</th><th>verdict</th><th>state</th></tr></thead>
@@ -221,7 +221,7 @@ function LeadCards({ dataset }) {
 	if (!found.value) return html`<${Loading} what="the agreement" />`;
 	return html`
 		<${BatchChoice} dataset=${dataset} batch=${batch} choose=${setBatch} />
-		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__choice">Nothing is compared yet${batch === null ? '' : ' here'}. Assign groups to several annotators (<em>Assign…</em> in the queue, <em>Annotators per group</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
+		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__choice">No annotations are compared yet${batch === null ? '' : ' here'}. Assign groups to several annotators (<em>Assign…</em> in the queue, <em>Annotators per group</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
 		<${TakesCard} dataset=${dataset} batch=${batch} />
 		<${LimitsCard} key=${dataset} limits=${found.value.limits} dataset=${dataset} saved=${found.reload} />
 	`;

@@ -25,7 +25,7 @@ function Links({ groups }) {
 		<section class="card compare__card" aria-labelledby="compare-open">
 			<h2 id="compare-open">Open one</h2>
 			<p class="compare__links">${groups.map((group, place) => html`<a key=${group.id} class="button" href=${reviewAddress(group.id)}>${place + 1} · ${nameOf(group)}</a>`)}</p>
-			<p>Solid is what each one drew, dashed what the other one did. Both pictures zoom and move together.</p>
+			<p>Solid: drawn by the person named above. Dashed: drawn by the other person. Both pictures zoom and move together.</p>
 		</section>
 	`;
 }

@@ -21,7 +21,7 @@ function Sample({ row }) {
 
 export function Legend() {
 	return html`
-		<p class="note">These pictures are drawn by what draws the real ones. No meaning rests on colour alone: look at dash, shape and place.</p>
+		<p class="note">The same code draws these examples and the real pictures. Dash and shape have a meaning as well, so colour is never the only sign.</p>
 		<div class="legend">
 			${LEGEND.map(({ title, rows }) => html`
 				<section key=${title}>

@@ -64,17 +64,17 @@ const strip = (/** @type {'ok' | 'bad'} */ grade, /** @type {number} */ off, /**
 const PICTURES = {
 	title: 'Lines in the pictures',
 	rows: [
-		{ name: 'Line that fits', meaning: 'Where the camera puts a marking; every annotated point of it is close. Blue, solid.', tokens: 'canvas-ok', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings) },
-		{ name: 'Line worth a look', meaning: 'A point is more than half as far off as JaC allows. Orange, long dashes.', tokens: 'canvas-warn', draw: onGrass(sceneOf({ markings: [lineOf('warn', 5)] }), drawMarkings) },
+		{ name: 'Line that fits', meaning: 'A marking projected by the camera; all its annotated points are close. Blue, solid.', tokens: 'canvas-ok', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings) },
+		{ name: 'Doubtful line', meaning: 'A point is more than half as far off as JaC allows. Orange, long dashes.', tokens: 'canvas-warn', draw: onGrass(sceneOf({ markings: [lineOf('warn', 5)] }), drawMarkings) },
 		{ name: 'Line that is wrong', meaning: 'A point is farther off than JaC allows, so the marking counts against the view. Red, short dashes.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings) },
-		{ name: 'Visible line, not drawn', meaning: 'It should be visible here and has no points: it counts as missed. White on black dots, so that it is seen on white paint too; yellow with its name when the card offers to draw it.', tokens: 'canvas-unseen canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('unseen', null, { points: [] })] }), drawMarkings, drawUndrawn) },
-		{ name: 'Annotated point', meaning: 'A click of a person. White with a dark ring.', tokens: 'canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings, drawPoints) },
+		{ name: 'Visible line, not drawn', meaning: 'It should be visible here but has no points: it counts as missed. White dots on black; yellow with its name when the card offers to draw it.', tokens: 'canvas-unseen canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('unseen', null, { points: [] })] }), drawMarkings, drawUndrawn) },
+		{ name: 'Annotated point', meaning: 'A point that a person clicked. White with a dark ring.', tokens: 'canvas-point canvas-ink', draw: onGrass(sceneOf({ markings: [lineOf('ok', 1)] }), drawMarkings, drawPoints) },
 		{ name: 'Point of a wrong line', meaning: 'The ring is red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12)] }), drawMarkings, drawPoints) },
 		{ name: 'Point that is not used', meaning: 'The solver left its line out because it contradicts all others. Filled red.', tokens: 'canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { used: false })] }), drawPoints) },
 		{ name: 'Error line', meaning: 'Leads from the line to the annotated point; W makes it 1, 5 or 20 times as long as it is.', tokens: 'canvas-warn canvas-bad', draw: onGrass(sceneOf({ markings: [lineOf(gradeAt(12), 12)] }), drawMarkings, drawResidualLines, drawPoints) },
 		{ name: 'Proposed line', meaning: 'Read from the paint of a picture without a camera. It is not used until a person accepts it (Enter, Shift P). Violet, dashed, its name with a question mark.', tokens: 'canvas-predicted', draw: onGrass(sceneOf({}), proposalDrawing({ 'Side line': [{ x: 6, y: 34 }, { x: 40, y: 30 }, { x: 126, y: 20 }] })) },
 		{ name: 'Selected point', meaning: 'The yellow ring: arrows move this point.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('ok', 2, { marking: 'Side' })] }, { ...solid, viewport: { scale: 1, left: -50, top: 9 } }), drawPoints, drawSelectedPoint) },
-		{ name: 'Note', meaning: 'A remark that somebody left at this place.', tokens: 'canvas-warn canvas-point canvas-plate', draw: onGrass(sceneOf({ pins: [{ at: { x: 22, y: 40 }, text: 'check this' }] }), drawPins) },
+		{ name: 'Note', meaning: 'A note that a person left at this place.', tokens: 'canvas-warn canvas-point canvas-plate', draw: onGrass(sceneOf({ pins: [{ at: { x: 22, y: 40 }, text: 'check this' }] }), drawPins) },
 	],
 };
 
@@ -88,14 +88,14 @@ const BALLS = {
 		{ name: 'Fitting box', meaning: 'The box that the 3D ball would have here. White, dashed.', tokens: 'canvas-optimised', draw: onGrass(sceneOf({ ball: /** @type {any} */ ({ ...FIT, reprojected: null }), solved: /** @type {any} */ ({ included: true }) }), drawBall) },
 		{ name: 'Outline and cross', meaning: 'Where the 3D ball lies in this picture. Green; where a person marked the ball it must lie on it.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ ball: fit, outline: circle(66, 26, 12) }, { boxes: false }), drawBall) },
 		{ name: 'Expected ball', meaning: 'The ball is not drawn here; the other views see it at the green cross, and in 95 of 100 cases within the dashed ring.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({ solved: expecting, outline: circle(66, 26, 9) }), drawExpected) },
-		{ name: 'Placed ball', meaning: 'It was put where the other views see it (Y). It is exported and confirms nothing until a person moves it. Green dots.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({}, {}, [ballAt({ inferred: true })]), drawBall) },
-		{ name: 'What the card speaks about', meaning: 'The point, line or view that Enter would fix. Yellow.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { marking: 'Side' })] }, { meant: /** @type {any} */ ({ marking: 'Side', index: 0, caption: 'point 1 of Side' }) }), drawMarkings, drawPoints, drawSuggestionMarks) },
+		{ name: 'Placed ball', meaning: 'Placed automatically where the other views see it (Y). It is exported, but is no evidence until a person moves it. Green dots.', tokens: 'canvas-reprojected', draw: onGrass(sceneOf({}, {}, [ballAt({ inferred: true })]), drawBall) },
+		{ name: 'Subject of the card', meaning: 'The point, line or view that the fix on the card (Enter) changes. Yellow.', tokens: 'canvas-selected', draw: onGrass(sceneOf({ markings: [lineOf('bad', 12, { marking: 'Side' })] }, { meant: /** @type {any} */ ({ marking: 'Side', index: 0, caption: 'point 1 of Side' }) }), drawMarkings, drawPoints, drawSuggestionMarks) },
 		{ name: 'Selected ball', meaning: 'Yellow with corners: drag it, or its corners; arrows move it.', tokens: 'canvas-selected', draw: onGrass(sceneOf({}, { selected: { kind: 'ball', view: KEY } }, [ballAt()]), drawBall) },
 		{ name: 'Several balls', meaning: 'More than one is marked: choose the one in play.', tokens: 'canvas-human', draw: onGrass(sceneOf({}, {}, [ballAt({ box: [10, 28, 14, 14] }), ballAt({ box: [70, 28, 14, 14] })]), drawBall) },
 		{ name: 'Ray of another view', meaning: 'The ball of that view lies somewhere on this line. Dotted, in the colour of the view, with its letter.', tokens: 'view-b', draw: onGrass(sceneOf({ epipolars: [{ letter: 'B', points: [{ x: 130, y: 2 }, { x: 4, y: 48 }] }] }), drawEpipolars) },
 		{ name: 'Sure prediction', meaning: 'A detector found a ball here. It is not used until a person accepts it (Y). Violet brackets.', tokens: 'canvas-predicted', draw: onGrass(predicted(true), drawPredictions) },
 		{ name: 'Unsure prediction', meaning: 'The same with a low score. Dotted brackets.', tokens: 'canvas-predicted', draw: onGrass(predicted(false), drawPredictions) },
-		{ name: 'Yours and before', meaning: 'After a conflict: your version dotted in yellow, what both began with in grey.', tokens: 'canvas-selected canvas-muted', draw: onGrass(sceneOf({}, { ghosts }), drawGhosts) },
+		{ name: 'Your version and the original', meaning: 'After a conflict: your version dotted in yellow, the version before both changes in grey.', tokens: 'canvas-selected canvas-muted', draw: onGrass(sceneOf({}, { ghosts }), drawGhosts) },
 		{ name: 'Pixel grid', meaning: 'The borders of the frame’s own pixels, under the magnifying glass (hold Z).', tokens: 'canvas-grid canvas-stage', draw: (context) => {
 			context.fillStyle = colours.value.stage;
 			context.fillRect(0, 0, WIDTH, HEIGHT);
@@ -157,8 +157,8 @@ const PITCH = {
 	rows: [
 		{ name: 'Pitch', meaning: 'Seen from above, with its lines.', tokens: 'pitch-grass pitch-line', part: pitch(null) },
 		{ name: 'Camera and its ray', meaning: 'Where a camera stands, in the colour of its view, and the way to the ball that it sees.', tokens: 'view-a', part: pitch(html`<path class="mini-pitch__ray" data-letter="A" d="M20 40L108 14" stroke-width="1.3" /><g class="mini-pitch__camera" data-letter="A"><circle cx="20" cy="40" r="7" /><text x="20" y="43.6" font-size="10">A</text></g>`) },
-		{ name: 'Ball of a valid pair', meaning: 'Where two views meet, and count. Light ring.', tokens: 'ink-soft', part: pitch(html`<circle class="mini-pitch__pair" data-valid="true" cx="66" cy="26" r="4" stroke-width="1.5" />`) },
-		{ name: 'Ball of a pair that fails', meaning: 'Where two views come closest although they do not agree. Red ring.', tokens: 'bad', part: pitch(html`<circle class="mini-pitch__pair" data-valid="false" cx="66" cy="26" r="4" stroke-width="1.5" />`) },
+		{ name: 'Ball of a valid pair', meaning: 'Where the rays of two views meet. Light ring.', tokens: 'ink-soft', part: pitch(html`<circle class="mini-pitch__pair" data-valid="true" cx="66" cy="26" r="4" stroke-width="1.5" />`) },
+		{ name: 'Ball of a pair that fails', meaning: 'Where the rays of two views come closest, but too far apart. Red ring.', tokens: 'bad', part: pitch(html`<circle class="mini-pitch__pair" data-valid="false" cx="66" cy="26" r="4" stroke-width="1.5" />`) },
 		{ name: '3D ball', meaning: 'The ball of all valid pairs.', tokens: 'pitch-ball', part: pitch(html`<circle class="mini-pitch__ball" cx="66" cy="26" r="4" stroke-width="1.5" />`) },
 	],
 };
@@ -172,10 +172,10 @@ const SCENE = {
 	rows: [
 		{ name: 'Camera', meaning: 'A pyramid in the colour of its view; click it to look through it.', tokens: 'scene-view-a scene-view-b scene-view-c scene-view-d scene-view-e scene-view-f', part: scene(html`${LETTERS.map((letter, i) => html`<path class="legend__cone" data-letter=${letter} d=${`M${14 + i * 20} 12l-6 14h12z`} />`)}`) },
 		{ name: 'Ray of a valid pair', meaning: 'From a camera to the ball that it sees; solid.', tokens: 'scene-valid', part: scene(html`<path class="legend__ray" data-valid="true" d="M8 8L120 40" />`) },
-		{ name: 'Pair that fails', meaning: 'Where two views do not agree; red.', tokens: 'scene-invalid', part: scene(html`<circle class="legend__pair" cx="66" cy="26" r="4" />`) },
+		{ name: 'Pair that fails', meaning: 'Where the rays of two views come closest, but too far apart; red.', tokens: 'scene-invalid', part: scene(html`<circle class="legend__pair" cx="66" cy="26" r="4" />`) },
 		{ name: '3D ball, stem and shadow', meaning: 'The ball, the line down to the grass that shows its height, and its shadow.', tokens: 'scene-ball scene-stem scene-shadow', part: scene(html`<ellipse class="legend__shadow" cx="66" cy="42" rx="7" ry="2.5" /><path class="legend__stem" d="M66 12V42" /><circle class="legend__ball" cx="66" cy="12" r="5" />`) },
-		{ name: 'Uncertainty', meaning: 'The ball is inside with 95 % probability or so (two sigma).', tokens: 'scene-ellipsoid', part: scene(html`<ellipse class="legend__ellipsoid" cx="66" cy="26" rx="30" ry="9" />`) },
-		{ name: 'Most likely point', meaning: 'The point that fits all views at once, beside the pair average.', tokens: 'scene-best', part: scene(html`<circle class="legend__best" cx="66" cy="26" r="5" />`) },
+		{ name: 'Uncertainty', meaning: 'The ball lies inside with a probability of about 95 % (two sigma).', tokens: 'scene-ellipsoid', part: scene(html`<ellipse class="legend__ellipsoid" cx="66" cy="26" rx="30" ry="9" />`) },
+		{ name: 'Most likely point', meaning: 'The point that fits all views at once; the pair average is shown beside it.', tokens: 'scene-best', part: scene(html`<circle class="legend__best" cx="66" cy="26" r="5" />`) },
 		{ name: 'Pitch', meaning: 'Grass in stripes, lines and goals; around it ground and sky.', tokens: 'scene-sky scene-ground scene-grass scene-grass-stripe scene-line scene-goal', part: scene(html`<path class="legend__stripe" d="M44 22h44v30H44z" /><path class="legend__line" d="M4 46H128" /><path class="legend__goal" d="M50 30V14H82V30" />`) },
 	],
 };

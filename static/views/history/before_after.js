@@ -53,7 +53,7 @@ function Side({ view, state, other, tone, title }) {
 				${other ? html`<g class="past__other"><${Overlay} state=${other} tone=${tone === 'before' ? 'after' : 'before'} size=${size} markings=${markings} balls=${balls} /></g>` : null}
 				${state ? html`<${Overlay} state=${state} tone=${tone} size=${size} markings=${markings} balls=${balls} still=${true} />` : null}
 			</svg>
-			<figcaption>${title}${state && !state.included ? ' · not used' : ''}${state ? '' : ' · not there'}</figcaption>
+			<figcaption>${title}${state && !state.included ? ' · not used' : ''}${state ? '' : ' · did not exist'}</figcaption>
 		</figure>
 	`;
 }
@@ -81,7 +81,7 @@ export function BeforeAfter({ group, entry }) {
 						${view.before ? html`<${Side} view=${view} state=${view.before} other=${view.after} tone="before" title="Before" />` : null}
 						<${Side} view=${view} state=${view.after} other=${view.before} tone="after" title=${view.before ? 'After' : 'As imported'} />
 					</div>
-				</div>`) : html`<p class="past__none">Nothing drawn was changed.</p>`}
+				</div>`) : html`<p class="past__none">This change affected no lines or balls.</p>`}
 		</div>
 	`;
 }

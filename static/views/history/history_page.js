@@ -71,7 +71,7 @@ export function HistoryPage() {
 				<section class="card past" aria-labelledby="past-title">
 					<h2 id="past-title">History of group ${group.number}<span class="past__legend"><i data-tone="before"></i>before <i data-tone="after"></i>after</span></h2>
 					<ol class="past__entries">${[...found.value.items].reverse().map((entry) => html`<${Entry} key=${entry.id} entry=${entry} group=${group} />`)}</ol>
-					<p class="note">The newest first. Open an entry to see what it changed; <kbd>↑</kbd> <kbd>↓</kbd> go through them, <kbd>Esc</kbd> leads back. Everything of all groups stands in the <${Term} word="audit">audit<//>.</p>
+					<p class="note">Newest first. Open an entry to see what it changed; <kbd>↑</kbd> <kbd>↓</kbd> select an entry, <kbd>Esc</kbd> goes back to the group. The <${Term} word="audit">audit<//> lists the changes of all groups.</p>
 				</section>` : null}
 		<//>
 	`;

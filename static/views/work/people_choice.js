@@ -21,7 +21,7 @@ const PARTS = /** @type {{part: Part, title: string, note: string, roles: Role[]
 /** @param {{dataset: string, chosen: Chosen, choose: (chosen: Chosen) => void}} props `dataset`: its name */
 export function PeopleChoice({ dataset, chosen, choose }) {
 	const people = useResource(async (signal) => (isTeam && !signal.aborted ? getMembers(dataset) : { items: /** @type {MemberJson[]} */ ([]) }), [dataset]);
-	if (!isTeam) return html`<p class="note">This server has no accounts: the batch is yours.</p>`;
+	if (!isTeam) return html`<p class="note">This server has no accounts: the batch is assigned to you.</p>`;
 	/** @param {Part} part @param {string} name @param {boolean} on */
 	function turn(part, name, on) {
 		choose({ ...chosen, [part]: on ? [...chosen[part], name] : chosen[part].filter((one) => one !== name) });

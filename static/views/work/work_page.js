@@ -30,7 +30,7 @@ function MyBatch({ one: { batch, parts, left, returned: back }, first }) {
 	// Who is at something else already stays there; where another one becomes the first, nobody is taken to it.
 	useEffect(() => { if (first && document.activeElement === document.body) button.current?.focus(); }, []);
 	const go = () => attempt(goOn(batch.id), (some) => {
-		if (!some) inform(`No group of “${batch.name}” is available to you now: others have the rest open, or it waits for other people.`);
+		if (!some) inform(`No group of “${batch.name}” is available to you now: other people have the remaining groups open, or have to work on them first.`);
 	});
 	return html`
 		<li class="work__item">
