@@ -95,7 +95,7 @@ function PasswordForm({ name }) {
 		<form class="form" onSubmit=${send}>
 			<div class="form__row"><label for="login-name">Name</label><input class="field" id="login-name" name="name" required maxlength="200" autocomplete="username" autocapitalize="none" spellcheck=${false} defaultValue=${name} autofocus=${!name} /></div>
 			<div class="form__row"><label for="login-password">Password</label><input class="field" id="login-password" name="password" type="password" required maxlength="200" autocomplete="current-password" autofocus=${Boolean(name)} /></div>
-			${asked ? html`<div class="form__row"><label for="login-code">Code of your second factor</label><input class="field" id="login-code" name="code" required maxlength="40" autocomplete="one-time-code" spellcheck=${false} ref=${focused} aria-describedby="login-code-help" /><small id="login-code-help">A recovery code or a passkey does as well. Without any, an admin can take the second factor away.</small></div>` : null}
+			${asked ? html`<div class="form__row"><label for="login-code">Code of your second factor</label><input class="field" id="login-code" name="code" required maxlength="40" autocomplete="one-time-code" spellcheck=${false} ref=${focused} aria-describedby="login-code-help" /><small id="login-code-help">You can also use a recovery code or a passkey. If you have none, an admin can remove the second factor.</small></div>` : null}
 			<${FormError} error=${error?.pointer === '/code' && !answered.current ? null : error} />
 			<p><button class="button button--primary" type="submit" aria-disabled=${busy}>Log in</button></p>
 		</form>

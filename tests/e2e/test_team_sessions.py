@@ -230,11 +230,11 @@ class TestSessions:
         console.expect("the server responded with a status of 404")
         page = open_page("/groups", address=team)
         for path, sentence in {
-            f"/join#{'x' * 300}": "This link is not good any more",
-            "/join#what%20is%20this?": "This link is not good any more",
+            f"/join#{'x' * 300}": "This link is no longer valid",
+            "/join#what%20is%20this?": "This link is no longer valid",
             f"/login?state={'x' * 300}&code=x": "This address does not belong to a login",
             f"/login?state=x&code={'x' * 5000}": "This address does not belong to a login",
-            "/login?state=x&code=x": "That took too long, was answered before",
+            "/login?state=x&code=x": "This login has expired, was completed already",
             "/login?error=KeyError": "The provider refused the request of this server",
         }.items():
             page.goto("about:blank")

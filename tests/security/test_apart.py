@@ -187,7 +187,7 @@ class TestNewDatasets:
             assert (refused.status_code, "in all datasets" in refused.text) == (403, True)
         asked = {"dataset": MINE, "format": "issia", "source": folder, "dry_run": True}
         looked_for = apart.ask("mine-lead", "POST", "/imports", asked)
-        assert (looked_for.status_code, "no folders may be" in looked_for.text) == (400, True)
+        assert (looked_for.status_code, "has allowed no folder" in looked_for.text) == (400, True)
 
 
 class TestMembers:

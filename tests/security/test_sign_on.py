@@ -33,7 +33,7 @@ class TestComingIn:
         again = door.enter()
         assert name_in(again) == "anna"
         assert session_in(again) != session_in(entered), "every login has a session of its own"
-        assert_refused(door.team.ask("POST", BEGIN, {"link": link}), 404, "not good any more")
+        assert_refused(door.team.ask("POST", BEGIN, {"link": link}), 404, "no longer valid")
         people = json.loads(door.team.ask("GET", f"{API}/users", role="admin").body)["items"]
         assert {one["name"]: one["sign_on"] for one in people}["anna"] == "anna"
         said = json.loads(door.team.ask("GET", f"{API}/audit", role="admin").body)["items"]
@@ -282,7 +282,7 @@ class TestSecondFactor:
         later = lambda: clock() + timedelta(minutes=11)  # noqa: E731
         monkeypatch.setattr(door.team.app.state.team.factors, "_clock", later)
         assert_refused(door.team.ask("POST", own, {}, Cookie=cookie), 400, "ten minutes")
-        assert_refused(door.team.ask("POST", own, {}, role="viewer"), 400, "takes your password")
+        assert_refused(door.team.ask("POST", own, {}, role="viewer"), 400, "needs your password")
 
 
 class TestOnly:

@@ -306,8 +306,8 @@ def _plan_group(
         group = after
     if any(one.error is not None for one in outcomes.values()):
         spoilt = ConflictError(
-            "another item of the same group is refused",
-            hint="A group is edited whole or not at all.",
+            "another item of the same group was refused",
+            hint="All items of a group are applied, or none.",
         )
         for index, one in outcomes.items():
             if one.error is None:

@@ -70,7 +70,7 @@ def _require_states(edit: BulkEdit) -> None:
             )
         if item.etag is not None and not STRONG_ETAG.fullmatch(item.etag):
             raise InputError(
-                "the etag of an item must be one strong ETag, in its quotes",
+                "the etag of an item must be a single strong ETag, including its quotes",
                 hint='Send the "etag" of the group as it is.',
                 pointer=pointer,
             )

@@ -131,7 +131,7 @@ class SetStationCamera:
         """The station with that camera."""
         if self.given is None and self.covariance is not None:
             raise InputError(
-                "a covariance needs the camera that it belongs to, in `given`",
+                "a covariance needs its camera in `given`",
                 pointer="/covariance",
             )
         return replace(
@@ -267,7 +267,7 @@ class IncludeView:
         """The group with or without the view."""
         why = left_out(self.reason, self.note)
         if self.included and why is not None:
-            raise InputError("only a view that is left out has a reason", pointer="/reason")
+            raise InputError("only a left-out view can have a reason", pointer="/reason")
         view = need_view(group, self.view)
         return group.with_view(replace(view, included=self.included, left_out=why))
 
@@ -401,7 +401,7 @@ def _checked_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[Image
         if not all(math.isfinite(value) and abs(value) <= MAX_PIXEL for value in point):
             pointer = f"/lines/{marking.replace('~', '~0').replace('/', '~1')}/{index}"
             raise InputError(
-                f"point {index + 1} of {marking} is not a number of pixels that a picture can have",
+                f"point {index + 1} of {marking} is not a valid pixel coordinate",
                 pointer=pointer,
             )
     return points
@@ -419,6 +419,6 @@ def _check_ball(ball: BallAnnotation) -> None:
             raise InputError("a ball's box needs a width and a height above zero", pointer="/box")
     if not all(math.isfinite(value) and abs(value) <= MAX_PIXEL for value in numbers):
         raise InputError(
-            "the place of the ball is not a number of pixels that a picture can have",
+            "the place of the ball is not a valid pixel coordinate",
             pointer="/box" if ball.box else "/point",
         )

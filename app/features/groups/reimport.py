@@ -67,7 +67,7 @@ def follow_group(stored: StoredGroup, incoming: Group) -> MergedGroup:
         if incoming.view(view.key) is None and stored.is_edited(view.key):
             views.append(view)
             bases.append(view)
-            sentence = f"{view.key} is gone from the dataset; a person had edited it, so it stays"
+            sentence = f"{view.key} is no longer in the imported files; it is kept because a person edited it"
             kept.append(KeptEdit(view.key, sentence))
     return MergedGroup(
         replace(incoming, views=tuple(views)), replace(incoming, views=tuple(bases)), tuple(kept)
@@ -109,7 +109,7 @@ def follow_station(
         return MergedStation(incoming, incoming, None)
     kept = None
     if station_digest(incoming) not in (stored.digest, stored.source_digest):
-        sentence = f"the dataset has new lines or a new camera for {incoming.key}; edits stay"
+        sentence = f"the imported files have new lines or a new camera for {incoming.key}; the edits are kept"
         kept = KeptEdit(None, sentence)
     # What no edit can touch follows all the same.
     station = incoming.with_annotations_of(stored.station)
@@ -129,7 +129,9 @@ def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept
         result = replace(view, balls=old.balls, included=old.included, left_out=old.left_out)
         # Neither what it said before nor what the person says.
         if view_digest(view) not in stored.view_digests[view.key]:
-            sentence = f"the dataset has another ball in {view.key}; the edited one stays"
+            sentence = (
+                f"the imported files have another ball in {view.key}; the edited ball is kept"
+            )
             kept.append(KeptEdit(view.key, sentence))
     if result.balls == old.balls:
         # How noisy they are is no word of the dataset's.

@@ -124,7 +124,7 @@ def require_etag(current: str, if_match: str, what: str) -> None:
     """
     if content_tag_of(current) != content_tag_of(if_match):
         raise StaleRevisionError(
-            f"{what} has changed in the meantime", base_etag=if_match, current_etag=current
+            f"{what} was changed meanwhile", base_etag=if_match, current_etag=current
         )
 
 

@@ -29,7 +29,9 @@ def _plan_step(kind: str) -> Plan:
         try:
             group = edit_from_json(body["edit"]).apply(record.stored.group)
         except NotFoundError as error:
-            raise ConflictError(f"this cannot be done any more: {error.message}") from error
+            raise ConflictError(
+                f"this can no longer be undone or redone: {error.message}"
+            ) from error
         return GroupChange(kind, body, group)
 
     return plan

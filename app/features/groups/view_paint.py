@@ -46,9 +46,7 @@ MOST_KNOWN = 12
 """Groups of a match whose cameras say where to look first; one stand needs no more."""
 PLAIN_SHARE = 0.01
 """Of the diagonal a lens centre may lie off the middle, and of its size a pixel be too wide."""
-NO_FRAME_HINT = (
-    "The import's report says why; importing again after the files are mended attaches the frames."
-)
+NO_FRAME_HINT = "The report of the import gives the reason. Correct the files and import them again to attach the frames."
 
 
 @dataclass(frozen=True)
@@ -140,9 +138,7 @@ def _find(session: Session, view_id: int) -> tuple[StoredGroup, View]:
 
 def _media(view: View) -> Media:
     if view.media is None:
-        raise NotFoundError(
-            f"view {view.key}: this view has no frame that could be read", hint=NO_FRAME_HINT
-        )
+        raise NotFoundError(f"view {view.key}: this view has no readable frame", hint=NO_FRAME_HINT)
     return view.media
 
 

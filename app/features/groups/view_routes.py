@@ -263,7 +263,7 @@ async def _picture(
     What is wrong with it is said with the view that it belongs to.
     """
     if view.media is None:
-        raise NotFoundError("this view has no frame that could be read", hint=NO_FRAME_HINT)
+        raise NotFoundError("this view has no readable frame", hint=NO_FRAME_HINT)
     with with_view_in_error(view.key):
         found = await to_thread.run_sync(frames.cached, view.media, width, view.flipped)
         if found is not None:

@@ -58,7 +58,7 @@ def _logged(group: Group) -> Json:
     return {**group_head_to_json(group), "views": views}
 
 
-GONE = "this group is gone from the dataset; it stays until a person rejects it"
+GONE = "this group is no longer in the imported files; it is kept until a person rejects it"
 
 
 def of_read_matches(

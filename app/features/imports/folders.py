@@ -88,11 +88,11 @@ def resolve_folder(settings: Settings, path: str) -> Root:
     folders = allowed_folders(settings)
     if not folders:
         raise InputError(
-            "no folders may be imported from",
-            hint="The operator names them in TOUCHLINE_IMPORT_FOLDERS; or upload the data.",
+            "the operator has allowed no folder for imports",
+            hint="Upload the data, or ask the operator to set TOUCHLINE_IMPORT_FOLDERS.",
         )
     if any(len(part.encode(errors="replace")) > MAX_PART for part in path.split("/")):
-        raise NotFoundError("there is no folder of so long a name to import from")
+        raise NotFoundError("the folder name is too long")
     root, _, inside = require_safe_path(path.rstrip("/")).partition("/")
     if root not in folders:
         names = ", ".join(sorted(folders))

@@ -182,7 +182,9 @@ def _note_missing(
     report.missing = len(missing)
     if report.missing:
         groups = plural(report.missing, "group")
-        report.problems.append(f"{groups} of an earlier import did not come again; all stay")
+        report.problems.append(
+            f"{groups} of an earlier import are missing in this import; all are kept"
+        )
     return missing
 
 
@@ -195,7 +197,7 @@ def _storable(
         if group.key in seen:
             report.problems.append(f"group {group.key} appears twice; the first one counts")
         elif len(set(keys)) < len(keys):
-            report.problems.append(f"group {group.key} has two views of one name")
+            report.problems.append(f"group {group.key} has two views with the same name")
         else:
             # One that is left out is not missing: the source brought it.
             seen.add(group.key)

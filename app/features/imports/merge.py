@@ -281,7 +281,7 @@ def _note_policy(session: Session, run: _Run) -> None:
     row = find_dataset(session, run.dataset)
     if row is not None and row.policy_hash != run.head.policy.hash:
         run.report.problems.append(
-            "the other installation judges by another policy; the one here stays"
+            "the other installation uses another policy; the policy of this installation is kept"
         )
 
 

@@ -176,8 +176,8 @@ async def upload_file(
     else:
         if not mark:
             raise InputError(
-                f"{name} comes in parts, and nothing tells it from another file of its name and size",
-                hint="Say in mark when it was changed, or its digest.",
+                f"{name} is uploaded in parts and needs a mark that identifies it",
+                hint="Send its modification time or digest as mark.",
                 pointer="/mark",
             )
         upload = await _on_disk(partial(begin_in_parts, settings, name, size, mark, by=actor))

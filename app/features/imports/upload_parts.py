@@ -88,7 +88,7 @@ def _require_disk(settings: Settings, upload: Upload) -> None:
     if missing > free:
         raise StorageError(
             f"{upload.name} needs {missing:,} bytes more, and the disk of the server has {free:,}",
-            hint="Free some space and send it again: it goes on where it stopped.",
+            hint="Free some space and send the file again: the upload continues where it stopped.",
         )
 
 
@@ -130,7 +130,7 @@ class PartWriter:
                 raise InputError(
                     f"{upload.name} is longer than the {upload.whole_size:,} bytes that it was said "
                     "to have",
-                    hint="Send it anew as what it is now.",
+                    hint="Start a new upload for the changed file.",
                 )
             if fresh:
                 path = content_path(self._settings, upload)
@@ -151,8 +151,8 @@ class PartWriter:
     def _require(self, upload: Upload) -> None:
         if self._next > upload.bytes:
             raise ConflictError(
-                f"{upload.bytes:,} bytes of {upload.name} are here, and these begin at {self._next:,}",
-                hint="Ask how many there are (GET /api/v1/uploads/ID), and go on from there.",
+                f"{upload.bytes:,} bytes of {upload.name} were received, and these begin at {self._next:,}",
+                hint="Request the number of received bytes (GET /api/v1/uploads/ID), and continue there.",
             )
 
 
@@ -180,5 +180,5 @@ def _storage_errors(upload: Upload) -> Iterator[None]:
         raise StorageError(
             f"the disk of the server {why}: {upload.bytes:,} of {upload.whole_size:,} bytes of "
             f"{upload.name} are there",
-            hint="Free some space and send it again: it goes on where it stopped.",
+            hint="Free some space and send the file again: the upload continues where it stopped.",
         ) from error

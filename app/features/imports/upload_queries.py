@@ -107,7 +107,7 @@ def upload_path(settings: Settings, upload_id: str) -> Path:
     upload = get_upload(settings, upload_id)
     if upload.bytes < upload.whole_size:
         raise ConflictError(
-            f"only {upload.bytes:,} of {upload.whole_size:,} bytes of {upload.name} are here",
+            f"only {upload.bytes:,} of {upload.whole_size:,} bytes of {upload.name} were received",
             hint="Send the rest of it first.",
         )
     return content_path(settings, upload)
@@ -178,7 +178,7 @@ def delete_upload(
 def require_unread(upload: Upload) -> None:
     """Raise InputError while a dataset reads frames from an upload."""
     if upload.kept:
-        raise InputError("a dataset reads its frames from this upload, so it stays")
+        raise InputError("a dataset reads its frames from this upload, so it cannot be deleted")
 
 
 def expire_uploads(settings: Settings) -> int:
@@ -397,7 +397,7 @@ class UploadWriter:
             # What lies there has no record, so nobody can have been told of it.
             _remove(place)
         raise StorageError(
-            "the upload could not be put in its place",
+            "the upload could not be stored",
             hint="Wait, then send it again with the same Idempotency-Key.",
         )
 
@@ -453,7 +453,7 @@ def _storage_errors() -> Iterator[None]:
         yield
     except OSError as error:
         full = is_full_disk(error)
-        problem = "the disk is full" if full else f"the disk refuses ({error.strerror})"
+        problem = "the disk is full" if full else f"the disk cannot be written ({error.strerror})"
         raise StorageError(
             f"{problem}: the upload was not kept", hint="Free some space and send it again."
         ) from error

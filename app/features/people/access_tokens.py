@@ -42,8 +42,8 @@ MOST = 50
 """Tokens of one person."""
 NOTED_AFTER = timedelta(minutes=5)
 """When a token was used is written down no more often."""
-INVALID = "this token is not valid (any more)"
-CUT = "this is no whole token: something is missing, or a letter is wrong"
+INVALID = "this token is unknown, expired or ended"
+CUT = "this token is incomplete or mistyped"
 ANOTHER = "Make another one under Account, in the browser."
 _LETTERS = string.digits + string.ascii_uppercase + string.ascii_lowercase
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 ._-]{0,38}[A-Za-z0-9])?")
@@ -163,7 +163,7 @@ class AccessTokens:
             NotLoggedInError: It is none, has expired or was ended, or its person is disabled.
         """
         if not has_valid_checksum(text):
-            raise NotLoggedInError(CUT, hint="Copy it again, all of it.")
+            raise NotLoggedInError(CUT, hint="Copy the complete token again.")
         with self._store.read_one() as session:
             row = find_access_token(session, token_hash(text), text_of(self._clock()), LEADING)
         if row is None:
@@ -211,7 +211,7 @@ class AccessTokens:
             if row is None or person is None:
                 raise NotFoundError(
                     f"there is no token {token_id}",
-                    hint="Account in the browser, or touchline users tokens, lists those there are.",
+                    hint="The page Account, or touchline users tokens, lists your tokens.",
                 )
             delete_access_token(session, token_id)
             _log(session, actor, person, "token ended", {"id": token_id, "name": row.name})

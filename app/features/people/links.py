@@ -70,10 +70,10 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
             pointer=pointer,
         )
     if password.casefold() == name.casefold():
-        raise InputError("a password is not the name itself", pointer=pointer)
+        raise InputError("a password must differ from the name", pointer=pointer)
     if _in_turn(lambda: _is_easy_to_guess(password, name)):
         raise InputError(
-            "this password is easy to guess: it is one of the common ones, or made of few parts",
+            "this password is easy to guess: it is common, or repeats a few parts",
             hint="Three or four unrelated words are easy to remember.",
             pointer=pointer,
         )
@@ -103,7 +103,9 @@ def _placeholder_hash() -> str:
 
 def _in_turn(work: Callable[[], T]) -> T:
     if not _turns.acquire(timeout=PATIENCE):
-        raise OverloadedError("too many people log in at this moment", hint="Try again in a while.")
+        raise OverloadedError(
+            "too many people are logging in at this moment", hint="Try again in a while."
+        )
     try:
         return work()
     finally:
@@ -112,7 +114,7 @@ def _in_turn(work: Callable[[], T]) -> T:
 
 LASTS = timedelta(days=3)
 FIRST_LASTS = timedelta(hours=24)
-GONE = "this link is not good any more: it was used, replaced, or is too old"
+GONE = "this link is no longer valid: it was used, replaced, or has expired"
 ASK = "Ask an admin of this server for a new one."
 
 

@@ -43,10 +43,10 @@ LASTS = timedelta(days=14)
 """And every session after so long."""
 NOTED_AFTER = timedelta(minutes=5)
 """When a session was used is written down no more often."""
-WRONG = "that name and that password do not belong together"
+WRONG = "the name or the password is wrong"
 ASK_CODE = "the code of your second factor is missing"
-WRONG_CODE = "that is not the code of this moment, or it was used before"
-LOST = "A passkey or a recovery code does as well; without any, an admin can take the second factor away."
+WRONG_CODE = "this code is wrong, expired, or was used before"
+LOST = "You can also use a passkey or a recovery code. If you have none, an admin can remove the second factor."
 MOST = 20
 """Sessions of one person; the one that was used longest ago makes room."""
 
@@ -323,7 +323,7 @@ class Logins:
         with self._store.read() as session:
             person = person_by_id(session, login.person_id)
         if person is None or not is_password(old, person.password):
-            raise InputError("that is not your present password", pointer="/old")
+            raise InputError("this is not your present password", pointer="/old")
         hashed = hash_password(new, login.name, pointer="/new")
         with self._store.write() as session:
             found = logins_of(session, login.person_id, **self._alive(self._clock()))

@@ -101,7 +101,9 @@ def give_role(
         ConflictError: They are an admin, who may do everything in every dataset.
     """
     if role is Role.ADMIN:
-        raise InputError("an admin is one of the whole server, not of a dataset", pointer="/role")
+        raise InputError(
+            "the role admin applies to the whole server, not to a dataset", pointer="/role"
+        )
     with store.write() as session:
         dataset_id = _need_dataset(session, dataset)
         person = person_by_id(session, person_id)

@@ -57,8 +57,10 @@ MOST = 20
 """Passkeys of one person."""
 VERIFIED = UserVerificationRequirement.REQUIRED
 REFUSED = "this passkey is not accepted"
-AGAIN = "Try again; if it stays so, log in with your password and make another one under Account."
-LATE = "that took too long, or was answered before"
+AGAIN = (
+    "Try again; if it fails again, log in with your password and add another passkey under Account."
+)
+LATE = "the request has expired, or was answered already"
 
 
 @dataclass(frozen=True)
@@ -168,7 +170,7 @@ class Passkeys:
             if name in {row.name for row in rows}:
                 raise ConflictError(f"you have a passkey {name} already", hint="Name it otherwise.")
             if find_passkey(session, values["credential"]) is not None:
-                raise ConflictError("this passkey is known already")
+                raise ConflictError("this passkey is registered already")
             number = insert_passkey(session, values)
             codes = [] if count_recovery_codes(session, login.person_id) else new_codes()
             if codes:
@@ -267,7 +269,7 @@ def _verified(row: Any, credential: dict[str, Any], challenge: bytes, site: Pass
     """How often the device says that it has signed; raises NotLoggedInError unless it has, this."""
     try:
         if base64url_to_bytes(credential["response"]["userHandle"]) != _handle(row.person_id):
-            raise ValueError("the passkey says that it is another person's")
+            raise ValueError("this passkey belongs to another person")
         return verify_authentication_response(
             credential=credential,
             expected_challenge=challenge,
@@ -284,7 +286,7 @@ def _verified(row: Any, credential: dict[str, Any], challenge: bytes, site: Pass
 
 def _require_room(rows: Any) -> None:
     if len(rows) >= MOST:
-        raise ConflictError(f"you have {MOST} passkeys", hint="Take one away first.")
+        raise ConflictError(f"you have {MOST} passkeys", hint="Delete one of them first.")
 
 
 def _handle(person_id: int) -> bytes:

@@ -80,12 +80,10 @@ class ProviderClient:
                 return address
         except ValueError:
             pass
-        log.warning(
-            "the provider names an address that is not its own", address=repr(address)[:200]
-        )
+        log.warning("the provider names an address of another server", address=repr(address)[:200])
         raise ConflictError(
             f"{self._rules.label} names an address to which this server sends no requests",
-            hint="Whoever runs this server can allow it by TOUCHLINE_SSO_HOSTS.",
+            hint="The operator of this server can allow it with TOUCHLINE_SSO_HOSTS.",
         )
 
     async def _fetch(
@@ -118,7 +116,7 @@ class ProviderClient:
 
     def _failed(self) -> ConflictError:
         return ConflictError(
-            f"{self._rules.label} does not answer as it should",
+            f"{self._rules.label} gave an invalid response",
             hint="Try again in a while; the server's log says more.",
         )
 
@@ -187,7 +185,7 @@ class Provider:
         """Where a browser goes to log in.
 
         Raises:
-            ConflictError: The provider does not answer as it should.
+            ConflictError: The provider gave an invalid response.
         """
         there = self._describe()
         address, _ = self._client(request).create_authorization_url(
@@ -203,7 +201,7 @@ class Provider:
 
         Raises:
             NotLoggedInError: The code, or what it is good for, is refused.
-            ConflictError: The provider does not answer as it should.
+            ConflictError: The provider gave an invalid response.
         """
         return self._verified(self._exchange(request, code), request)
 
@@ -211,7 +209,7 @@ class Provider:
         """A sentence on where it is, having asked it anew.
 
         Raises:
-            ConflictError: The provider does not answer as it should.
+            ConflictError: The provider gave an invalid response.
         """
         self._description = None
         self._describe()
@@ -325,7 +323,7 @@ class Provider:
 
     def _refusal(self) -> NotLoggedInError:
         return NotLoggedInError(
-            f"{self._rules.label} does not vouch for this login", hint=REFUSED_HINT
+            f"{self._rules.label} does not confirm this login", hint=REFUSED_HINT
         )
 
     def _changed_error(self, what: str) -> ConflictError:

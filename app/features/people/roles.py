@@ -99,7 +99,7 @@ def require(role: Role, action: Action, where: str = "") -> None:
     """Raise ForbiddenError unless a role lets somebody do that; ``where`` it counts, in words."""
     if not lets(role, action):
         raise ForbiddenError(
-            f"this needs the role {LEAST[action]}{where}; yours is {role}",
+            f"this action needs the role {LEAST[action]}{where}; yours is {role}",
             hint="An admin of this server can change your role, a lead that in their dataset.",
         )
 
@@ -110,7 +110,9 @@ def require_scope(scopes: Collection[Scope], action: Action) -> None:
         return
     missing = next((scope for scope, allowed in SCOPES.items() if action in allowed), None)
     if missing is None:
-        raise ForbiddenError("no token may do this", hint="Log in and do it in the browser.")
+        raise ForbiddenError(
+            "this action is not allowed with a token", hint="Log in and do it in the browser."
+        )
     raise ForbiddenError(
         f"this token lacks the scope {missing}; it has {' and '.join(scopes)}",
         hint="Make another one under Account, with that scope.",
@@ -205,7 +207,7 @@ def checked_name(text: str) -> str:
         raise InputError(
             f"{quoted(name)} cannot be the name of a person",
             hint="Use up to 40 small letters, digits and . _ -, with a letter or digit at both ends;"
-            f" {', '.join(sorted(_TAKEN))} mean something else here.",
+            f" {', '.join(sorted(_TAKEN))} are reserved.",
             pointer="/name",
         )
     return name
@@ -215,7 +217,7 @@ def require_no_token(actor: str) -> None:
     """Raise ForbiddenError where a token asks: who may come in, and as what, is decided by people."""
     if person_of(actor) != actor:
         raise ForbiddenError(
-            "no token makes people or changes their rights",
+            "a token cannot add people or change their rights",
             hint="An admin does it in the browser, or touchline users on the machine.",
         )
 

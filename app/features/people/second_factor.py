@@ -106,7 +106,7 @@ class SecondFactors:
             found = find_second_factor(session, login.person_id)
             if found is not None and found.confirmed:
                 raise ConflictError(
-                    "you have an authenticator already", hint="Take it away first, then begin anew."
+                    "you have an authenticator already", hint="Remove it first, then add a new one."
                 )
             put_second_factor(session, login.person_id, salt, now())
         totp = totp_of(self._store, login.person_id, salt)
@@ -127,11 +127,11 @@ class SecondFactors:
         with self._store.write() as session:
             found = find_second_factor(session, login.person_id)
             if found is None or found.confirmed:
-                raise NotFoundError("no second factor waits to be confirmed")
+                raise NotFoundError("there is no second factor to confirm")
             if not use_totp(session, self._store, login.person_id, code, self._clock()):
                 raise InputError(
-                    "that is not the code of this moment",
-                    hint="Is the clock of the device right?",
+                    "this code is wrong or has expired",
+                    hint="Check the clock of the device, and type the present code.",
                     pointer="/code",
                 )
             confirm_second_factor(session, login.person_id, code_hashes(codes))
@@ -211,7 +211,9 @@ def end_factor(session: Session, login: Login) -> None:
     if has_second_factor(session, login.person_id):
         return
     if is_required(session):
-        raise ConflictError("everybody needs a second factor here", hint="Make another one first.")
+        raise ConflictError(
+            "this server requires a second factor of everybody", hint="Make another one first."
+        )
     delete_recovery_codes(session, login.person_id)
 
 
@@ -224,7 +226,7 @@ def require_password(store: Store, login: Login, password: str | None, at: datet
         if login.way is LoginMethod.SIGN_ON and login.created and at - login.created < FRESH:
             return
         raise InputError(
-            "that takes your password, or a login by single sign-on within the last ten minutes",
+            "this action needs your password, or a login by single sign-on within the last ten minutes",
             hint="Without a password: log out, log in again, and come back here.",
             pointer="/password",
         )

@@ -99,7 +99,7 @@ def require_no_people(store: Store) -> None:
     """
     if has_people(store):
         raise InputError(
-            "this home has accounts: without --team the server would not ask for a login",
+            "this home has accounts, but without --team the server would not require a login",
             hint="Serve with --team; or with --alone, if only you can reach this machine.",
         )
 
@@ -142,7 +142,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
         person = _read(session, person_id)
         if person_of(actor) != actor:
             raise ForbiddenError(
-                "no token sets a password", hint="An admin makes the link in the browser."
+                "a token cannot set a password", hint="An admin makes the link in the browser."
             )
         if person.name == actor:
             raise ForbiddenError(

@@ -41,7 +41,7 @@ from app.finite import json_text
 
 LASTS = timedelta(minutes=10)
 """So long somebody may take to log in at the provider."""
-LATE = "that took too long, was answered before, or began in another browser"
+LATE = "this login has expired, was completed already, or began in another browser"
 FACTOR = "/factor"
 """Pointer of a refusal that asks for the code of a second factor."""
 _OWN = re.compile(r"/(?![/\\])[!-\[\]-~]*")
@@ -131,10 +131,10 @@ class SignOn:
         Raises:
             InputError: ``to`` is no page of ours, or the name cannot be one.
             NotFoundError: The link is not good.
-            ConflictError: The provider does not answer as it should.
+            ConflictError: The provider gave an invalid response.
         """
         if not _OWN.fullmatch(to) or len(to) > _LONGEST:
-            raise InputError("that is no page of this server", pointer="/to")
+            raise InputError("this is not a page of this server", pointer="/to")
         if link is not None and look(self._store, link).name is None:
             name = checked_name(name or "")
         return self._begin(asker, redirect, to, link=link, name=name)
@@ -184,7 +184,7 @@ class SignOn:
                 vouch for it, or who that is may not come in; or a code is missing (``pointer`` is then
                 ``FACTOR``: ask again with the same state).
             InputError: The same of an account that is to be linked.
-            NotFoundError: The link is not good any more.
+            NotFoundError: The link is no longer valid.
             ConflictError: The account is another person's, a name is taken, or the provider does not answer.
         """
         found = self._begun.take(token_hash(state))
@@ -192,7 +192,7 @@ class SignOn:
         if begun is None or not compare_digest(begun.browser, token_hash(asker)):
             raise NotLoggedInError(LATE, hint="Begin again.")
         if issuer is not None and issuer != self.rules.issuer:
-            raise NotLoggedInError("another provider has answered", hint="Begin again.")
+            raise NotLoggedInError("the response comes from another provider", hint="Begin again.")
         if begun.session is not None:
             return self._link(begun, code, login)
         claims = begun.claims or self._claims(begun, code)

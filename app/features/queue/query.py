@@ -100,7 +100,7 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
         if term.field == "sort":
             if negative:
                 raise InputError(
-                    "an order cannot be turned round with a minus",
+                    "a sort order cannot be reversed with a minus sign",
                     hint=_REVERSE,
                     pointer=term.pointer,
                 )

@@ -37,11 +37,11 @@ def decode(query: Query, cursor: str) -> list[Key]:
         text = base64.b64decode(padded, altchars=b"-_", validate=True)
         name, *values = json.loads(text)
     except (binascii.Error, ValueError, TypeError) as error:
-        raise InputError("the cursor is damaged", pointer="/cursor") from error
+        raise InputError("the cursor is invalid", pointer="/cursor") from error
     sound = all(map(_is_key, values))
     if name != _name(query) or len(values) != len(query.order.keys) or not sound:
         raise InputError(
-            "this cursor came from another query; ask for the first page of this one",
+            "this cursor belongs to another query; request the first page without a cursor",
             pointer="/cursor",
         )
     return list(values)
@@ -189,7 +189,7 @@ def list_groups(
     if not 1 <= limit <= MAX_PAGE:
         raise InputError(f"a page has 1 to {MAX_PAGE} groups", pointer="/limit")
     if cursor is not None and start is not None:
-        raise InputError("a page begins at a cursor or at a position, not both", pointer="/from")
+        raise InputError("give a cursor or a position, not both", pointer="/from")
     order = parsed.order
     keys = None if cursor is None else decode(parsed, cursor)
     with store.read() as session:

@@ -112,7 +112,7 @@ def submit_station(
 
     Raises:
         StaleRevisionError: ``if_match`` is not the station's present ETag.
-        ConflictError: The station belongs to one view alone, which is where it is edited.
+        ConflictError: The station belongs to a single view alone, which is where it is edited.
         InputError: The edit says something impossible.
     """
 
@@ -208,7 +208,7 @@ def _planned(
     state = _read(session, station_id)
     if not state.station.shared:
         raise ConflictError(
-            f"station {state.station.key} belongs to one view",
+            f"station {state.station.key} belongs to a single view",
             hint="Edit the lines of that view instead.",
         )
     require_etag(state.etag, if_match, f"camera {state.station.key}")

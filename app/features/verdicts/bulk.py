@@ -215,7 +215,7 @@ def _require_expected(found: VerdictSelection, expected: int | None) -> None:
     if expected is not None and expected != len(found.change):
         raise ConflictError(
             f"{plural(len(found.change), 'group')} would change, not {expected}",
-            hint="Look at what would happen once more (dry_run=true).",
+            hint="Repeat the dry run (dry_run=true) and check its result.",
         )
 
 
@@ -339,7 +339,7 @@ class BatchRun:
             return
         if read_progress(session) != self._left:
             raise ConflictError(
-                "this very request is being carried out",
+                "the same request is still running",
                 hint="Wait, then send it again with the same Idempotency-Key.",
             )
         self._left = {"batch": self.batch, **left}
@@ -384,7 +384,7 @@ class BatchRun:
         given = find_batch(session, self.batch)
         if given is None or given.is_taken_back:
             raise ConflictError(
-                "the verdicts given so far have been undone",
+                "the verdicts of this request were undone meanwhile",
                 hint="Give the verdict again, under another Idempotency-Key.",
             )
         return given

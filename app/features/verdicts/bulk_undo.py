@@ -102,7 +102,7 @@ def _active_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
     """
     batch = read_batch(session, batch_id)
     if batch.undone is not None:
-        raise ConflictError(f"{batch.undone_by} has taken this batch back already")
+        raise ConflictError(f"{batch.undone_by} has undone this batch already")
     return batch
 
 
@@ -231,7 +231,7 @@ def _spans(batch: StoredBulkVerdict) -> Spans:
         raise ConflictError(
             "this batch was undone by an older version of Touchline, which kept no record of the "
             "groups",
-            hint="Give the verdict once more in the queue.",
+            hint="Set the verdict again in the queue.",
         )
     return chunks(batch.undo_spans)
 
@@ -243,11 +243,11 @@ def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
         return None
     again = read_batch(session, redone)
     if again.done or again.is_taken_back:
-        raise ConflictError("the verdicts of this batch were given again already")
+        raise ConflictError("the verdicts of this batch were redone already")
     if again.actor != actor:
         raise ConflictError(
-            f"{again.actor} has begun to give this batch again",
-            hint=f"Let {again.actor} finish it, or undo the verdicts given so far.",
+            f"{again.actor} is redoing this batch",
+            hint="Wait until it is done, or undo the verdicts redone so far.",
         )
     return again.id
 

@@ -74,7 +74,7 @@ def verdict(
         for item in sample:
             say(f"  {item['number']:6} {item['label'] or item['key']}")
     if refused and not plan["would_change"]:
-        print_error("no group was judged: each that matches was refused", "Say why in --note.")
+        print_error("no verdict was set: all matching groups were refused", "Say why in --note.")
         raise typer.Exit(1)
 
 

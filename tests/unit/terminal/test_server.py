@@ -382,7 +382,7 @@ class TestRefusals:
         path.touch(0o600)
         path.write_text(new_token_text())
         for content, sentence in (
-            (None, "is not valid (any more)"),
+            (None, "is unknown, expired or ended"),
             ("tl_x", "holds no whole token"),
         ):
             path.write_text(content or path.read_text())

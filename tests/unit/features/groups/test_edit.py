@@ -128,7 +128,7 @@ class TestApply:
             (
                 SetLines("7.png", {"Middle line": (ImagePoint(math.nan, 1),)}),
                 InputError,
-                "number of pixels",
+                "valid pixel",
             ),
             (SetLines("7.png", {"Middle line": HERE * 501}), InputError, "1000 points"),
             (SetBall("7.png", BallAnnotation()), InputError, "box or a point"),
@@ -139,7 +139,7 @@ class TestApply:
             (
                 SetBall("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
                 InputError,
-                "number of pixels",
+                "valid pixel",
             ),
             (
                 SetBall("7.png", BallAnnotation(box=Box(1, 2, 3, 4), point=ImagePoint(1, 2))),

@@ -148,7 +148,7 @@ class TestRedoBatch:
         again = api.post(path)
         assert (again.status_code, json.loads(again.text)["detail"]) == (
             409,
-            "the verdicts of this batch were given again already",
+            "the verdicts of this batch were redone already",
         )
 
     def test_an_unknown_batch_is_404(self, api) -> None:

@@ -265,9 +265,9 @@ class TestPreconditions:
         answer = api.get(f"{API}/views/{document['views'][0]['id']}/image")
         assert answer.status_code == 404
         problem = answer.json()
-        assert problem["detail"] == "this view has no frame that could be read"
+        assert problem["detail"] == "this view has no readable frame"
         assert problem["hint"] == (
-            "The import's report says why; importing again after the files are mended attaches "
+            "The report of the import gives the reason. Correct the files and import them again to attach "
             "the frames."
         )
 

@@ -394,7 +394,9 @@ class TestMissingGroups:
         again(store, make_group(7), make_group(8), make_group(9))
         report = again(store, make_group(8))
         assert (report.unchanged, report.missing) == (1, 2)
-        assert report.problems == ["2 groups of an earlier import did not come again; all stay"]
+        assert report.problems == [
+            "2 groups of an earlier import are missing in this import; all are kept"
+        ]
         assert get_dataset(store, "demo").groups == 3
 
     def test_groups_of_another_source_are_not_missing(self, store, make_group) -> None:

@@ -259,7 +259,7 @@ class TestServe:
         first = run("serve", "--team", "--port", "0").stdout
         second = run("serve", "--team", "--port", "0", "--url", "https://x.org").stdout
         assert "https://x.org/join#" in second
-        with pytest.raises(Exception, match="not good any more"):
+        with pytest.raises(Exception, match="no longer valid"):
             links.look(store, token_in(first))
         links.use(store, token_in(second), SECRET, "ada")
         assert "/join#" not in run("serve", "--team", "--port", "0").stdout

@@ -179,13 +179,13 @@ class TestMaking:
     def test_a_passkey_of_another_session_site_or_challenge_is_not_kept(self, desk: Desk) -> None:
         login = desk.login()
         options = desk.passkeys.begin(login, SECRET, SITE)
-        with pytest.raises(InputError, match="answered before"):
+        with pytest.raises(InputError, match="answered already"):
             desk.passkeys.make(desk.login(), "phone", desk.device.make(options), SITE)
         for wrong in ({"origin": "http://evil"}, {"site": "evil"}, {"flags": PRESENT}):
             options = desk.passkeys.begin(login, SECRET, SITE)
             with pytest.raises(InputError, match="not accepted"):
                 desk.passkeys.make(login, "phone", Authenticator(**wrong).make(options), SITE)
-        with pytest.raises(InputError, match="answered before"):
+        with pytest.raises(InputError, match="answered already"):
             desk.passkeys.make(login, "phone", desk.device.make(options), SITE)
         desk.passkeys.begin(login, SECRET, SITE)
         with pytest.raises(InputError, match="not accepted"):

@@ -105,7 +105,7 @@ class TestLinks:
         _, link = invite(home, "anna", Role.VIEWER, actor="local")
         assert links.look(home, link.token) == links.LinkHolder("anna", False)
         assert links.use(home, link.token, SECRET) == "anna"
-        with pytest.raises(NotFoundError, match="not good any more"):
+        with pytest.raises(NotFoundError, match="no longer valid"):
             links.use(home, link.token, SECRET)
         assert found(logins, logins.log_in("anna", SECRET)).role is Role.VIEWER
 

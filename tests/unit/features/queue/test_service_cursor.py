@@ -33,7 +33,7 @@ class TestDecode:
         "key", [float("inf"), float("-inf"), float("nan"), 1e300, 2**64, [1], {"a": 1}]
     )
     def test_a_cursor_with_an_impossible_key_is_refused(self, query: Query, key: object) -> None:
-        with pytest.raises(InputError, match="came from another query") as caught:
+        with pytest.raises(InputError, match="belongs to another query") as caught:
             decode(query, cursor("jac", key, 3))
         assert caught.value.pointer == "/cursor"
 
@@ -41,7 +41,7 @@ class TestDecode:
         "other", ["sort:jac jac>0.5", "sort:jac status:accepted", "sort:sigma"]
     )
     def test_a_cursor_of_another_query_is_refused(self, query: Query, other: str) -> None:
-        with pytest.raises(InputError, match="came from another query"):
+        with pytest.raises(InputError, match="belongs to another query"):
             decode(parse_query(other), encode(query, [0.75, 3]))
 
     def test_white_space_between_terms_makes_no_other_query(self) -> None:
