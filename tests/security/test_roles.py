@@ -124,7 +124,7 @@ class TestEveryRoute:
             assert row.kind == "stream" or says.encode() in lacks.body, (row, lacks.body)
             if not private:
                 enough = asked(team, row, None, Authorization=team.bearer(scope), Origin="")
-                peoples = enough.status == 403 and b"no token makes people" in enough.body
+                peoples = enough.status == 403 and b"a token cannot add people" in enough.body
                 assert enough.status in LET_IN[row.kind] or peoples, (row, enough.body)
 
     def test_a_token_may_no_more_than_its_person(self, team: Team) -> None:

@@ -62,7 +62,7 @@ class TestTokens:
         typo = bearer[:-1] + ("a" if bearer[-1] != "a" else "b")
         monkeypatch.setattr(access_tokens, "find_access_token", None)
         for text in (typo, bearer[:-1], "Bearer", "Bearer x y"):
-            assert b"no whole token" in self.ask(team, text).body
+            assert b"incomplete or mistyped" in self.ask(team, text).body
 
     def test_a_token_counts_before_a_cookie_and_two_are_none(self, team: Team) -> None:
         bearer, cookie = team.bearer("read", role="viewer"), team.cookies["admin"]
@@ -204,7 +204,7 @@ class TestTokens:
             ("PUT", f"{API}/team", {"require_second_factor": True}),
         ):
             answer = team.ask(method, target, body, **sent)
-            assert (answer.status, b"no token makes people" in answer.body) == (403, True), target
+            assert (answer.status, b"a token cannot add people" in answer.body) == (403, True), target
         assert find_person(team.store, "viewer").role is Role.VIEWER
 
     def test_an_admin_ends_anybodys(self, team: Team) -> None:

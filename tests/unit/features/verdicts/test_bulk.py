@@ -320,14 +320,14 @@ class TestUndoBatch:
         undo_batch(store, report.batch, actor="ben")
         (batch,) = list_batches(store, 1)
         assert (batch.undone_by, batch.done) == ("ben", True)
-        with pytest.raises(ConflictError, match="ben has taken this batch back"):
+        with pytest.raises(ConflictError, match="ben has undone this batch"):
             undo_batch(store, report.batch, actor="ann")
 
     def test_two_who_take_it_back_at_once_do_it_once(self, store, ids, monkeypatch) -> None:
         monkeypatch.setattr(bulk, "CHUNK", 2)
         batch = give_verdicts(store, 1, "", "deferred", actor="ben").batch
         before_write(store, monkeypatch, 2, lambda: undo_batch(store, batch, actor="eve"))
-        with pytest.raises(ConflictError, match="eve has taken this batch back"):
+        with pytest.raises(ConflictError, match="eve has undone this batch"):
             undo_batch(store, batch, actor="ann")
         (found,) = list_batches(store, 1)
         assert (found.undone_by, found.undo_spans) == ("eve", [[5, 8]])
