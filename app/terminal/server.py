@@ -110,7 +110,7 @@ def read_token(path: Path) -> str:
         raise InputError(f"other users can read {path}", hint=f"chmod 600 {path}")
     if not has_valid_checksum(text):
         raise InputError(
-            f"{path} holds no whole token",
+            f"{path} does not contain a complete token",
             hint="Copy it again, all of it: tl_ and 54 letters and digits.",
         )
     return text

@@ -33,7 +33,7 @@ function Numbers({ items }) {
 	const numbers = [
 		['views with lines', sum(({ views }) => views)], ['read', sum(({ read }) => read)], ['camera from paint', sum(({ painted }) => painted)],
 		['too little paint', sum((one) => one.no_paint)], ['paint disagrees', sum((one) => one.paint_disagrees)],
-		['outdated', items.some(({ old }) => old === null) ? null : sum(({ old }) => old ?? 0)],
+		['to be read again', items.some(({ old }) => old === null) ? null : sum(({ old }) => old ?? 0)],
 		['picture missing', sum((one) => one.no_frame)], ['without picture', sum((one) => one.without_picture)],
 	];
 	return html`<dl class="number-list paint-card__numbers">${numbers.map(([name, n]) => html`<div key=${name}><dt>${name}</dt><dd>${n === null ? '?' : count(Number(n))}</dd></div>`)}</dl>`;

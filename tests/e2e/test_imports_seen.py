@@ -282,12 +282,12 @@ class TestGivenCameras:
         self, open_page: OpenPage
     ) -> None:
         page = open_page("/import")
-        choice = page.get_by_label("Where a view has a given camera and lines")
+        choice = page.get_by_label("If a view has both a camera and lines")
         page.locator("label", has_text="SoccerNet-v3D").click()
         assert choice.locator("option").all_inner_texts() == ["the given camera", "the lines"]
         page.locator("label", has_text="XGTF").click()
         assert choice.locator("option").all_inner_texts() == [
-            "the given camera, measured by the lines",
+            "the given camera; lines check it",
             "the given camera; lines are ignored",
             "the lines",
         ]

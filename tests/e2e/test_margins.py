@@ -62,7 +62,9 @@ class TestMargins:
         expect(page.locator(".queue-tools__order")).to_have_count(0)
         page.get_by_label("Order").select_option("value")
         expect(page.locator(".queue-tools__order")).to_contain_text("closest to a gate’s threshold")
-        expect(page.get_by_label("Order")).to_have_attribute("title", re.compile("closest to a gate"))
+        expect(page.get_by_label("Order")).to_have_attribute(
+            "title", re.compile("closest to a gate")
+        )
         column = page.get_by_role("columnheader", name="margin")
         expect(column.locator("small")).to_have_text("by value")
         expect(column.locator("button")).to_have_attribute("data-term", "column:margin")

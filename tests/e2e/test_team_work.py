@@ -234,7 +234,7 @@ class TestWork:
         expect(page.get_by_role("button", name="Take over Enter")).to_be_focused()
         page.keyboard.press("Enter")
         until(page, lambda: "/review/8" in page.url)
-        expect(page.get_by_text("ute’s annotation is in the group now")).to_be_visible()
+        expect(page.get_by_text("ute’s annotation is applied to the group")).to_be_visible()
         assert verdict(page, 8) == {"state": "accepted", "by": "ute"}
 
     def test_what_one_submitted_is_done_and_offers_nothing_that_changes_it(

@@ -184,7 +184,7 @@ class TestState:
         assert name_in(door.finish(used, mine)) == "cody"
         second, cookie = door.begin()
         fresh = door.back(second)
-        assert_refused(door.finish({**fresh, "code": used["code"]}, cookie), word="not vouch")
+        assert_refused(door.finish({**fresh, "code": used["code"]}, cookie), word="not confirm")
         third, cookie = door.begin()
         assert_refused(door.finish({**door.back(third), "code": fresh["code"]}, cookie))
 
@@ -195,7 +195,7 @@ class TestState:
         address, cookie = door.begin()
         told, clock = door.back(address), door.sign_on._begun._clock
         monkeypatch.setattr(door.sign_on._begun, "_clock", lambda: clock() + LASTS)
-        assert_refused(door.finish(told, cookie), word="too long")
+        assert_refused(door.finish(told, cookie), word="has expired")
 
     def test_its_cookie_is_out_of_reach_and_short(self, door: ClassLimiter) -> None:
         sent = door.team.ask("POST", BEGIN, {}).headers["set-cookie"].lower()

@@ -64,7 +64,7 @@ class TestToken:
             {"sub": 7},
         ):
             door.provider.changed = changed
-            assert_refused(door.enter(), word="not vouch")
+            assert_refused(door.enter(), word="not confirm")
 
     def test_the_clocks_may_differ_by_a_minute(self, door: ClassLimiter) -> None:
         door.join("clara")
@@ -89,7 +89,7 @@ class TestToken:
             lambda claims: "no token",
         ):
             door.provider.sign = sign
-            assert_refused(door.enter(), word="not vouch")
+            assert_refused(door.enter(), word="not confirm")
 
     def test_new_keys_of_the_provider_are_asked_for_but_not_by_everybodys_word(
         self, door: ClassLimiter
@@ -99,7 +99,7 @@ class TestToken:
         assert kept is not None
         door.provider.key = jwk.RSAKey.generate_key(2048, {"kid": "second"})
         door.provider.asked.clear()
-        assert_refused(door.enter(), word="not vouch")
+        assert_refused(door.enter(), word="not confirm")
         assert "/keys" not in door.provider.asked, "they were asked for within the last minute"
         old = replace(kept, at=kept.at - timedelta(minutes=2))
         door.sign_on._provider._keys = old
@@ -137,7 +137,7 @@ class TestProvider:
         door.provider.instead["/token"] = drip
         refused = self.ends(door)
         answered.set()
-        assert_refused(refused, 409, "does not answer")
+        assert_refused(refused, 409, "valid response")
         assert not heard_out
 
     def test_that_talks_too_much_is_not_heard_out(self, door: ClassLimiter) -> None:
@@ -151,7 +151,7 @@ class TestProvider:
                 sent.append(2**16)
 
         door.provider.instead["/token"] = talk
-        assert_refused(self.ends(door), 409, "does not answer")
+        assert_refused(self.ends(door), 409, "valid response")
         assert sum(sent) < 10 * 2**20
 
     @pytest.mark.parametrize("path", ["/.well-known/openid-configuration", "/token", "/keys"])
@@ -160,7 +160,7 @@ class TestProvider:
         there = f"{door.provider.address}/elsewhere"
         door.provider.instead[path] = lambda handler: send_away(handler, there)
         door.provider.asked.clear()
-        assert_refused(self.ends(door), 409, "does not answer")
+        assert_refused(self.ends(door), 409, "valid response")
         assert "/elsewhere" not in door.provider.asked
 
     @pytest.mark.parametrize("name", ["token_endpoint", "jwks_uri", "authorization_endpoint"])
@@ -180,7 +180,7 @@ class TestProvider:
     @pytest.mark.parametrize("said", [b"[1]", b"<html>", b'{"a":' * 9000, b"\xff"])
     def test_that_talks_nonsense_is_refused(self, door: ClassLimiter, said: bytes) -> None:
         door.provider.instead["/token"] = lambda handler: tell(handler, said)
-        assert_refused(self.ends(door), 409, "does not answer")
+        assert_refused(self.ends(door), 409, "valid response")
 
     def ends(self, door: ClassLimiter) -> Answer:
         begun = door.team.ask("POST", BEGIN, {})

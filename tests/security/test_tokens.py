@@ -204,7 +204,9 @@ class TestTokens:
             ("PUT", f"{API}/team", {"require_second_factor": True}),
         ):
             answer = team.ask(method, target, body, **sent)
-            assert (answer.status, b"a token cannot add people" in answer.body) == (403, True), target
+            assert (answer.status, b"a token cannot add people" in answer.body) == (403, True), (
+                target
+            )
         assert find_person(team.store, "viewer").role is Role.VIEWER
 
     def test_an_admin_ends_anybodys(self, team: Team) -> None:

@@ -116,7 +116,7 @@ class ProviderClient:
 
     def _failed(self) -> ConflictError:
         return ConflictError(
-            f"{self._rules.label} gave an invalid response",
+            f"{self._rules.label} did not give a valid response",
             hint="Try again in a while; the server's log says more.",
         )
 

@@ -383,7 +383,7 @@ class TestRefusals:
         path.write_text(new_token_text())
         for content, sentence in (
             (None, "is unknown, expired or ended"),
-            ("tl_x", "holds no whole token"),
+            ("tl_x", "does not contain a complete token"),
         ):
             path.write_text(content or path.read_text())
             words = ["--server", place.url, "--token-file", str(path), "datasets", "list"]

@@ -133,9 +133,13 @@ class TestApply:
             (SetLines("7.png", {"Middle line": HERE * 501}), InputError, "1000 points"),
             (SetBall("7.png", BallAnnotation()), InputError, "box or a point"),
             (SetBall("7.png", BallAnnotation(box=Box(1, 2, 0, 3))), InputError, "above zero"),
-            (SetBall("7.png", BallAnnotation(box=Box(1e9, 2, 3, 3))), InputError, "a picture can"),
-            (SetBall("7.png", BallAnnotation(box=Box(1, math.inf, 3, 3))), InputError, "a picture"),
-            (SetBall("7.png", BallAnnotation(box=Box(1, 2, 1e9, 3))), InputError, "a picture can"),
+            (SetBall("7.png", BallAnnotation(box=Box(1e9, 2, 3, 3))), InputError, "valid pixel"),
+            (
+                SetBall("7.png", BallAnnotation(box=Box(1, math.inf, 3, 3))),
+                InputError,
+                "valid pixel",
+            ),
+            (SetBall("7.png", BallAnnotation(box=Box(1, 2, 1e9, 3))), InputError, "valid pixel"),
             (
                 SetBall("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
                 InputError,

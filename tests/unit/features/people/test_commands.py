@@ -143,7 +143,7 @@ class TestUsers:
         assert "issia: reviewer" in run("users", "list").stdout
         assert run("users", "take", "anna", "issia").exit_code == 0
         assert found(logins, "anna").roles.role_in(1) is Role.NONE
-        assert "of the whole server" in str(run("users", "grant", "anna", "1", "admin").exception)
+        assert "the whole server" in str(run("users", "grant", "anna", "1", "admin").exception)
 
     def test_what_was_done_before_there_were_accounts_is_given_to_one_person_once(
         self, store: Store

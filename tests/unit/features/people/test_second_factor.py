@@ -113,12 +113,12 @@ class TestLogin:
         if good:
             desk.login(desk.code(later))
         else:
-            desk.refused(desk.code(later), "not the code")
+            desk.refused(desk.code(later), "code is wrong")
 
     @pytest.mark.parametrize("code", ["", "000000", "12345", "１２３４５６", "abcdef", "a" * 40])
     def test_what_is_no_code_is_refused(self, desk: Desk, code: str) -> None:
         desk.enrol()
-        desk.refused(code if code != desk.code() else "000001", "not the code")
+        desk.refused(code if code != desk.code() else "000001", "code is wrong")
 
     def test_each_try_is_counted_and_none_before_the_password(self, desk: Desk) -> None:
         desk.enrol()
@@ -155,7 +155,7 @@ class TestEnrolling:
     def test_nothing_is_asked_before_it_is_confirmed(self, desk: Desk) -> None:
         login = desk.login()
         desk.factors.begin(login, SECRET)
-        with pytest.raises(InputError, match="not the code"):
+        with pytest.raises(InputError, match="code is wrong"):
             desk.factors.confirm(login, "000000")
         assert desk.login()
         assert not find_person(desk.store, "anna").second_factor
@@ -220,7 +220,7 @@ class TestRequired:
         login = desk.enrol()
         found = desk.login(desk.code())
         assert not found.must_enrol
-        with pytest.raises(ConflictError, match="everybody needs"):
+        with pytest.raises(ConflictError, match="requires a second factor"):
             desk.factors.remove(login, SECRET)
         desk.factors.require(False, actor="local")
         desk.factors.remove(login, SECRET)

@@ -243,7 +243,7 @@ class TestGiveVerdicts:
                 assert (first.resume(session), second.resume(session)) == (None, None)
             with store.write() as session:
                 first.interrupt(session, {"left": [[1, 2]]})
-            with pytest.raises(ConflictError, match="is being carried"), store.write() as session:
+            with pytest.raises(ConflictError, match="is still running"), store.write() as session:
                 second.interrupt(session, {"left": [[1, 2]]})
             with store.write() as session:
                 first.interrupt(session, {"left": [[2, 2]]})
@@ -362,7 +362,7 @@ class TestUndoBatch:
     ) -> None:
         monkeypatch.setattr(bulk, "CHUNK", 1)
         before_write(store, monkeypatch, 3, lambda: undo_batch(store, 1, actor="eve"))
-        with pytest.raises(ConflictError, match="have been undone"):
+        with pytest.raises(ConflictError, match="were undone meanwhile"):
             give_verdicts(store, 1, "", "deferred", actor="ben")
         assert set(statuses(store)) == {"unreviewed"}
         (found,) = list_batches(store, 1)

@@ -127,7 +127,7 @@ class TestRedoBatch:
         self, store, ids, undone
     ) -> None:
         done = redo_batch(store, undone, actor="ben")
-        with pytest.raises(ConflictError, match="given again already"):
+        with pytest.raises(ConflictError, match="redone already"):
             redo_batch(store, undone, actor="ben")
         with pytest.raises(ConflictError, match="was not undone"):
             redo_batch(store, done.batch, actor="ben")
@@ -148,7 +148,7 @@ class TestRedoBatch:
         self, store, ids, monkeypatch
     ) -> None:
         batch = stopped_redo(store, monkeypatch)
-        with pytest.raises(ConflictError, match="ben has begun") as refused:
+        with pytest.raises(ConflictError, match="ben is redoing") as refused:
             redo_batch(store, batch, actor="eve")
         assert "ben" in refused.value.hint
 
@@ -163,7 +163,7 @@ class TestRedoBatch:
             return write()
 
         monkeypatch.setattr(store, "write", somebody_else_first)
-        with pytest.raises(ConflictError, match="given again already"):
+        with pytest.raises(ConflictError, match="redone already"):
             redo_batch(store, undone, actor="ben")
         newest, old = list_batches(store, 1)
         assert (newest.actor, old.redone) == ("eve", newest.id)
@@ -173,4 +173,4 @@ class TestRedoBatch:
             session.execute(text("UPDATE verdict_batch SET undo_spans = NULL"))
         with pytest.raises(ConflictError, match="older version") as refused:
             redo_batch(store, undone, actor="ben")
-        assert "once more" in refused.value.hint
+        assert "again" in refused.value.hint
