@@ -247,7 +247,7 @@ def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
     if again.actor != actor:
         raise ConflictError(
             f"{again.actor} is redoing this batch",
-            hint="Wait until it is done, or undo the verdicts redone so far.",
+            hint=f"Wait until {again.actor} is done, or undo the verdicts redone so far.",
         )
     return again.id
 
