@@ -15,5 +15,5 @@ export function browserName(agent) {
 		const found = pattern.exec(agent);
 		if (found) return `${name} ${found[1]}${system ? `, ${system[1]}` : ''}`;
 	}
-	return agent.slice(0, LONGEST) || 'A browser without a name';
+	return agent.slice(0, LONGEST) || 'Unknown browser';
 }

@@ -29,7 +29,7 @@ const STATES = [
 
 /** Why a group is left alone. */
 const REFUSALS = /** @type {{[reason: string]: string}} */ ({
-	submitted: 'they are independent annotations that were submitted',
+	submitted: 'they are submitted independent annotations',
 	unsolved: 'they are not solved yet',
 	needs_note: 'they fail a gate, and accepting that needs a note',
 	unusable_ball: 'their 3D ball is unusable (below the grass, or uncertain by metres), and accepting that needs a note',
@@ -43,7 +43,7 @@ function Outcome({ preview, q }) {
 			<p><strong>${count(preview.would_change)}</strong> of ${count(preview.matches)} ${preview.matches === 1 ? 'group changes' : 'groups change'}.</p>
 			${preview.refused.length ? html`
 				<ul class="bulk__refused">${preview.refused.map(({ reason, groups }) => html`
-					<li key=${reason}><span data-grade="warn">${count(groups)} stay as they are:</span> ${REFUSALS[reason] ?? words(reason)}</li>`)}
+					<li key=${reason}><span data-grade="warn">${plural(groups, 'group')} not changed:</span> ${REFUSALS[reason] ?? words(reason)}</li>`)}
 				</ul>` : null}
 			${preview.sample.length ? html`
 				<p class="note">For example</p>

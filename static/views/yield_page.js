@@ -52,6 +52,7 @@ function YieldBody({ one, loaded, reload }) {
 		<div class="yield">
 			<section class="card yield__policy" aria-labelledby="policy-title">
 				<h2 id="policy-title">Policy <a class="card__aside link" href=${pageAddress(one.name, 'policy')}>${policy.name}, version ${policy.version}</a></h2>
+				<p class="note">The yield is the number of groups that pass the policy. Change a threshold to see its effect; nothing changes before you save.</p>
 				<${ThresholdForm} fields=${fields} shipped=${shipped} present=${policy.values} values=${values} change=${change} idle=${answer && isUnmeasured(answer) ? 'No effect: JaC was not measured' : ''} />
 				${answer ? html`<${Difference} answer=${answer} name=${policy.name} changed=${changed} />` : null}
 				${error ? html`<p class="form__error" role="alert">${error.message}</p>` : null}

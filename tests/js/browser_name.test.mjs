@@ -16,7 +16,7 @@ for (const [agent, name] of [
 	[`${WINDOWS} ${CHROME.replace('Chrome', 'HeadlessChrome')}`, 'Chrome 141, Windows NT 10.0'],
 	['Mozilla/5.0 (iPhone; CPU iPhone OS 18_4) AppleWebKit/605.1.15 Mobile/15E148 Safari/604.1', 'Safari 604, iPhone'],
 	['python-httpx/0.28.1', 'python-httpx/0.28.1'],
-	['', 'A browser without a name'],
+	['', 'Unknown browser'],
 ]) {
 	test(`a session is called “${name}”`, () => assert.equal(browserName(agent), name));
 }

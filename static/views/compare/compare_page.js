@@ -23,7 +23,7 @@ const nameOf = (group) => `${group.dataset.name} · group ${group.number}`;
 function Links({ groups }) {
 	return html`
 		<section class="card compare__card" aria-labelledby="compare-open">
-			<h2 id="compare-open">Open one</h2>
+			<h2 id="compare-open">Open a group</h2>
 			<p class="compare__links">${groups.map((group, place) => html`<a key=${group.id} class="button" href=${reviewAddress(group.id)}>${place + 1} · ${nameOf(group)}</a>`)}</p>
 			<p>Solid: drawn by the person named above. Dashed: drawn by the other person. Both pictures zoom and move together.</p>
 		</section>
