@@ -163,6 +163,7 @@ class FrameReader:
         self._path, self._times, self._keys = path, times, keys
         self._video: cv2.VideoCapture | None = None
         self._next = 0
+        self._sought: int | None = None
         self._opening: ExitStack | None = None
 
     def close(self) -> None:
@@ -180,6 +181,7 @@ class FrameReader:
         Raises:
             ImageError: It is no video that can be read.
         """
+        self._sought = None
         if self._video is not None and self._next <= number <= self._next + _MARGINS[0]:
             if self._advance(number):
                 return _retrieved(self._video)
@@ -196,6 +198,33 @@ class FrameReader:
                 return None
             self._next += 1
         return _retrieved(video)
+
+    def approach(self, number: int, most: int) -> bool:
+        """Come nearer to a frame, by a jump or by so many frames at most: between two steps others may be asked for.
+
+        Returns:
+            Whether ``read`` finds it at once now, or has to open the video anew.
+
+        Raises:
+            ImageError: It is no video that can be read.
+        """
+        near = self._video is not None and self._next <= number <= self._next + _MARGINS[0]
+        if self._sought != number and not near:
+            if number <= _MARGINS[0]:
+                return True
+            if not any(self._land(start, number) for start in self._starts(number)):
+                self.close()
+                return True
+        self._sought = number
+        # That frame itself is left to ``read``.
+        if self._next + most < number:
+            if self._advance(self._next + most - 1):
+                return False
+            self.close()
+        elif self._next < number and not self._advance(number - 1):
+            self.close()
+        self._sought = None
+        return True
 
     def skip(self) -> bool:
         """Pass over the frame that follows the one read last; whether there is one."""
@@ -222,6 +251,10 @@ class FrameReader:
 
     def _jump(self, start: int, number: int) -> bool:
         """Go to a frame from about another one; whether every frame on the way came when it should."""
+        return self._land(start, number) and self._advance(number)
+
+    def _land(self, start: int, number: int) -> bool:
+        """Go to about a frame on the way to another one; whether it is known which one this is."""
         video = self._opened()
         video.set(cv2.CAP_PROP_POS_MSEC, self._times[start])
         if skipped_to_next(video) is None:
@@ -236,7 +269,7 @@ class FrameReader:
         if place > latest:
             return False
         self._next = place + 1
-        return self._advance(number)
+        return True
 
     def _advance(self, number: int) -> bool:
         """Decode on to a frame; whether every frame on the way came when it should."""

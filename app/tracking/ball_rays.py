@@ -23,6 +23,7 @@ _NEAR = 2
 """Rays on either side among which the worst alone is left out."""
 _SLOPE_NEAR = 4
 """Rays on either side that a slope is taken from."""
+_HALF_TURN = np.array([-1.0, -1.0, 1.0])
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -58,6 +59,12 @@ class BallRays:
             positions=self.positions[rows],
             directions=self.directions[rows],
             sigma=self.sigma[rows],
+        )
+
+    def turned(self) -> BallRays:
+        """As cameras see them that are turned by 180 degrees about the centre mark."""
+        return replace(
+            self, positions=self.positions * _HALF_TURN, directions=self.directions * _HALF_TURN
         )
 
 

@@ -19,6 +19,10 @@ from app.tracking.time_map import TimeMap, map_of_instants
 
 _CHANGE = 15.0
 """Natural logarithm of how many times likelier a change of the map makes the rays."""
+TURNED = (
+    "The rays of live and replay meet once the cameras of the replay are turned by half a turn of the pitch: they "
+    "stand on the other side."
+)
 _CHANGE_S, _CHANGE_SHARE = 0.04, 0.05
 """Time and share of the speed by which the maps of two pieces differ."""
 
@@ -35,7 +39,7 @@ def find_time_map(
             a frame. Two say a map where the ball says none.
     """
     given = np.array(hints, dtype=float).reshape(-1, 2)
-    made = map_of_ball(live, replay, given)
+    made = or_turned(map_of_ball(live, replay, given), live, replay, given)
     if made.pieces:
         return made
     if made.reason is not None and len(given) > 1 and np.ptp(given[:, 1]) > 0:
@@ -61,6 +65,16 @@ def map_of_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool
     best = max(found, key=fit.evidence)
     made = judged(fit, best, found)
     return _in_pieces(fit, made, best, found) if whole else made
+
+
+def or_turned(made: TimeMap, live: BallRays, replay: BallRays, hints: FloatArray) -> TimeMap:
+    """What ``map_of_ball`` made; where it says nothing, and would once the replay's cameras are turned, that is said."""
+    if made.reason is None or made.pieces:
+        return made
+    other = map_of_ball(live, replay.turned(), hints)
+    if other.reason is not None and not other.pieces:
+        return made
+    return replace(made, reason=TURNED, turned=True)
 
 
 def ray_misses(live: BallRays, replay: BallRays, made: TimeMap) -> tuple[FloatArray, FloatArray]:

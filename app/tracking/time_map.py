@@ -35,6 +35,9 @@ class TimeMap:
         by_hand: Whether a person's instants alone say it.
         first, last: Replay times of a piece.
         pieces: Where one map does not fit the whole replay: those that fit parts of it.
+        turned: Whether the rays of the ball meet, but only once the replay's cameras are turned by half a turn of the
+            pitch.
+        too_close: Whether several instants are too close together to tell the speed.
     """
 
     reason: str | None
@@ -48,6 +51,8 @@ class TimeMap:
     first: float = 0.0
     last: float = 0.0
     pieces: tuple[TimeMap, ...] = ()
+    turned: bool = False
+    too_close: bool = False
 
     def sigma_at(self, time: float) -> float | None:
         """Standard deviation of the live time of a replay time, seconds; None where it is not known."""
@@ -104,7 +109,7 @@ def map_of_instants(
                 f"({speed:.2g} ± {sigma:.2g}); link one farther away"
             )
             if len(pieces) == 1:
-                return _assumed(rows, assumed_speed, reason)
+                return replace(_assumed(rows, assumed_speed, reason), too_close=True)
             reason = f"{reason}."
         elif not _SLOWEST <= speed <= _FASTEST:
             reason = (

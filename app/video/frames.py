@@ -85,10 +85,17 @@ class RecordingReader:
         """Whether a frame is among those that are kept."""
         return number in self._kept
 
-    def prefetch(self, number: int, count: int) -> None:
-        """Decode the frames that follow one, as far as there are any, so that they can be read at once."""
-        for following in range(number + 1, min(number + 1 + count, len(self._index))):
-            self.read(following)
+    def prefetch(self, number: int, most: int) -> bool:
+        """Come nearer to a frame by so many frames at most, and decode it once it is the next; whether it is kept now.
+
+        Raises:
+            NotFoundError, ImageError: As ``read_frames`` does.
+        """
+        if not self.has(number):
+            if not self._reader.approach(number, most):
+                return False
+            self.read(number)
+        return True
 
     def _decode(self, number: int) -> Image:
         index = self._index

@@ -17,6 +17,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {number | null} worst_px
  * @property {number[]} annotated frames whose lines were known
  * @property {number[]} unusable frames with too few lines
+ * @property {boolean} turned whether a person turned them by half a turn of the pitch
  */
 /**
  * @typedef {object} ShotCamerasJson
@@ -64,6 +65,11 @@ export function getFrameCameras(id, frame, before, signal) {
 /** @param {number} id @param {{first: number, last: number}} stretch @returns {Promise<JobJson>} */
 export function postCameras(id, { first, last }) {
 	return request(`/recordings/${id}/cameras`, { method: 'POST', body: { first, last }, key: idempotencyKey() });
+}
+
+/** Turn the cameras of the stretch that has a frame by half a turn of the pitch, or back. @param {number} id @param {number} frame @param {boolean} turned against what the tracker gave @returns {Promise<JobJson>} */
+export function turnCameras(id, frame, turned) {
+	return request(`/recordings/${id}/cameras/${frame}`, { method: 'PATCH', body: { turned }, key: idempotencyKey() });
 }
 
 /** Where the cameras of a stretch are as a file of another tool. @param {number} id @param {number} frame @param {string} format */

@@ -79,7 +79,7 @@ export function findShots(id) {
 	return request(`/recordings/${id}/shots`, { method: 'POST', key: idempotencyKey() });
 }
 
-/** @param {number} id @param {number[]} frames @param {{propose: boolean, linked: boolean}} options whether cameras are proposed afterwards, and whether linked replays give views @returns {Promise<JobJson>} */
+/** @param {number} id @param {number[]} frames @param {{propose: boolean, linked: boolean, dry_run?: boolean}} options whether cameras are proposed afterwards, whether linked replays give views, and whether nothing is kept @returns {Promise<JobJson>} */
 export function postInstants(id, frames, options) {
 	return request(`/recordings/${id}/groups`, { method: 'POST', body: { frames, ...options }, key: idempotencyKey() });
 }
@@ -100,6 +100,8 @@ export function postInstants(id, frames, options) {
  * @property {LinkPiece[]} pieces
  * @property {{frame: number, miss_m: number}[]} misses
  * @property {string | null} ball_reason
+ * @property {boolean} turned whether the ball's rays would meet once the replay's cameras are turned by half
+ * @property {boolean} too_close whether several instants are too close together to tell the speed
  */
 /** @typedef {{id: number, live: LinkedShot, replay: LinkedShot, instants: LinkedInstant[], assumed_speed: number | null, map: LinkMap, etag: string}} LinkJson */
 /** @typedef {{first: number, replay: (number | null)[], off_s: (number | null)[], repeated: number[], blended: number[]}} LinkedFrames */

@@ -19,7 +19,7 @@ export function mapText(map, fps) {
 }
 
 /** @param {LinkMap} map @param {number} fps */
-function timesText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, miss_m, pieces }, fps) {
+function timesText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, miss_m, pieces, too_close: tooClose }, fps) {
 	if (outcome === 'none') return ['Go to the same instant in both, such as a kick or a bounce, and press I.'];
 	if (outcome === 'unobservable') return [reason ?? ''];
 	const source = found_by === 'ball' ? 'Found from the ball' : 'Found from your instants';
@@ -27,7 +27,7 @@ function timesText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, mis
 		const parts = pieces.map((piece) => `Frames ${piece.first} to ${piece.last} of the replay run ${speedText(piece.speed)} (speed ${piece.speed.toFixed(3)} ± ${sigmaText(piece.speed_sigma)}).`);
 		return [`The speed of the replay changes. ${source}.`, ...parts];
 	}
-	if (outcome === 'offset' && reason?.startsWith('The instants near')) return [reason];
+	if (outcome === 'offset' && tooClose && reason) return [reason];
 	if (outcome === 'offset') return [`One instant says when the replay is, not how fast it runs: it is taken to run ${speedText(speed ?? 1)}.`, 'Link a second instant, as far from the first as you can.'];
 	const known = sigma_s === null ? '' : ` Its times are known to ± ${sigmaText(sigma_s * fps)} live frames (one sigma, in the middle of the replay).`;
 	const missed = miss_m === null ? '' : ` The ball's rays miss each other by ${miss_m.toFixed(2)} m.`;

@@ -152,10 +152,30 @@ def test_lines_of_a_frame_mend_the_shot(recording: int, open_page: OpenPage, tri
     curves = page.get_by_role("region", name="Cameras over time")
     expect(curves).to_contain_text("Key frame")
     page.keyboard.press("b")
-    expect(page.get_by_text("These are the cameras before the last run.")).to_be_visible()
+    expect(page.get_by_text("These are the cameras before the last change.")).to_be_visible()
     expect(curves).to_contain_text("Frame 3 is lost")
     page.keyboard.press("b")
     expect(curves).not_to_contain_text("Frame 3 is lost")
+
+
+def test_cameras_are_turned_by_half_and_back_by_key(recording: int, open_page: OpenPage) -> None:
+    page = tracked(open_page, recording)
+
+    def place() -> list[float]:
+        answer = page.request.get(f"/api/v1/recordings/{recording}/cameras/0")
+        found: list[float] = answer.json()["camera"][0][:3]
+        return found
+
+    before = place()
+    button = page.get_by_role("button", name="Turn by half")
+    expect(button).to_have_attribute("aria-pressed", "false")
+    page.keyboard.press("Shift+t")
+    expect(button).to_have_attribute("aria-pressed", "true")
+    assert place() == [-before[0], -before[1], before[2]]
+    expect(page.get_by_text("Shift T turns them back.")).to_be_visible()
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "false")
+    assert place() == before
 
 
 def test_groups_have_the_cameras_of_their_frames(recording: int, open_page: OpenPage) -> None:

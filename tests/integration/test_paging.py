@@ -26,9 +26,11 @@ from app.features.people.service import invite
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
-from app.features.recordings.cameras import Tracked, save_cameras
+from app.features.recordings.camera_tracking import Tracked, save_cameras
+from app.features.recordings.index import index_now
 from app.features.recordings.links import add_link
-from app.features.recordings.service import Shot, add_recording, index_now, put_shots
+from app.features.recordings.service import add_recording
+from app.features.recordings.shots import Shot, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.features.webhooks.messages import Kind

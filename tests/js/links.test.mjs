@@ -5,7 +5,7 @@ import { instantBeside, mapText, markOf, replayFrameAt, speedText, withInstant }
 
 const INSTANTS = [{ live: 5, replay: 30 }, { live: 15, replay: 50 }];
 const FRAMES = { first: 4, replay: [null, 20, 22], off_s: [null, 0, 0], repeated: [21], blended: [22] };
-const MAP = /** @type {const} */ ({ outcome: 'linked', found_by: 'instants', reason: null, speed: 0.25, speed_sigma: 0.004, sigma_s: 0.02, miss_m: null, pieces: [], misses: [], ball_reason: null });
+const MAP = /** @type {const} */ ({ outcome: 'linked', found_by: 'instants', reason: null, speed: 0.25, speed_sigma: 0.004, sigma_s: 0.02, miss_m: null, pieces: [], misses: [], ball_reason: null, turned: false, too_close: false });
 
 test('a speed is told as times slower or faster', () => {
 	assert.deepEqual([0.25, 1, 0.99, 2].map(speedText), ['4.0 times slower than live', 'as fast as live', 'as fast as live', '2.0 times faster than live']);
@@ -19,6 +19,9 @@ test('a map says its speed and how well its times are known', () => {
 	assert.equal(pieces.length, 3);
 	assert.match(pieces[2], /Frames 9 to 20 of the replay run as fast as live/);
 	assert.deepEqual(mapText({ ...MAP, ball_reason: 'The ball rests.' }, 50).slice(1), ['The ball does not tell the times. The ball rests.']);
+	const close = mapText({ ...MAP, outcome: 'offset', reason: 'Too close together; 1 is assumed.', speed: 1, too_close: true }, 50);
+	assert.deepEqual(close, ['Too close together; 1 is assumed.']);
+	assert.match(mapText({ ...MAP, outcome: 'offset', reason: 'One; 1 is assumed.', speed: 1 }, 50)[0], /^One instant says when/);
 	assert.deepEqual(mapText({ ...MAP, outcome: 'unobservable', reason: 'The ball rests.' }, 50), ['The ball rests.']);
 });
 

@@ -25,6 +25,7 @@ from app.soccer.frames import ImageSize
 from app.solving.tripod_pitch import TripodPitch
 from app.tracking.clip import Clip
 from app.tracking.follow import OUTCOMES
+from app.tracking.sides import turned_frame
 from app.tracking.track import FrameCamera, Track, track_clip
 from app.worker_process import WorkerEnded, WorkerLimits, WorkerProcess
 
@@ -40,6 +41,7 @@ def track_files(
     lines: Sequence[str] = (),
     *,
     on_shown: bool = False,
+    turn: bool = False,
     progress: ReportProgress | None = None,
 ) -> dict[str, Any]:
     """Write a camera file for each frame of a clip that has a camera, and what became of each.
@@ -52,16 +54,22 @@ def track_files(
             earlier run left there for the same frames are replaced or removed.
         lines: ``FILE@FRAME``: a line file of SoccerNet's form, and the number of its frame.
         on_shown: Whether cameras are those of the pitch that the clip shows, instead of the plan.
+        turn: Whether the cameras are turned by half a turn of the pitch, where no lines say which half is left.
         progress: Called with frames done.
 
     Returns:
         What ``track.json`` holds.
 
     Raises:
-        InputError: A line file cannot be read or determines no camera, or ``out`` cannot hold the
-            result.
+        InputError: A line file cannot be read or determines no camera, ``out`` cannot hold the
+            result, or cameras of lines shall be turned.
         ImageError: The clip cannot be read.
     """
+    if turn and lines:
+        raise InputError(
+            "lines say which half of the pitch is left: their cameras are not turned",
+            hint="Name the lines for the other half, or leave one of the two out.",
+        )
     named = _parse_names(lines)
     contents = {number: _read(path) for number, path in named.items()}
     shown = {number: str(path) for number, path in named.items()}
@@ -76,10 +84,13 @@ def track_files(
         except WorkerEnded as error:
             raise InputError(f"{clip.name} {error}") from error
     frames = found.shown_frames if on_shown else found.frames
-    result = {
-        "frames": [frame_row(frame) for frame in frames],
-        "pitch": pitch_row(found.shown, on_shown=on_shown),
-    }
+    pitch = pitch_row(found.shown, on_shown=on_shown)
+    if turn:
+        frames = [turned_frame(frame) for frame in frames]
+        if pitch is not None:
+            x, y, z = pitch["tripod"]
+            pitch["tripod"] = [-x, -y, z]
+    result = {"frames": [frame_row(frame) for frame in frames], "pitch": pitch}
     write_cameras(out, frames, result)
     return result
 

@@ -274,6 +274,12 @@ def track(
             "of the pitch that the clip shows, of its own length, width and crown (track.json)."
         ),
     ] = CamerasOn.PLAN,
+    turn: Annotated[
+        bool,
+        typer.Option(
+            "--turn", help="The camera stands on the far side: turn it by half a turn of the pitch."
+        ),
+    ] = False,
     json_: Json = False,
 ) -> None:
     """Follow the camera of a clip: a camera for each frame.
@@ -286,7 +292,9 @@ def track(
 
     with show_progress("Tracking") as progress:
         on_shown = pitch is CamerasOn.SHOWN
-        result = track_files(clip, out, lines or (), on_shown=on_shown, progress=progress)
+        result = track_files(
+            clip, out, lines or (), on_shown=on_shown, turn=turn, progress=progress
+        )
     if json_:
         print_json(result)
         return

@@ -33,13 +33,9 @@ from app.features.recordings.ball_run_queries import (
 )
 from app.features.recordings.camera_queries import views_of_video
 from app.features.recordings.cameras import cameras_at
-from app.features.recordings.service import (
-    Recording,
-    get_recording,
-    get_shots,
-    need_recording,
-    read_index,
-)
+from app.features.recordings.index import read_index
+from app.features.recordings.service import Recording, get_recording, need_recording
+from app.features.recordings.shots import get_shots
 from app.media.frames import refused_picture
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box

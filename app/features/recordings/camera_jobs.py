@@ -1,4 +1,4 @@
-"""Cameras of a stretch of a recording as a job."""
+"""Cameras of a stretch of a recording as a job: tracked, or turned by half."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from app.db.store import Store
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
-from app.features.recordings.cameras import require_stretch, track_now
+from app.features.recordings.camera_tracking import (
+    require_stretch,
+    require_turnable,
+    track_now,
+    turn_cameras,
+)
 from app.features.recordings.service import get_recording
 from app.features.solve.jobs import request_solve
 from app.plural import plural
@@ -30,7 +35,7 @@ def request_cameras(
         actor: Who wants it.
 
     Raises:
-        NotFoundError, ConflictError, InputError: As ``cameras.require_stretch``.
+        NotFoundError, ConflictError, InputError: As ``camera_tracking.require_stretch``.
     """
     recording = get_recording(store, recording_id)
     require_stretch(recording, first, last)
@@ -41,6 +46,39 @@ def request_cameras(
         dataset_id=recording.dataset_id,
         actor=actor,
         request={"recording": recording_id, "first": first, "last": last},
+    )
+
+
+def request_turn(
+    jobs: Jobs, store: Store, recording_id: int, frame: int, turned: bool, *, actor: str
+) -> Job:
+    """Turn the cameras of a stretch by half a turn of the pitch, or back, soon.
+
+    Args:
+        jobs: Carries it out.
+        store: The database.
+        recording_id: Which recording.
+        frame: Any frame of the stretch.
+        turned: Whether they shall be turned against what the tracker gave.
+        actor: Who wants it.
+
+    Raises:
+        NotFoundError, ConflictError: As ``camera_tracking.require_turnable``.
+    """
+    recording = get_recording(store, recording_id)
+    found = require_turnable(store, recording_id, frame, turned)
+    return jobs.submit(
+        KIND,
+        f"Turn the camera of frames {found.first} to {found.last} of {recording.name} by half",
+        partial(cameras_work, jobs, store),
+        dataset_id=recording.dataset_id,
+        actor=actor,
+        request={
+            "recording": recording_id,
+            "first": found.first,
+            "last": found.last,
+            "turned": turned,
+        },
     )
 
 
@@ -55,9 +93,12 @@ def cameras_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
         progress(done, total, f"{plural(done, 'frame')} of {recording.name} followed{rest}.")
 
     with left_to_next_server(progress):
-        found, given = track_now(
-            store, recording.id, first, last, actor=actor, progress=step, stop=progress.check
-        )
+        if "turned" in asked:
+            found, given = turn_cameras(store, recording.id, first, asked["turned"], actor=actor)
+        else:
+            found, given = track_now(
+                store, recording.id, first, last, actor=actor, progress=step, stop=progress.check
+            )
     solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id if given else None
     summary = found.summary
     counts = {name: getattr(summary, name) for name in ("frames", "tracked", "bridged", "lost")}
@@ -67,6 +108,7 @@ def cameras_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
         "name": recording.name,
         "first": first,
         "last": last,
+        "turned": summary.turned,
         "groups": given,
         "solve_job": solve,
     }

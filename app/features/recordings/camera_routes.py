@@ -8,10 +8,11 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.errors import NotFoundError
 from app.features.jobs.queries import Job
-from app.features.recordings.camera_jobs import request_cameras
+from app.features.recordings.camera_jobs import request_cameras, request_turn
 from app.features.recordings.camera_output import MEDIA_TYPES, camera_output
 from app.features.recordings.camera_schemas import (
     CameraFormat,
+    CamerasChange,
     CamerasDocument,
     CamerasList,
     CamerasRequest,
@@ -96,6 +97,22 @@ def get_stretch(
         return Response(status_code=304, headers=headers)
     frames = read_cameras(store.settings, digest)
     return document(FrameCamerasDocument.of(frames, pitch), 200, headers)
+
+
+@router.patch(
+    "/{recording}/cameras/{frame}", operation_id="turnCameras", **by_job(404, 409, 413, 415)
+)
+@may(Action.LEAD, recording=OwnedKind.RECORDING)
+@responds(job_answer)
+def turn_stretch(
+    recording: Id, frame: Frame, wanted: CamerasChange, services: AppServices, actor: Actor
+) -> Job:
+    """Turn the cameras of the stretch that has a frame by half a turn of the pitch, or back.
+
+    Its paint is the same from the other side, so that a camera which stands opposite is tracked turned. Groups of its
+    frames follow, unless somebody has given or drawn another camera. Lines that are drawn in a frame say which side it is.
+    """
+    return request_turn(services.jobs, services.store, recording, frame, wanted.turned, actor=actor)
 
 
 @router.get(

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.file_tools.track import frame_row
 from app.features.recordings.cameras import CameraSummary
@@ -30,6 +30,16 @@ class CamerasRequest(BaseModel):
     last: Frame = Field(description="Number of its last frame.")
 
 
+class CamerasChange(BaseModel):
+    """On which side the cameras of a stretch stand."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"turned": True}]})
+
+    turned: StrictBool = Field(
+        description="Whether they are turned by half a turn of the pitch against what the tracker gave."
+    )
+
+
 class CameraSummaryDocument(Document, shows=CameraSummary):
     """What became of the frames of a stretch."""
 
@@ -43,6 +53,9 @@ class CameraSummaryDocument(Document, shows=CameraSummary):
     worst_px: float | None = Field(description="How far, pixels of the video.")
     annotated: tuple[int, ...] = Field(description="Frames whose lines were known.")
     unusable: tuple[int, ...] = Field(description="Frames with too few lines for a camera.")
+    turned: bool = Field(
+        description="Whether a person turned them by half a turn of the pitch against what the tracker gave."
+    )
 
 
 class CamerasDocument(Document):

@@ -37,7 +37,8 @@ def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:
 
 
 def _import_here(paths: Sequence[Path], dataset: str) -> list[dict[str, Any]]:
-    from app.features.recordings.service import add_recording, index_now, require_video
+    from app.features.recordings.index import index_now
+    from app.features.recordings.service import add_recording, require_video
 
     files = [require_video(path.resolve()) for path in paths]
     found = []

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +16,8 @@ from app.canonical import digest_of
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import ConflictError, ImageError, OverloadedError, ReviewError
-from app.features.recordings.service import Recording, read_index
+from app.features.recordings.index import read_index
+from app.features.recordings.service import Recording
 from app.media.files import JPEG_QUALITY
 from app.media.frames import refused_picture
 from app.video.frames import Image, RecordingReader
@@ -28,6 +31,8 @@ WAITING = 64
 BEHIND, AHEAD = 10, 4
 """Frames that are decoded with one that is jumped to, so that steps back find them, and frames that
 are decoded before somebody asks, while one steps or plays."""
+STEP = 6
+"""Frames that are passed over at once on the way to one that nobody waits for: who asks meanwhile waits so long."""
 THUMBNAIL = 320
 """Pixels of width up to which pictures are kept in the cache: a strip shows hundreds at once."""
 MOST_OPEN = 2
@@ -64,11 +69,18 @@ class RecordingFrames:
         return self._pool.submit(read_jpeg, *asked, explain=explain)
 
     def ask_ahead(self, recording: Recording, number: int) -> None:
-        """Have the frames behind one decoded, as far as nobody else waits for any."""
-        if self._pool.tasks == 0 and recording.sha256 is not None:
-            asked = (recording.path, recording.sha256, number, self._settings)
+        """Have the frames beside one decoded, one after the other, as long as nobody waits for any."""
+        if recording.sha256 is not None:
+            self._go_on(recording.path, recording.sha256, number, self._settings)
+
+    def _go_on(self, *asked: Any) -> None:
+        def then(done: Future[bool]) -> None:
+            if not done.cancelled() and done.exception() is None and done.result():
+                self._go_on(*asked)
+
+        if self._pool.tasks == 0:
             with suppress(OverloadedError):
-                self._pool.submit(read_ahead, *asked)
+                self._pool.submit(read_ahead, *asked).future.add_done_callback(then)
 
     def close(self) -> None:
         """End the process."""
@@ -77,11 +89,14 @@ class RecordingFrames:
 
 @dataclass
 class _Open:
-    """A recording that the process keeps open; the frame that was asked for last, and which way that was."""
+    """A recording that the process keeps open; the frame that was asked for last, which way that was, and the frames
+    that are decoded before somebody asks, in their order."""
 
     reader: RecordingReader
+    count: int
     last: int = -1
     way: int = 1
+    planned: list[int] = field(default_factory=list)
 
 
 _OPEN: OrderedDict[tuple[str, str], _Open] = OrderedDict()
@@ -111,23 +126,31 @@ def read_jpeg(path: Path, sha256: str, number: int, width: int | None, settings:
     return data
 
 
-def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> None:
-    """Decode what is asked for next, if it goes on as it did; it is kept for whoever asks."""
+def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> bool:
+    """Come one step nearer to what is asked for next, if it goes on as it did; whether there is more to do."""
     with suppress(ConflictError, ImageError):
         found = _opened(path, sha256, settings)
         if found.way > 0:
-            found.reader.prefetch(number, AHEAD)
-        elif not found.reader.has(before := max(number - BEHIND // 2, 0)):
-            _read_up_to(found.reader, before)
+            following = range(number + 1, min(number + 1 + AHEAD, found.count))
+            found.planned = [one for one in following if not found.reader.has(one)]
+        elif not found.planned and not found.reader.has(before := max(number - BEHIND // 2, 0)):
+            found.planned = list(range(max(before - BEHIND, 0), before + 1))
+        if found.planned and found.reader.prefetch(found.planned[0], STEP):
+            del found.planned[0]
+        return bool(found.planned)
+    return False
 
 
 def _read(path: Path, sha256: str, number: int, settings: Settings) -> Image:
     found = _opened(path, sha256, settings)
     follows = 0 < number - found.last <= 2 * AHEAD
-    if not follows and not found.reader.has(number):
+    way = 1 if number >= found.last else -1
+    is_kept = found.reader.has(number)
+    if way != found.way or not (follows or is_kept):
+        found.planned.clear()
+    if not follows and not is_kept:
         _read_up_to(found.reader, number)
-    found.way = 1 if number >= found.last else -1
-    found.last = number
+    found.way, found.last = way, number
     return found.reader.read(number)
 
 
@@ -140,7 +163,8 @@ def _read_up_to(reader: RecordingReader, number: int) -> None:
 def _opened(path: Path, sha256: str, settings: Settings) -> _Open:
     key = (str(path), sha256)
     if key not in _OPEN:
-        _OPEN[key] = _Open(RecordingReader(path, read_index(settings, sha256), KEPT_BYTES))
+        index = read_index(settings, sha256)
+        _OPEN[key] = _Open(RecordingReader(path, index, KEPT_BYTES), len(index))
         while len(_OPEN) > MOST_OPEN:
             _, oldest = _OPEN.popitem(last=False)
             oldest.reader.close()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -19,18 +19,16 @@ from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_row
+from app.features.groups.queries import StoredGroup, read_groups
 from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
-from app.features.recordings.cameras import SOURCE, cameras_at
+from app.features.recordings.camera_groups import SOURCE
+from app.features.recordings.camera_queries import views_of_video
+from app.features.recordings.cameras import cameras_at
+from app.features.recordings.index import read_index
 from app.features.recordings.link_frames import linked_frames
 from app.features.recordings.links import list_links
 from app.features.recordings.match_clock import match_time
-from app.features.recordings.service import (
-    Recording,
-    get_recording,
-    groups_taken,
-    read_index,
-    single_views,
-)
+from app.features.recordings.service import Recording, get_recording, groups_taken
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
@@ -51,9 +49,9 @@ class Taken:
     Attributes:
         name: Of the recording.
         new: Groups that were made.
-        changed: Groups of one view that got those of linked replays.
+        changed: Groups that were there, and got views of linked replays of which they had none.
         unchanged: Groups that were there already, and stay as they are.
-        linked_views: Views of linked replays in the groups that were made or changed.
+        linked_views: Views of linked replays that were added to the groups that were made or changed.
         outside: Times that an instant of those is outside of the stretch of a linked replay.
         cameras: Views of those groups that have the camera of their frame.
     """
@@ -130,6 +128,7 @@ def take_instants(
     linked: bool,
     actor: str,
     progress: ReportProgress,
+    dry_run: bool = False,
 ) -> Taken:
     """Make a group of each instant: of one view, or with those of linked replays; in a worker process, which decodes.
 
@@ -139,10 +138,11 @@ def take_instants(
         store: The database.
         recording_id: Which recording.
         frames: Numbers of its frames.
-        linked: Whether the frames of linked replays that show the same are further views. Groups of one view that
-            are there already get them, too.
+        linked: Whether the frames of linked replays that show the same are further views. Groups that are there already
+            get those of replays of which they have no view.
         actor: Who wants it.
         progress: Called with instants done and in all.
+        dry_run: Count what would become of them, and keep nothing.
 
     Raises:
         ConflictError, InputError: As ``require_instants``, also of the recording of a replay.
@@ -152,26 +152,26 @@ def take_instants(
     recording = get_recording(store, recording_id)
     numbers = require_instants(recording, frames)
     there = groups_taken(store, recording)
-    replays = _linked_views(store, recording, numbers) if linked else _LinkedViews()
-    single = single_views(store, recording) if linked else set()
-    wanted = [n for n in numbers if n not in there or (n in single and n in replays.of)]
+    replays = _linked_views(store, recording, numbers, there) if linked else _LinkedViews()
+    wanted = [number for number in numbers if number not in there or number in replays.of]
     index = read_index(store.settings, recording.require_readable())
     origin, report = Origin(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
     tracked = cameras_at(store, recording, wanted)
     live = [_Shown(recording, index, number, tracked.get(number)) for number in wanted]
-    groups = _groups(store.settings, live, replays.of)
-    while batch := list(islice(groups, BATCH)):
+    groups = _groups(store, live, replays.of, there)
+    while not dry_run and (batch := list(islice(groups, BATCH))):
         with store.write() as session:
             ingest_batch(session, origin, batch, report, set())
         done += len(batch)
         progress(done, total)
     linked_views = [view for number in wanted for view in replays.of.get(number, ())]
+    new = sum(number not in there for number in wanted)
     return Taken(
         recording.name,
-        report.new,
-        report.changed,
+        new if dry_run else report.new,
+        len(wanted) - new if dry_run else report.changed,
         len(numbers) - len(wanted),
         len(linked_views),
         sum(number in wanted for number in replays.missed),
@@ -182,15 +182,23 @@ def take_instants(
     )
 
 
-def _linked_views(store: Store, recording: Recording, numbers: Sequence[int]) -> _LinkedViews:
+def _linked_views(
+    store: Store, recording: Recording, numbers: Sequence[int], there: Mapping[int, int]
+) -> _LinkedViews:
     """The frames of all linked replays that show what live frames show; of links whose speed is known, not
-    assumed."""
+    assumed. Left out where the group of a frame (``there``) has a view of that replay already."""
     found = _LinkedViews()
     for link in list_links(store, recording.id):
-        asked = [number for number in numbers if number in link.live.frames]
-        if link.live.recording != recording.id or link.map.outcome != "linked" or not asked:
+        if link.live.recording != recording.id or link.map.outcome != "linked":
             continue
         replay = get_recording(store, link.replay.recording)
+        with store.read() as session:
+            shown = views_of_video(session, replay.dataset_id, replay.require_readable())
+        have = {view.group for view in shown if view.number in link.replay.frames}
+        inside = [number for number in numbers if number in link.live.frames]
+        asked = [number for number in inside if there.get(number) not in have]
+        if not asked:
+            continue
         index = read_index(store.settings, replay.require_readable())
         same = linked_frames(store, link)
         frames = {number: same.replay[number - same.first] for number in asked}
@@ -214,21 +222,49 @@ def _linked_views(store: Store, recording: Recording, numbers: Sequence[int]) ->
 
 
 def _groups(
-    settings: Settings, live: Sequence[_Shown], linked: Mapping[int, Sequence[_Shown]]
+    store: Store,
+    live: Sequence[_Shown],
+    linked: Mapping[int, Sequence[_Shown]],
+    there: Mapping[int, int],
 ) -> Iterator[Group]:
+    """Groups of live frames with further views of replays; those that are there keep the views that they have."""
+    settings = store.settings
     for start in range(0, len(live), BATCH):
         some = live[start : start + BATCH]
         _keep(settings, [*some, *(view for one in some for view in linked.get(one.number, ()))])
+        with store.read() as session:
+            known = read_groups(session, [there[one.number] for one in some if one.number in there])
         for one in some:
             match = one.recording.name
             key = f"{match}/{one.number}.png"
-            views = [_view(settings, one, f"{one.number}.png", key)]
+            stored = known.get(there.get(one.number, 0))
+            if stored is None:
+                views = [_view(settings, one, f"{one.number}.png", key)]
+            else:
+                views = [_as_taken(stored, view, one) for view in stored.group.views]
             for other in linked.get(one.number, ()):
                 name = f"{other.number}.png"
                 if other.recording.id != one.recording.id:
                     name = f"{other.recording.name}_{name}"
-                views.append(_view(settings, other, name, f"{key}/{name}"))
+                if all(name != view.key for view in views):
+                    views.append(_view(settings, other, name, f"{key}/{name}"))
             yield Group(key, tuple(views), match=match, label=f"Frame {one.number}")
+
+
+def _as_taken(stored: StoredGroup, view: View, live: _Shown) -> View:
+    """A view of a group that is there, without what people said of it since: an import keeps that, and what is
+    given. Its live view gets the camera of its frame where it has neither camera nor lines."""
+    kept = stored.stations[view.key]
+    station = kept.station
+    if kept.edited:
+        station = Station(station.key, station.size, flipped=station.flipped)
+    tracked = live.tracked
+    is_free = kept.station.given is None and not kept.station.lines
+    if is_free and view.key == f"{live.number}.png" and tracked is not None and tracked.camera:
+        station = station.with_given(tracked.camera, tracked.covariance)
+    if view.key in stored.edited_views:
+        view = View(view.key, station, media=view.media, extras=view.extras)
+    return replace(view, station=station)
 
 
 def _keep(settings: Settings, views: Sequence[_Shown]) -> None:
@@ -249,7 +285,8 @@ def _view(settings: Settings, shown: _Shown, name: str, key: str) -> View:
     told = {**_provenance(shown.recording, shown.index, shown.number), **(shown.link or {})}
     if frame is not None and frame.camera is not None:
         station = station.with_given(frame.camera, frame.covariance)
-        told["camera"] = _given_by_track(frame)
+        # Another camera may be given later: this is what was given now.
+        told["camera_when_taken"] = _given_by_track(frame)
     media = Media(str(settings.recordings / shown.place))
     return View(name, station, media=media, extras=Extras(metadata={"recording": told}))
 

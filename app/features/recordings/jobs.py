@@ -19,17 +19,16 @@ from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
 from app.features.paint.jobs import PROPOSALS
+from app.features.recordings.index import has_index, index_now
 from app.features.recordings.instants import require_instants, take_instants
 from app.features.recordings.service import (
     Recording,
     add_recording,
-    find_again,
     get_recording,
     groups_taken,
-    has_index,
-    index_now,
     require_video,
 )
+from app.features.recordings.shots import find_again
 from app.features.solve.jobs import request_solve
 from app.plural import plural
 from app.progress import ReportProgress
@@ -129,10 +128,12 @@ class InstantOptions:
     Attributes:
         propose: Whether cameras are proposed for the new groups afterwards.
         linked: Whether the frames of linked replays are further views.
+        dry_run: Whether nothing is kept, and what would become of them is counted.
     """
 
     propose: bool = True
     linked: bool = False
+    dry_run: bool = False
 
 
 def request_instants(
@@ -161,7 +162,7 @@ def request_instants(
     numbers = require_instants(recording, frames)
     return jobs.submit(
         INSTANTS,
-        f"Make {plural(len(numbers), 'group')} of {recording.name}",
+        f"{'Dry run: make' if options.dry_run else 'Make'} {plural(len(numbers), 'group')} of {recording.name}",
         partial(instants_work, jobs, store),
         dataset_id=recording.dataset_id,
         actor=actor,
@@ -183,12 +184,14 @@ def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
             recording,
             asked["frames"],
             linked=asked.get("linked", False),
+            dry_run=asked.get("dry_run", False),
             actor=actor,
             progress=step,
             stop=progress.check,
         )
     solve = proposals = None
-    if taken["new"] or taken["changed"]:
+    dry_run = asked.get("dry_run", False)
+    if (taken["new"] or taken["changed"]) and not dry_run:
         solve = request_solve(jobs, store, recording.dataset_id, actor=actor).id
         views = taken["new"] + taken["changed"] + taken["linked_views"]
         if asked["propose"] and taken["cameras"] < views:
@@ -197,6 +200,7 @@ def instants_work(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
     groups = groups_taken(store, recording)
     return {
         **taken,
+        "dry_run": dry_run,
         "group": groups.get(asked["frames"][0]) if asked["frames"] else None,
         "solve_job": solve,
         "proposals_job": proposals,
@@ -212,6 +216,7 @@ def take_in_worker(
     actor: str,
     progress: ReportProgress,
     stop: Any,
+    dry_run: bool = False,
 ) -> dict[str, Any]:
     """``instants.take_instants`` in a worker process, within the limits of imports."""
     limits = WorkerLimits(store.settings.import_memory, store.settings.import_seconds, SILENCE)
@@ -219,7 +224,7 @@ def take_in_worker(
         taken = run_in_worker(
             store,
             "recordings",
-            take_instants,
+            partial(take_instants, dry_run=dry_run),
             recording.id,
             frames,
             linked,

@@ -1,6 +1,7 @@
 """Links found from the ball: where it is seen in both shots, with the cameras over time, tells which times are the same.
 
-The ball is seen where a file (``ball.csv``) says it, or where the groups that were taken from the shots have it.
+The ball is seen where a file (``ball.csv``) says it, or where the groups that were taken from the shots have it; in the
+frames of the live shot between these, a track of the ball says where it was.
 """
 
 from __future__ import annotations
@@ -41,17 +42,20 @@ from app.features.recordings.links import (
     residuals_of,
     save_map,
 )
-from app.features.recordings.service import get_recording, groups_taken
+from app.features.recordings.service import Recording, get_recording, groups_taken
+from app.features.tracks.service import list_tracks, read_track
 from app.formats.report import Report
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.plural import plural
 from app.progress import ReportProgress
 from app.tracking.ball_rays import BallRays, ball_rays
-from app.tracking.link import map_of_ball, ray_misses
+from app.tracking.link import map_of_ball, or_turned, ray_misses
 from app.worker_process import WorkerEnded, WorkerLimits
 
 KIND = "link"
+SURE_M = 0.5
+"""Largest sigma of a track's ball that is looked for in the replay."""
 _BATCH = 100
 _Seen = tuple[tuple[float, float], Camera | None]
 """Pixel of the ball, and the camera of its view where that has one of its own."""
@@ -167,14 +171,14 @@ def link_by_ball(
     live_times, times = link_seconds(store.settings, row)
     report = Report()
     sides = [
-        _rays(store, shot, seconds, (live, replay), uploads.get(name), report)
+        _rays(store, shot, seconds, (live, replay), uploads.get(name), report, link_id)
         for name, shot, seconds in (("live", live, live_times), ("replay", replay, times))
     ]
     (live_rays, live_left), (rays, replay_left) = sides
     before = get_link(store, recording_id, link_id)
     pairs = [(one.live, one.replay) for one in before.instants]
     given = instant_seconds(row, pairs, live_times, times)
-    found = map_of_ball(live_rays, rays, given)
+    found = or_turned(map_of_ball(live_rays, rays, given), live_rays, rays, given)
     reason = None if found.pieces else found.reason
     if reason is None:
         made = described(found, replay, times, "ball")
@@ -183,9 +187,9 @@ def link_by_ball(
         each = zip(frames.tolist(), misses.tolist(), strict=True)
         made = replace(made, misses=tuple(RayMiss(*one) for one in each))
     elif before.map.is_usable and before.map.found_by == "instants":
-        made = replace(before.map, ball_reason=reason)
+        made = replace(before.map, ball_reason=reason, turned=found.turned)
     else:
-        made = LinkMap("unobservable", "ball", reason, miss_m=found.miss)
+        made = LinkMap("unobservable", "ball", reason, miss_m=found.miss, turned=found.turned)
     with store.write() as session:
         present = need_link(session, recording_id, link_id)
         if etag_of(present) != etag_of(row):
@@ -208,6 +212,7 @@ def _rays(
     shots: Sequence[LinkedShot],
     upload: str | None,
     report: Report,
+    link_id: int,
 ) -> tuple[BallRays, int]:
     """The rays of the ball in a shot, and how many frames with a ball have no camera, or are of another shot."""
     if upload is None:
@@ -215,7 +220,15 @@ def _rays(
     else:
         seen = _of_file(store.settings, upload, report)
     inside = {number: one for number, one in seen.items() if number in shot.frames}
-    tracked = cameras_at(store, get_recording(store, shot.recording), inside)
+    recording = get_recording(store, shot.recording)
+    places = {} if upload or shot != shots[0] else ball_places(store, recording, shot, link_id)
+    tracked = cameras_at(store, recording, inside.keys() | places.keys())
+    for number in places.keys() - inside.keys():
+        frame = tracked.get(number)
+        if frame is not None and frame.camera is not None:
+            x, y = frame.camera.project(places[number][None])[0].tolist()
+            if np.isfinite(x):
+                inside[number] = ((x, y), frame.camera)
     rays, last = [], -1.0
     for number in sorted(inside):
         pixel, own = inside[number]
@@ -233,7 +246,32 @@ def _rays(
             f"{plural(len(inside), 'ball')} {where}, and no camera for one of them",
             hint="Track the camera of the shot, and mark the ball in frames of it or send a ball.csv.",
         )
-    return ball_rays(*(list(column) for column in zip(*rays, strict=True))), len(seen) - len(rays)
+    left_out = len(seen) - sum(number in seen for number in inside)
+    rays_found = ball_rays(*(list(column) for column in zip(*rays, strict=True)))
+    return rays_found, left_out + len(inside) - len(rays)
+
+
+def ball_places(
+    store: Store, recording: Recording, shot: LinkedShot, link_id: int
+) -> dict[int, FloatArray]:
+    """Where tracks put the ball in frames of a shot, pitch frame, metres, shape (3,), by frame.
+
+    Tracks that are stale, or in which a view of the link takes part, say nothing: their times come from it.
+    """
+    found: dict[int, FloatArray] = {}
+    for track in list_tracks(store, recording.dataset_id):
+        overlaps = track.first <= shot.last and shot.first <= track.last
+        if track.match != recording.name or not overlaps or track.stale or track.summary.reason:
+            continue
+        detail = read_track(store, track.id)
+        if any(view.endswith(f" link {link_id}") for view in detail.inputs.measurements.names):
+            continue
+        known = np.isfinite(detail.ball.position).all(axis=1)
+        known &= detail.ball.sigma <= SURE_M
+        for row in np.flatnonzero(known):
+            if (number := int(detail.ball.frames[row])) in shot.frames:
+                found[number] = detail.ball.position[row]
+    return found
 
 
 def _of_file(settings: Settings, upload: str, report: Report) -> dict[int, _Seen]:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Response
 
 from app.features.jobs.queries import Job
 from app.features.recordings.link_ball import request_ball_link
-from app.features.recordings.link_frames import LinkedFrames, linked_frames, suggest_live
+from app.features.recordings.link_frames import LinkedFrames, linked_frames
 from app.features.recordings.link_schemas import (
     BallLinkRequest,
     InstantsEdit,
@@ -17,6 +17,7 @@ from app.features.recordings.link_schemas import (
     LiveSuggestions,
     NewShotLink,
 )
+from app.features.recordings.link_suggestions import suggest_live
 from app.features.recordings.link_values import ShotLink, links_csv
 from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
 from app.features.recordings.routes import CSV_FILE

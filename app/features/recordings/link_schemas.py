@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.features.recordings.link_frames import LiveSuggestion
+from app.features.recordings.link_suggestions import LiveSuggestion
 from app.features.recordings.link_values import Instant, LinkedShot, LinkMap
 from app.features.recordings.links import MAX_INSTANTS
 from app.features.recordings.schemas import Frame

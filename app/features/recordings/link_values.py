@@ -100,6 +100,8 @@ class LinkMap:
         pieces: Where the speed changes.
         misses: Of the ball's rays, by frame of the replay.
         ball_reason: Why the ball did not tell the times, where instants do.
+        turned: Whether the ball's rays would meet once the cameras of the replay are turned by half a turn of the pitch.
+        too_close: Whether several instants are too close together to tell the speed, which is assumed.
     """
 
     outcome: LinkOutcome
@@ -114,6 +116,8 @@ class LinkMap:
     pieces: tuple[LinkPiece, ...] = ()
     misses: tuple[RayMiss, ...] = ()
     ball_reason: str | None = None
+    turned: bool = False
+    too_close: bool = False
 
     @property
     def is_usable(self) -> bool:
@@ -215,6 +219,7 @@ def described(
         made.sigma_at(float(times[-1]) / 2) if whole else None,
         made.miss,
         pieces,
+        too_close=made.too_close,
     )
 
 
@@ -242,7 +247,9 @@ def etag_of(row: Any) -> str:
 def link_of(row: Any) -> ShotLink:
     """The link of a row."""
     live, replay = shots_of_link(row)
-    stored = parse(row.map)
+    stored, instants = parse(row.map), tuple(Instant(*one) for one in parse(row.instants))
+    # Maps of earlier versions do not say it.
+    stored.setdefault("too_close", stored["outcome"] == "offset" and len(instants) > 1)
     parts = {
         "pieces": tuple(LinkPiece(**one) for one in stored["pieces"]),
         "misses": tuple(RayMiss(**one) for one in stored.get("misses", ())),
@@ -253,7 +260,7 @@ def link_of(row: Any) -> ShotLink:
         dataset_id=int(row.dataset_id),
         live=live,
         replay=replay,
-        instants=tuple(Instant(*one) for one in parse(row.instants)),
+        instants=instants,
         assumed_speed=row.assumed_speed,
         map=made,
         actor=row.actor,

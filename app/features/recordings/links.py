@@ -21,6 +21,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.audit_events import add_audit_event
 from app.features.groups.state import require_etag
+from app.features.recordings.index import frame_seconds
 from app.features.recordings.link_queries import (
     delete_link,
     find_link,
@@ -38,7 +39,7 @@ from app.features.recordings.link_values import (
     shots_of_link,
 )
 from app.features.recordings.queries import RecordingRow
-from app.features.recordings.service import frame_seconds, need_recording
+from app.features.recordings.service import need_recording
 from app.geometry.arrays import FloatArray
 from app.plural import plural
 from app.tracking.time_map import map_of_instants
@@ -197,12 +198,19 @@ def set_instants(
         NotFoundError: The recording has no such link.
         StaleRevisionError: Somebody else was faster.
     """
+    with store.read() as session:
+        seen = need_link(session, recording_id, link_id)
+    if if_match is not None:
+        require_etag(etag_of(seen), if_match, "this link")
+    # The map takes a while: others write meanwhile. It depends on the shots alone, which stay as they are.
+    pairs = _sound(instants, *shots_of_link(seen))
+    made, residuals = _map_of(store.settings, seen, pairs, assumed_speed)
     with store.write() as session:
         row = need_link(session, recording_id, link_id)
         if if_match is not None:
             require_etag(etag_of(row), if_match, "this link")
-        pairs = _sound(instants, *shots_of_link(row))
-        made, residuals = _map_of(store.settings, row, pairs, assumed_speed)
+        if (row.live_sha256, row.replay_sha256) != (seen.live_sha256, seen.replay_sha256):
+            raise ConflictError("a recording is another file by now", hint="Link the shots again.")
         if save_map(session, row, pairs, made, residuals, assumed_speed=assumed_speed):
             note_link(session, actor, "instants linked", row)
         found = link_of(find_link(session, link_id))

@@ -64,8 +64,13 @@ def match_time(
         seconds: When each frame of the recording is shown, shape (N,).
         frame: Number of the frame.
     """
-    if not clocks:
+    clock = clock_at(clocks, frame)
+    if clock is None:
         return None
-    before = [clock for clock in clocks if clock.frame <= frame]
-    clock = before[-1] if before else clocks[0]
     return clock.half, clock.seconds + float(seconds[frame] - seconds[clock.frame])
+
+
+def clock_at(clocks: Sequence[MatchClock], frame: int) -> MatchClock | None:
+    """The reading of the clock that holds in a frame; None where nobody has read it."""
+    before = [clock for clock in clocks if clock.frame <= frame]
+    return before[-1] if before else next(iter(clocks), None)

@@ -73,17 +73,33 @@ def names_and_paths(session: Session, dataset_id: int) -> Sequence[Any]:
 
 
 def taken_frames(session: Session, dataset_id: int, name: str) -> Sequence[Any]:
-    """``key``, ``id`` and number of ``views`` of the groups that were taken from a recording."""
-    views = (
-        select(func.count())
-        .where(ViewModel.group_id == GroupModel.id)
-        .correlate(GroupModel)
-        .scalar_subquery()
-    )
-    statement = select(GroupModel.key, GroupModel.id, views.label("views")).where(
+    """``key`` and ``id`` of the groups that were taken from a recording."""
+    statement = select(GroupModel.key, GroupModel.id).where(
         GroupModel.dataset_id == dataset_id, GroupModel.match == name
     )
     return session.execute(statement).all()
+
+
+def match_names(session: Session, dataset_id: int) -> set[str]:
+    """The matches of a dataset's groups."""
+    statement = select(GroupModel.match).where(GroupModel.dataset_id == dataset_id).distinct()
+    return set(session.scalars(statement))
+
+
+def matches_of_video(session: Session, dataset_id: int, sha256: str) -> list[str]:
+    """The matches of groups whose first view shows a frame of a video, that with most of them first."""
+    statement = (
+        select(GroupModel.match)
+        .join(ViewModel, ViewModel.group_id == GroupModel.id)
+        .where(
+            GroupModel.dataset_id == dataset_id,
+            ViewModel.position == 0,
+            ViewModel.media_path.contains(f"/{sha256}/"),
+        )
+        .group_by(GroupModel.match)
+        .order_by(func.count().desc(), GroupModel.match)
+    )
+    return list(session.scalars(statement))
 
 
 def insert_recording(session: Session, dataset_id: int, name: str, path: str, *, actor: str) -> int:

@@ -28,19 +28,16 @@ from app.features.recordings.schemas import (
 )
 from app.features.recordings.service import (
     Recording,
-    RecordingShots,
     get_recording,
-    get_shots,
     list_recordings,
-    put_shots,
     remove_recording,
     set_clocks,
-    shots_csv,
 )
+from app.features.recordings.shots import RecordingShots, get_shots, put_shots, shots_csv
 from app.finite import MAX_ID
 from app.http.conflicts import current_state
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch, SeesWhole, etag_matches
+from app.http.deps import Actor, AppServices, AppStore, DryRun, Id, IfMatch, SeesWhole, etag_matches
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
@@ -237,7 +234,11 @@ def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @responds(job_answer)
 def take_instants(
-    recording: Id, wanted: InstantsRequest, services: AppServices, actor: Actor
+    recording: Id,
+    wanted: InstantsRequest,
+    services: AppServices,
+    actor: Actor,
+    dry_run: DryRun = False,
 ) -> Job:
     """Make a group of each of these frames, which are kept without loss.
 
@@ -245,7 +246,7 @@ def take_instants(
     how many seconds it is off (`off_s`), and whether it is repeated or blended. A frame that is a group already stays as
     it is, but for a group of one view that gets linked ones. The recording may be gone afterwards.
     """
-    options = InstantOptions(propose=wanted.propose, linked=wanted.linked)
+    options = InstantOptions(wanted.propose, wanted.linked, dry_run or wanted.dry_run)
     return request_instants(
         services.jobs, services.store, recording, wanted.frames, options, actor=actor
     )

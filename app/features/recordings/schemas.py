@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from app.features.imports.schemas import ImportPlace
 from app.features.recordings.instants import MOST_AT_ONCE
 from app.features.recordings.match_clock import MAX_CLOCKS, Half, MatchClock
-from app.features.recordings.service import MAX_SHOTS, RecordingShots, Shot
+from app.features.recordings.shots import MAX_SHOTS, RecordingShots, Shot
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
 from app.soccer.choices import ShotKind, ShotStart
@@ -170,4 +170,7 @@ class InstantsRequest(BaseModel):
     linked: StrictBool = Field(
         default=False,
         description="Whether the frames of linked replays that show the same are further views of the groups.",
+    )
+    dry_run: StrictBool = Field(
+        default=False, description="The same as the parameter: count, and keep nothing."
     )

@@ -47,6 +47,7 @@ export function CameraCard({ one, cameras }) {
 			<p class="buttons">
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens its lines'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>
+				${stretch ? html`<button class="button" type="button" aria-pressed=${stretch.summary.turned} data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'The paint is the same from the other side: for a camera that stands opposite the main camera'} onClick=${cameras.turnHalf}>Turn by half <kbd>Shift T</kbd></button>` : null}
 			</p>
 			${stretch ? html`
 				<p class="camera__files">Save as ${FILES.map(([format, label], index) => html`${index ? ', ' : ''}<a key=${format} class="link" href=${camerasFile(one.id, stretch.first, format)} download>${label}</a>`)}</p>` : null}

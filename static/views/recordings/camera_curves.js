@@ -84,7 +84,7 @@ function Tools({ cameras }) {
 			<button class="button button--small" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Lines <kbd>P</kbd></button>
 			${cameras.stretch?.before ? html`<button class="button button--small" type="button" aria-pressed=${cameras.before} onClick=${cameras.turnBefore}>Before <kbd>B</kbd></button>` : null}
 			<${ThisFrame} cameras=${cameras} />
-			${cameras.before ? html`<strong>These are the cameras before the last run.</strong>` : null}
+			${cameras.before ? html`<strong>These are the cameras before the last change.</strong>` : null}
 		</div>
 	`;
 }

@@ -3,7 +3,7 @@
 
 import { useEffect, useRef, useState } from 'preact/hooks';
 
-import { getCameraStretches, getFrameCameras, postCameras } from '../../api/cameras.js';
+import { getCameraStretches, getFrameCameras, postCameras, turnCameras } from '../../api/cameras.js';
 import { listen } from '../../api/events.js';
 import { postInstants } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
@@ -32,6 +32,7 @@ import { goTo, wanted } from '../../state/playback.js';
  * @property {string} busy why nothing can be begun
  * @property {() => void} track
  * @property {() => void} correct draw the lines of the frame on screen
+ * @property {() => void} turnHalf to the other side of the pitch, or back
  * @property {() => void} worst
  * @property {() => void} untracked
  * @property {() => void} turnBefore
@@ -63,6 +64,15 @@ export function useCameras(one, shot) {
 			list.reload();
 		});
 	}
+	function turnHalf() {
+		if (busy || !stretch) return;
+		const turned = !stretch.summary.turned;
+		attempt(turnCameras(one.id, stretch.first, turned), async (begun) => {
+			const over = await follow(begun, setJob);
+			if (over.state === 'done') announce(turned ? 'The cameras stand on the other side now. Shift T turns them back.' : 'The cameras are turned back.');
+			list.reload();
+		});
+	}
 	function correct() {
 		if (busy) return;
 		attempt(postInstants(one.id, [frame], { propose: false, linked: false }), async (begun) => {
@@ -81,7 +91,7 @@ export function useCameras(one, shot) {
 		else goTo(place);
 	};
 	return {
-		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, correct,
+		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, correct, turnHalf,
 		worst: () => jump(frames && worstFrame(frames), 'No frame is tracked.'),
 		untracked: () => jump(frames && nextUntracked(frames, wanted.value), frames ? 'Every frame is tracked.' : 'This shot has no cameras yet.'),
 		turnBefore: () => {
@@ -102,10 +112,11 @@ export function useCameraKeys(cameras) {
 	latest.current = cameras;
 	const keys = useRef(/** @type {Binding[]} */ ([
 		{ keys: ['t'], label: 'Track the camera of the shot', group: 'Cameras', needs: 'lead', run: () => latest.current.track() },
+		{ keys: ['Shift+t'], label: 'Turn the cameras by half a turn of the pitch, or back', group: 'Cameras', needs: 'lead', run: () => latest.current.turnHalf() },
 		{ keys: ['e'], label: 'Draw the lines of this frame', group: 'Cameras', needs: 'lead', run: () => latest.current.correct() },
 		{ keys: ['w'], label: 'Worst frame of the shot', group: 'Cameras', run: () => latest.current.worst() },
 		{ keys: ['n'], label: 'Next frames that are lost or bridged', group: 'Cameras', run: () => latest.current.untracked() },
-		{ keys: ['b'], label: 'Cameras before the last run, or the present ones', group: 'Cameras', run: () => latest.current.turnBefore() },
+		{ keys: ['b'], label: 'Cameras before the last change, or the present ones', group: 'Cameras', run: () => latest.current.turnBefore() },
 		{ keys: ['p'], label: 'Projected lines', group: 'Cameras', run: () => latest.current.turnLines() },
 	]));
 	useKeys(keys.current);

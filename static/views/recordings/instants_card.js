@@ -21,8 +21,9 @@ import { JobProgress } from '../job_progress.js';
 /** @typedef {{chosen: ReadonlySet<number>, turn: (frame: number) => void, add: (frames: number[]) => void, clear: () => void}} Instants */
 
 /** What became of them, in words. @param {JobJson['result']} result */
-function madeText({ new: made, changed, unchanged, linked_views: views, outside }) {
+function madeText({ new: made, changed, unchanged, linked_views: views, outside, dry_run: dry }) {
 	return [
+		dry ? 'Nothing is kept yet. So it would be:' : '',
 		`${plural(made, 'group')} made.`,
 		changed ? `${plural(changed, 'group')} got views of replays.` : '',
 		unchanged ? `${plural(unchanged, 'frame')} ${unchanged === 1 ? 'was a group already and stays as it is' : 'were groups already and stay as they are'}.` : '',
@@ -42,11 +43,12 @@ export function InstantsCard({ one, shot, instants, links }) {
 	const busy = job !== null && !isOver(job);
 	const why = busy ? 'Groups are being made' : chosen.size === 0 ? 'Choose an instant first' : '';
 	const every = withForm((said) => { if (shot) instants.add(everyOf(shot, Number(said.get('step')))); });
-	function make() {
+	/** @param {boolean} dry */
+	function make(dry) {
 		if (why) return;
-		attempt(postInstants(one.id, [...chosen], { propose, linked: linked && usable > 0 }), async (begun) => {
+		attempt(postInstants(one.id, [...chosen], { propose, linked: linked && usable > 0, dry_run: dry }), async (begun) => {
 			const over = await follow(begun, setJob);
-			if (over.state === 'done') instants.clear();
+			if (over.state === 'done' && !dry) instants.clear();
 		});
 	}
 	const query = `match:"${one.name.replaceAll('"', '')}"`;
@@ -65,7 +67,8 @@ export function InstantsCard({ one, shot, instants, links }) {
 			</form>
 			<label class="form__check"><input type="checkbox" checked=${propose} onChange=${withTick(setPropose)} />Propose cameras afterwards</label>
 			${usable ? html`<label class="form__check"><input type="checkbox" checked=${linked} onChange=${withTick(setLinked)} />With the views of ${plural(usable, 'linked replay')}</label>` : null}
-			<p class="buttons"><button class="button button--primary" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${make}>Make ${chosen.size ? plural(chosen.size, 'group') : 'groups'}</button></p>
+			<p class="buttons"><button class="button button--primary" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${() => make(false)}>Make ${chosen.size ? plural(chosen.size, 'group') : 'groups'}</button>
+				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why || 'Counts what would become of them, and keeps nothing'} onClick=${() => make(true)}>Dry run</button></p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}
 			${job?.state === 'done' ? html`<p role="status">${madeText(job.result)}</p>` : null}

@@ -2,8 +2,9 @@
 /** The times of a replay from the ball: where it is in both shots, and how far its rays miss each other under the map. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
+import { useRef, useState } from 'preact/hooks';
 
+import { getCameraStretches, turnCameras } from '../../api/cameras.js';
 import { postUpload } from '../../api/imports.js';
 import { postBallLink } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
@@ -24,24 +25,36 @@ async function sent(file) {
 export function BallCard({ link, dataset, reload }) {
 	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
 	const { error, busy, attempt } = useAttempt();
+	const form = useRef(/** @type {HTMLFormElement | null} */ (null));
 	const runs = busy || (job !== null && !isOver(job));
-	/** @param {SubmitEvent} event */
-	function find(event) {
-		event.preventDefault();
-		if (runs) return;
-		const said = new FormData(/** @type {HTMLFormElement} */ (event.currentTarget));
+	function look() {
+		if (!form.current) return;
+		const said = new FormData(form.current);
 		const files = Promise.all([sent(said.get('live')), sent(said.get('replay'))]);
 		attempt(files.then(([live, replay]) => postBallLink(link.live.recording, link.id, { live_upload: live, replay_upload: replay })), async (begun) => {
 			await follow(begun, setJob);
 			reload();
 		});
 	}
-	const { misses } = link.map;
+	const { misses, turned } = link.map;
+	/** Turn the cameras of the replay, and look for the times once more. */
+	async function turn() {
+		if (runs) return;
+		const { recording, first } = link.replay;
+		const turning = getCameraStretches(recording).then(async ({ items }) => {
+			const stretch = items.find((one) => one.first <= first && first <= one.last);
+			if (stretch) await follow(await turnCameras(recording, stretch.first, !stretch.summary.turned), setJob);
+		});
+		if (await attempt(turning)) look();
+	}
 	return html`
 		<section class="card linking__ball" aria-label="Ball">
 			<h2>Ball</h2>
 			<p>Rays of the ball meet where both frames show the same instant. Both shots need tracked cameras, and the ball: marked in groups that were taken from them, or in a file <code>ball.csv</code> (<code>frame,time_s,x,y</code>).</p>
-			<form class="linking__files" onSubmit=${find}>
+			${turned ? html`
+				<p role="status">The cameras of the replay stand on the other side of the pitch: turned by half a turn, its rays meet the live ones.
+					<button class="button button--small" type="button" data-needs="lead" data-of=${dataset} aria-disabled=${runs} onClick=${turn}>Turn the replay’s cameras</button></p>` : null}
+			<form class="linking__files" ref=${form} onSubmit=${(/** @type {SubmitEvent} */ event) => { event.preventDefault(); if (!runs) look(); }}>
 				<label>ball.csv of the live recording <input type="file" name="live" accept=".csv" /></label>
 				<label>ball.csv of the replay’s recording <input type="file" name="replay" accept=".csv" /></label>
 				<button class="button" type="submit" data-needs="lead" data-of=${dataset} aria-disabled=${runs} title=${runs ? 'It is being looked for' : ''}>Find the times from the ball</button>

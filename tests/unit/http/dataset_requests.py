@@ -17,6 +17,8 @@ from app.features.people.service import invite
 from app.features.people.session_routes import get_login
 from app.features.predictions.reader import PredictionFiles, read_files
 from app.features.predictions.service import add_predictions
+from app.features.recordings.camera_tracking import Tracked, save_cameras
+from app.features.recordings.service import get_recording
 from app.finite import json_text
 from app.formats.frame_names import frame_path_in_split
 from app.http.team import get_team
@@ -29,6 +31,7 @@ from tests.flights import add_flight
 from tests.integration.conftest import picture
 from tests.rigs import groups as rig_groups
 from tests.scenes import make_scenes
+from tests.tracked_frames import frame
 from tests.unit.http.group_requests import (
     API,
     Request,
@@ -155,6 +158,14 @@ def accepted_ball_run(api: Any) -> Request:
 
 def no_ball_run(api: Any) -> Request:
     return "DELETE", ball_run(api), None, {}
+
+
+def turned_cameras(api: Any) -> Request:
+    path = recording(api)
+    found = get_recording(store_of(api), int(path.rpartition("/")[2]))
+    frames = [frame(number, "tracked") for number in range(10)]
+    save_cameras(store_of(api), found, (0, 9), Tracked(frames, ()), [], "ann")
+    return "PATCH", f"{path}/cameras/3", {"turned": True}, {}
 
 
 def link(api: Any) -> Request:
@@ -318,6 +329,10 @@ def accepted_one(api: Any) -> Request:
 
 def practice(_api: Any) -> Request:
     return "POST", "/practice", {"again": True}, {}
+
+
+def recording_practice(_api: Any) -> Request:
+    return "POST", "/practice/recording", {}, {}
 
 
 def cancelled(api: Any) -> Request:

@@ -125,6 +125,13 @@ class TestUnobservable:
             mirrored = replace(planted, replay=replace(planted.replay, cameras=cameras))
             assert linked(mirrored).reason
 
+    def test_cameras_that_were_tracked_turned_are_told(self) -> None:
+        planted = plant(BALL, 1, speed=0.5, noise_px=0.5, stand=OPPOSITE)
+        made = find_time_map(planted.live.rays(), planted.replay.rays().turned())
+        assert made.turned and made.pieces == ()
+        assert "stand on the other side" in (made.reason or "")
+        assert not linked(planted).turned
+
     def test_exchanged_cameras(self) -> None:
         for seed in range(3):
             planted = plant(BALL, seed, stand=BEHIND_GOAL)

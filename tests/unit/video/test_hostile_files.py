@@ -18,7 +18,8 @@ import pytest
 from app.config import Settings
 from app.db.store import Store
 from app.errors import ImageError, StorageError, TooLargeError
-from app.features.recordings.service import add_recording, get_recording, index_file, index_now
+from app.features.recordings.index import index_file, index_now
+from app.features.recordings.service import add_recording, get_recording
 from app.video.frames import read_frames
 from app.video.indexing import index_recording
 from tests.videos import HEIGHT, WIDTH, write_video

@@ -111,6 +111,18 @@ def test_the_pitch_that_is_shown_is_told_and_cameras_are_of_it_where_asked(
     assert pitch_row(None, on_shown=True) is None
 
 
+def test_cameras_of_the_far_side_are_turned_where_no_lines_say_it(
+    found: list[FrameCamera], tmp_path: Path, touchline: Run
+):
+    clip, out = tmp_path / "clip.mp4", tmp_path / "out"
+    clip.touch()
+    assert touchline("track", clip, out, "--turn")[0] == 0
+    x, y, z = CAMERA.position
+    assert read_cameras(out, Report())["0"].position == pytest.approx([-x, -y, z])
+    code, _, err = touchline("track", clip, out, "--turn", "--lines", "lines.json@0")
+    assert code == 1 and "lines say which half of the pitch is left" in err
+
+
 @pytest.mark.parametrize(
     ("lines", "message"),
     [

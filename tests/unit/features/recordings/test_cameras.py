@@ -21,32 +21,21 @@ from app.features.groups.queries import read_groups
 from app.features.groups.replay import replay
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.imports.cameras import ingest_cameras
-from app.features.recordings import cameras as module
-from app.features.recordings.cameras import (
-    SOURCE,
-    Tracked,
-    cameras_at,
-    get_cameras,
-    list_cameras,
-    read_cameras,
-    track_now,
-    track_stretch,
-)
+from app.features.recordings import camera_tracking as module
+from app.features.recordings.camera_groups import SOURCE
+from app.features.recordings.camera_tracking import Tracked, track_now, track_stretch
+from app.features.recordings.cameras import cameras_at, get_cameras, list_cameras, read_cameras
 from app.features.recordings.links import add_link, set_instants
 from app.features.recordings.queries import update_recording
-from app.features.recordings.service import (
-    Recording,
-    Shot,
-    get_recording,
-    groups_taken,
-    put_shots,
-)
+from app.features.recordings.service import Recording, get_recording, groups_taken
+from app.features.recordings.shots import Shot, put_shots
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
+from app.solving.sides import turned_camera
 from app.tracking.track import FrameCamera, Track
 from tests.tripod_films import Film, render_film
 from tests.videos import write_pictures
@@ -228,10 +217,12 @@ def test_groups_get_the_cameras_of_their_frames_and_need_no_proposal(
     station = stored[groups[5]].group.views[0].station
     assert station.given == tracker.truth[1] and station.given_covariance is not None
     shown = stored[groups[5]].group.views[0].extras.metadata["recording"]
-    assert shown["frame"] == 5 and shown["camera"]["source"] == SOURCE == "track"
-    assert shown["camera"]["outcome"] == "tracked" and shown["camera"]["sigma"]["position"] > 0
+    assert shown["frame"] == 5 and "camera" not in shown
+    told = shown["camera_when_taken"]
+    assert told["source"] == SOURCE == "track"
+    assert told["outcome"] == "tracked" and told["sigma"]["position"] > 0
     assert stored[groups[7]].group.views[0].station.given is None
-    assert "camera" not in stored[groups[7]].group.views[0].extras.metadata["recording"]
+    assert "camera_when_taken" not in stored[groups[7]].group.views[0].extras.metadata["recording"]
 
 
 def test_a_person_mends_a_frame_and_shot_and_groups_follow(
@@ -305,6 +296,109 @@ def test_views_of_linked_replays_are_frames_of_their_shot(
     draw(api, group, tracker.truth[5], view=1)
     track(api, recording, finished, 8, 11)
     assert list(tracker.asked) == [9]
+
+
+def test_cameras_are_turned_by_half_and_back_and_groups_follow(
+    app: Any, api: Any, recording: str, found: Recording, finished: Finished, tracker: Tracker
+) -> None:
+    store: Store = app.state.services.store
+    own = tracker.truth[0]
+    track(api, recording, finished)
+    take(api, recording, finished, 5, 6, 7)
+    ingest_cameras(store, "cup", {"7": own}, source="mine", actor="ann")
+    as_tracked = api.get(f"{recording}/cameras/5").json()
+
+    def turn(turned: bool) -> Any:
+        job = finished(api.patch(f"{recording}/cameras/9", json={"turned": turned}))
+        assert job.state == "done", job.problem
+        return job.result
+
+    def given() -> dict[int, Camera | None]:
+        groups = groups_taken(store, found)
+        with store.read() as session:
+            stored = read_groups(session, list(groups.values()))
+        return {
+            number: stored[group].group.views[0].station.given for number, group in groups.items()
+        }
+
+    result = turn(True)
+    assert (result["turned"], result["groups"]) == (True, 2) and result["solve_job"] is not None
+    shown = api.get(f"{recording}/cameras/5").json()
+    for before, after in zip(as_tracked["camera"], shown["camera"], strict=True):
+        assert after[:3] == [-before[0], -before[1], before[2]]
+        assert abs(after[3] - before[3]) == pytest.approx(180, abs=1e-5)
+        assert after[4:] == pytest.approx(before[4:], abs=1e-5)
+    assert shown["sigma"] == as_tracked["sigma"]
+    views = given()
+    assert views[5] == turned_camera(tracker.truth[1]) and views[7] == own
+    with store.read() as session:
+        assert replay(session) == read_state_snapshot(session)
+    (one,) = api.get(f"{recording}/cameras").json()["items"]
+    assert (one["summary"]["turned"], one["before"]["turned"], one["revision"]) == (True, False, 2)
+    assert turn(True)["groups"] == 0
+    # Tracked again they stay on the side that a person chose.
+    track(api, recording, finished)
+    assert given()[5] == views[5]
+    assert api.get(f"{recording}/cameras").json()["items"][0]["summary"]["turned"]
+    assert turn(False)["groups"] == 2
+    assert given() == {5: tracker.truth[1], 6: tracker.truth[2], 7: own}
+    assert api.get(f"{recording}/cameras/5").json() == as_tracked
+
+
+def test_cameras_that_lines_put_on_their_side_or_that_others_tracked_are_not_turned(
+    app: Any, api: Any, recording: str, found: Recording, finished: Finished, tracker: Tracker
+) -> None:
+    store: Store = app.state.services.store
+    assert api.patch(f"{recording}/cameras/5", json={"turned": True}).status_code == 404
+    track(api, recording, finished)
+    present = get_cameras(store, found.id, 5)
+    take(api, recording, finished, 7)
+    draw(api, groups_taken(store, found)[7], tracker.truth[3])
+    tracker.off = 1.0
+    track(api, recording, finished)
+    answer = api.patch(f"{recording}/cameras/5", json={"turned": True})
+    assert answer.status_code == 409
+    assert "lines of frame 7 say which half of the pitch" in answer.json()["detail"]
+    turned = Tracked([tracker.frame(number, {}) for number in range(4, 12)], (), True)
+    with pytest.raises(ConflictError, match="somebody tracked this shot meanwhile"):
+        module.save_cameras(store, found, (4, 11), turned, [], "ann", turned_from=present)
+
+
+def test_linked_views_leave_a_camera_that_was_given_or_lines_that_were_drawn(
+    app: Any,
+    api: Any,
+    recording: str,
+    found: Recording,
+    finished: Finished,
+    tracker: Tracker,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    store: Store = app.state.services.store
+    monkeypatch.setattr("app.tracking.time_map._UNSURE", 1.0)
+    take(api, recording, finished, 4, 5, 6)
+    own = tracker.truth[0]
+    ingest_cameras(store, "cup", {"5": own}, source="mine", actor="ann")
+    groups = groups_taken(store, found)
+    draw(api, groups[6], tracker.truth[2])
+    track(api, recording, finished)
+    link = add_link(store, (found.id, 4, 7), (found.id, 8, 11), actor="ann")
+    set_instants(store, found.id, link.id, [(4, 8), (7, 11)], None, None, actor="ann")
+    body = {"frames": [4, 5, 6], "propose": False, "linked": True}
+    assert finished(api.post(f"{recording}/groups", json=body)).result["changed"] == 3
+    with store.read() as session:
+        stored = read_groups(session, list(groups.values()))
+        assert replay(session) == read_state_snapshot(session)
+    stations = {
+        number: [view.station for view in stored[group].group.views]
+        for number, group in groups.items()
+    }
+    given = {number: [one.given for one in both] for number, both in stations.items()}
+    assert given == {
+        4: [tracker.truth[0], tracker.truth[4]],
+        5: [own, tracker.truth[5]],
+        6: [None, tracker.truth[6]],
+    }
+    assert stations[6][0].lines and stored[groups[6]].is_edited("6.png")
 
 
 def test_a_camera_that_somebody_gave_stays(

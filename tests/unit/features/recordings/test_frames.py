@@ -12,7 +12,7 @@ import pytest
 from app.config import Settings
 from app.features.recordings import frames as module
 from app.features.recordings.frames import AHEAD, BEHIND, read_ahead, read_jpeg
-from app.features.recordings.service import index_file
+from app.features.recordings.index import index_file
 from app.media.video import FrameReader
 from tests.videos import number_of, write_video
 
@@ -65,7 +65,10 @@ class TestReadJpeg:
         self, film: tuple[Path, str], settings: Settings, decoded: list[int]
     ) -> None:
         read_jpeg(*film, 30, None, settings)
-        read_ahead(*film, 30, settings)
+        steps = 1
+        while read_ahead(*film, 30, settings):
+            steps += 1
+        assert steps == AHEAD
         assert decoded[-AHEAD:] == [31, 32, 33, 34]
         decoded.clear()
         assert shown(read_jpeg(*film, 31, None, settings)) == 31
@@ -77,10 +80,28 @@ class TestReadJpeg:
         for number in (90, 89):
             read_jpeg(*film, number, None, settings)
         for number in range(88, 60, -1):
-            read_ahead(*film, number + 1, settings)
+            while read_ahead(*film, number + 1, settings):
+                pass
             decoded.clear()
             assert shown(read_jpeg(*film, number, None, settings)) == number
             assert decoded == []
+
+    def test_a_jump_back_is_made_in_steps_between_which_others_are_answered(
+        self, film: tuple[Path, str], settings: Settings, decoded: list[int]
+    ) -> None:
+        read_jpeg(*film, 110, None, settings)
+        read_jpeg(*film, 104, None, settings)
+        asked, steps = iter([103, 102, 101]), 0
+        while read_ahead(*film, 104, settings):
+            decoded_before, steps = len(decoded), steps + 1
+            if steps % 3 == 0 and (number := next(asked, None)) is not None:
+                assert shown(read_jpeg(*film, number, None, settings)) == number
+                assert len(decoded) == decoded_before
+        assert steps >= BEHIND + 5
+        decoded.clear()
+        for number in range(100, 89, -1):
+            assert shown(read_jpeg(*film, number, None, settings)) == number
+        assert decoded == []
 
     def test_small_pictures_are_kept_in_the_cache(
         self, film: tuple[Path, str], settings: Settings, decoded: list[int]

@@ -12,8 +12,9 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError, StorageError
 from app.features.recordings import instants as module
+from app.features.recordings.index import index_now
 from app.features.recordings.instants import require_instants, take_instants
-from app.features.recordings.service import Recording, add_recording, groups_taken, index_now
+from app.features.recordings.service import Recording, add_recording, groups_taken
 from tests.videos import write_video
 
 

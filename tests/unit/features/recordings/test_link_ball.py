@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from app.canonical import canonical
+from app.db.idempotency import without_response
+from app.db.json_columns import pack
+from app.db.session import now
 from app.db.store import Store
-from app.features.recordings.cameras import Tracked, save_cameras
-from app.features.recordings.link_ball import _of_groups
+from app.features.datasets.service import read_dataset_head
+from app.features.recordings.camera_tracking import Tracked, save_cameras
+from app.features.recordings.link_ball import _of_groups, ball_places
 from app.features.recordings.links import get_link
 from app.features.recordings.service import get_recording
+from app.features.tracks.codec import TrackInputs, inputs_to_json, track_to_json
+from app.features.tracks.queries import insert_track
+from app.features.tracks.service import TrackSummary, _stamp
 from app.geometry.arrays import FloatArray
+from app.soccer.pitch import Pitch
+from app.solving.sides import turned_camera
+from app.tracking.ball_track import BallMeasurements, BallTrack
 from tests.bench.link import Filmed, at_times, film, made_ball
-from tests.tracked_frames import frame
+from tests.tracked_frames import CAMERA, frame
 from tests.videos import write_video
 
 Finished = Callable[[Any], Any]
@@ -106,6 +117,25 @@ class TestLinkByBall:
         frames = api.get(f"{link}/frames").json()
         assert frames["replay"][50] == LIVE + round((50 / FPS - BEGIN) / SPEED * FPS)
 
+    def test_a_replay_that_was_tracked_turned_is_told_and_links_once_it_is_turned_back(
+        self, api: Any, store: Store, link: str, finished: Finished
+    ) -> None:
+        live, replay = views = both(made_ball(8.0, seed=3))
+        opposite = [turned_camera(camera) for camera in replay.cameras]
+        tracked(store, (live, replace(replay, cameras=opposite)))
+        sent = uploads(api, views)
+        finished(api.post(f"{link}/ball", json=sent))
+        found = api.get(link).json()["map"]
+        assert (found["outcome"], found["turned"]) == ("unobservable", True)
+        assert "turned by half a turn of the pitch" in found["reason"]
+        at = link.partition("/links")[0]
+        job = finished(api.patch(f"{at}/cameras/{LIVE}", json={"turned": True}))
+        assert (job.state, job.result["turned"]) == ("done", True)
+        finished(api.post(f"{link}/ball", json=sent))
+        found = api.get(link).json()["map"]
+        assert (found["outcome"], found["turned"]) == ("linked", False)
+        assert found["speed"] == pytest.approx(SPEED, rel=0.01)
+
     def test_a_resting_ball_is_refused_and_a_map_of_instants_stays(
         self, api: Any, store: Store, link: str, finished: Finished
     ) -> None:
@@ -135,6 +165,74 @@ class TestLinkByBall:
         assert "150 balls in the file, and no camera for one of them" in job.problem["detail"]
         assert "Track the camera of the shot" in job.problem["hint"]
         assert api.post(f"{link}/ball", json={"live_upload": "0" * 32}).status_code == 404
+
+
+class TestOfTracks:
+    def test_a_track_says_where_the_ball_was_in_live_frames_that_nobody_marked(
+        self, api: Any, store: Store, link: str, finished: Finished
+    ) -> None:
+        ball = made_ball(8.0, seed=3)
+        views = both(ball)
+        tracked(store, views)
+        sent = {"replay_upload": uploads(api, views)["replay_upload"]}
+        without = finished(api.post(f"{link}/ball", json=sent))
+        assert "0 balls in its groups" in without.problem["detail"]
+        insert_track_of(store, ball, np.arange(LIVE) / FPS)
+        job = finished(api.post(f"{link}/ball", json=sent))
+        assert (job.state, job.result["reason"]) == ("done", None)
+        found = api.get(link).json()["map"]
+        assert found["speed"] == pytest.approx(SPEED, rel=0.01)
+        assert found["offset_s"] == pytest.approx(BEGIN, abs=0.1 / FPS)
+
+    def test_a_track_in_which_the_replay_takes_part_says_nothing_of_its_times(
+        self, api: Any, store: Store, link: str
+    ) -> None:
+        insert_track_of(store, made_ball(8.0, seed=3), np.arange(LIVE) / FPS, "final link 1")
+        recording, shot = get_recording(store, 1), get_link(store, 1, 1).live
+        assert ball_places(store, recording, shot, 1) == {}
+        assert len(ball_places(store, recording, shot, 2)) == LIVE
+
+
+def insert_track_of(store: Store, ball: FloatArray, times: FloatArray, view: str = "final") -> None:
+    """The track of a ball over the live shot, known to a centimetre."""
+    frames, count = np.arange(len(times)), len(times)
+    empty = np.zeros((count, 3))
+    made = BallTrack(
+        frames,
+        times,
+        at_times(ball, times),
+        empty,
+        np.broadcast_to(np.eye(6) * 1e-4, (count, 6, 6)),
+        ("measured",) * count,
+        ("roll",) * count,
+        ((view,),) * count,
+    )
+    pixels = np.zeros((1, 2))
+    measured = BallMeasurements(frames[:1], times[:1], (view,), pixels, np.ones(1), (CAMERA,))
+    inputs = TrackInputs(frames, times, Pitch(), measured)
+    counts = {"measured": count}
+    summary = TrackSummary(count, counts, {}, 1, 0, None, None, None, None, FPS, {})
+    dataset = get_recording(store, 1).dataset_id
+    with store.write() as session, without_response():
+        policy = read_dataset_head(session, dataset).policy
+        values = {
+            "dataset_id": dataset,
+            "key": "final 0-149",
+            "match": "final",
+            "first": 0,
+            "last": count - 1,
+            "stamp": _stamp(policy, (), 0, count - 1),
+            "digest": "none",
+            "inputs": pack(inputs_to_json(inputs)),
+            "body": pack(track_to_json(made)),
+            "summary": canonical(asdict(summary)),
+            "corrections": "[]",
+            "revision": 0,
+            **dict.fromkeys(("verdict", "note", "judged_by", "judged_at")),
+            "actor": "ann",
+            "created": now(),
+        }
+        insert_track(session, values)
 
 
 class TestOfGroups:

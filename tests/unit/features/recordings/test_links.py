@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
+from time import process_time
 from typing import Any
 
+import numpy as np
 import pytest
 
+from app.db.idempotency import without_response
 from app.db.log import read_log
+from app.features.recordings.link_frames import nearest_frames
 from tests.unit.features.recordings.test_routes import picture_of
 from tests.videos import number_of, write_video
 
@@ -134,6 +139,15 @@ class TestSetInstants:
         none = instants(api, link).json()
         assert (none["map"]["outcome"], none["instants"]) == ("none", [])
 
+    def test_several_that_are_too_close_together_say_so_in_a_field(
+        self, api: Any, link: str
+    ) -> None:
+        one = instants(api, link, (5, 30)).json()["map"]
+        close = instants(api, link, (5, 30), (6, 32)).json()["map"]
+        assert [one["too_close"], close["too_close"]] == [False, True]
+        assert one["outcome"] == close["outcome"] == "offset"
+        assert "too close together" in close["reason"]
+
     def test_more_say_by_how_much_each_is_off(self, api: Any, link: str) -> None:
         found = instants(api, link, (0, 20), (5, 30), (11, 40), (15, 50)).json()
         assert found["map"]["pieces"] == []
@@ -182,6 +196,70 @@ class TestSetInstants:
     def test_it_is_removed(self, api: Any, link: str) -> None:
         assert api.delete(link).status_code == 204
         assert api.get(link).status_code == api.delete(link).status_code == 404
+
+    def test_others_write_while_the_map_is_found(
+        self, app: Any, api: Any, link: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from app.features.recordings import links
+
+        plain, store, written = links.map_of_instants, app.state.services.store, []
+
+        def write() -> None:
+            with store.write(), without_response():
+                written.append(True)
+
+        def slow(*arguments: Any) -> Any:
+            other = Thread(target=write, daemon=True)
+            other.start()
+            other.join(20)
+            return plain(*arguments)
+
+        monkeypatch.setattr(links, "map_of_instants", slow)
+        assert instants(api, link, (5, 30), (15, 50)).status_code == 200
+        assert written == [True]
+
+    def test_of_two_at_once_the_later_is_refused(
+        self, api: Any, link: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from app.features.recordings import links
+
+        plain, faster = links.map_of_instants, iter([(4, 25)])
+
+        def slow(*arguments: Any) -> Any:
+            for pair in faster:
+                assert instants(api, link, pair).status_code == 200
+            return plain(*arguments)
+
+        monkeypatch.setattr(links, "map_of_instants", slow)
+        assert instants(api, link, (5, 30), (15, 50)).status_code == 412
+        assert [one["live"] for one in api.get(link).json()["instants"]] == [4]
+
+
+class TestNearestFrames:
+    def test_it_is_what_a_look_at_all_frames_finds(self) -> None:
+        generator = np.random.default_rng(5)
+        for _ in range(300):
+            live = np.arange(generator.integers(1, 40)) * 0.04
+            replay = np.sort(generator.integers(0, 60, generator.integers(1, 60)) * 0.02)
+            marked = generator.random(len(replay)) < 0.4
+            numbers, later = nearest_frames(live, replay, marked, 0.02)
+            for time, number, off in zip(live, numbers, later, strict=True):
+                apart = np.abs(replay - time)
+                if replay[0] - time > 0.02 or replay[-1] - time < -0.02:
+                    assert (number, off) == (-1, 0.0)
+                    continue
+                sound = np.flatnonzero((apart <= 0.02) & ~marked)
+                choice = sound if len(sound) else np.arange(len(replay))
+                assert apart[number] == apart[choice].min()
+                assert number in choice and off == replay[number] - time
+
+    def test_very_long_shots_take_no_time_to_speak_of(self) -> None:
+        count = 67_000
+        replay = np.arange(count) * 0.02
+        began = process_time()
+        numbers, _ = nearest_frames(np.arange(count) * 0.04, replay, np.zeros(count, bool), 0.02)
+        assert process_time() - began < 2
+        assert (numbers[:5].tolist(), numbers[-1]) == ([0, 2, 4, 6, 8], -1)
 
 
 class TestLinkedFrames:
@@ -249,6 +327,40 @@ class TestLinkedGroups:
         number = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"][1]["id"]
         (_, view) = api.get(f"/api/v1/groups/{number}").json()["views"]
         assert number_of(picture_of(api.get(f"/api/v1/views/{view['id']}/image"))) == 33
+
+    def test_a_replay_that_is_linked_later_joins_groups_that_have_one_and_a_dry_run_shows_it(
+        self, api: Any, recording: str, finished: Finished
+    ) -> None:
+        replays = [{"recording": 1, "first": a, "last": b} for a, b in ((20, 39), (40, 59))]
+        links = []
+        for replay in replays:
+            made = api.post(f"{recording}/links", json={"live": LIVE, "replay": replay})
+            links.append(made.headers["location"])
+        instants(api, links[0], (0, 20), (19, 39))
+        self.taken(api, links[0], finished, 10)
+        instants(api, links[1], (0, 40), (19, 59))
+        body = {"frames": [10, 11], "linked": True, "dry_run": True}
+        counted = finished(api.post(f"{recording}/groups", json=body)).result
+        assert counted["dry_run"] and counted["solve_job"] is None
+        assert (counted["new"], counted["changed"], counted["linked_views"]) == (1, 1, 3)
+        assert self.views(api) == {"final/10.png": ["10.png", "30.png"]}
+        ball = {"point": [63, 44]}
+        (row,) = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"]
+        group = api.get(f"/api/v1/groups/{row['id']}")
+        path = f"/api/v1/views/{group.json()['views'][1]['id']}/ball"
+        tag = {"If-Match": group.headers["etag"]}
+        assert api.patch(path, json=ball, headers=tag).status_code == 200
+        result = self.taken(api, links[1], finished, 10, 11)
+        names = ("new", "changed", "unchanged", "linked_views")
+        assert [result[name] for name in names] == [1, 1, 0, 3]
+        assert self.views(api) == {
+            "final/10.png": ["10.png", "30.png", "50.png"],
+            "final/11.png": ["11.png", "31.png", "51.png"],
+        }
+        views = api.get(f"/api/v1/groups/{row['id']}").json()["views"]
+        assert [bool(view["balls"]) for view in views] == [False, True, False]
+        result = self.taken(api, links[1], finished, 10, 11)
+        assert (result["unchanged"], result["linked_views"]) == (2, 0)
 
     def test_a_group_of_one_view_gets_them_and_others_stay(
         self, api: Any, link: str, finished: Finished

@@ -17,7 +17,7 @@ import touchline
 from app.db.log import read_log
 from app.features.datasets.service import get_dataset
 from app.features.imports.cameras import ingest_cameras
-from app.features.recordings import service as module
+from app.features.recordings import index as module
 from app.soccer.frames import ImageSize
 from app.soccer.policy import TOUCHLINE
 from tests.cameras import looking

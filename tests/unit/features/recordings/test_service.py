@@ -8,13 +8,16 @@ from typing import Any
 
 import pytest
 
+from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, ImageError, InputError, JobCancelled, NotFoundError
 from app.features.datasets.orphan_queries import unread_uploads, unused_frames
 from app.features.imports.upload_queries import UploadWriter, keep_upload, upload_path
 from app.features.jobs.service import Jobs
+from app.features.recordings import index
 from app.features.recordings import jobs as module
-from app.features.recordings import service
+from app.features.recordings.index import index_now
+from app.features.recordings.instants import take_instants
 from app.features.recordings.jobs import (
     InstantOptions,
     request_index,
@@ -23,15 +26,13 @@ from app.features.recordings.jobs import (
 )
 from app.features.recordings.service import (
     Recording,
-    Shot,
     add_recording,
     get_recording,
-    get_shots,
-    index_now,
-    put_shots,
+    groups_taken,
     remove_recording,
     require_video,
 )
+from app.features.recordings.shots import Shot, get_shots, put_shots
 from tests.unit.features.jobs.steps import stopped_at_its_first_step
 from tests.videos import write_video
 from tests.waiting import SECONDS
@@ -60,6 +61,38 @@ class TestIndexNow:
         assert indexed(store, film).id == recording.id
         assert list(get_shots(store, recording.id).items) != mine
 
+    def test_groups_of_a_removed_video_are_not_those_of_another_with_its_name(
+        self, store: Store, film: Path
+    ) -> None:
+        def take(recording: Recording, *frames: int) -> int:
+            return take_instants(store, recording.id, frames, False, "ann", lambda *_: None).new
+
+        first, kept = indexed(store, film), film.read_bytes()
+        assert take(first, 5, 6) == 2
+        remove_recording(store, first.id, actor="ann")
+        write_video(film, "mp4v", 30)
+        second = indexed(store, film)
+        assert (second.name, second.groups) == ("final-2", 0)
+        assert groups_taken(store, second) == {}
+        assert take(second, 5) == 1
+        # The same video takes its groups up again, also where it lies elsewhere by now.
+        again = film.with_name("other.mp4")
+        again.write_bytes(kept)
+        third = indexed(store, again)
+        assert (third.name, sorted(groups_taken(store, third))) == ("final", [5, 6])
+
+    def test_groups_of_the_video_before_stay_when_a_file_is_replaced(
+        self, store: Store, film: Path
+    ) -> None:
+        first = indexed(store, film)
+        take_instants(store, first.id, [5], False, "ann", lambda *_: None)
+        write_video(film, "mp4v", 30)
+        second = indexed(store, film)
+        assert (second.id, second.name, second.groups) == (first.id, "final-2", 0)
+        with store.read() as session:
+            (event,) = [e for e in read_log(session) if e.body.get("did") == "recording renamed"]
+        assert (event.body["before"], event.body["name"]) == ("final", "final-2")
+
     def test_it_ends_when_its_job_is_cancelled_and_keeps_nothing(
         self, store: Store, film: Path
     ) -> None:
@@ -74,14 +107,14 @@ class TestIndexNow:
     def test_a_file_that_changes_meanwhile_is_refused(
         self, store: Store, film: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        plain = service.in_worker
+        plain = index.in_worker
 
         def slowly(path: Path, *rest: Any, **more: Any) -> Any:
             found = plain(path, *rest, **more)
             path.touch()
             return found
 
-        monkeypatch.setattr(service, "in_worker", slowly)
+        monkeypatch.setattr(index, "in_worker", slowly)
         with pytest.raises(ImageError, match="changed while it was read"):
             indexed(store, film)
 

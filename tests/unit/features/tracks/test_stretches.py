@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
+from app.features.tracks.codec import TrackInputs, make_track
 from app.features.tracks.stretches import (
     RATE,
     Stretch,
@@ -16,10 +17,13 @@ from app.features.tracks.stretches import (
     unused_sentence,
 )
 from app.formats.export_record import ExportRecord
-from app.soccer.annotation import Extras
-from app.soccer.group import Group
+from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group, Station, View
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
+from tests.bench.link import at_times, film, made_ball
+from tests.cameras import SIZE
 from tests.flights import FIRST, flight_groups
 from tests.rigs import TRUTH
 
@@ -118,6 +122,41 @@ class TestGatherStretches:
             "final link 3": [100],
         }
         assert stretch.unused == {"frame that shows the one before once more": 1}
+
+    @pytest.mark.parametrize("later", [True, False])
+    def test_a_slow_replay_of_a_panning_camera_measures_the_ball_at_its_own_times(
+        self, later: bool
+    ) -> None:
+        """Its frames are a third of a live frame beside the live ones; taken for simultaneous, the ball lies elsewhere."""
+        ball, off_s = made_ball(5.0, seed=3), 0.0133
+        times = 0.4 + np.arange(75) / 25
+        generator = np.random.default_rng(1)
+        live = film(at_times(ball, times), times, (0.0, 62.0, -16.0), 1900.0)
+        replay = film(at_times(ball, times + off_s), times, (24.0, -58.0, -14.0), 2200.0)
+        groups = []
+        for frame, time in enumerate(times.tolist()):
+            told = {"name": "final", "frame": frame, "seconds": time}
+            other = {"name": "final", "frame": 500 + 2 * frame, "seconds": 90.0, "link": 3}
+            other["off_s"] = off_s if later else 0.0
+            views = []
+            for number, filmed, said in ((frame, live, told), (500 + 2 * frame, replay, other)):
+                pixel = filmed.pixels[frame] + generator.normal(0, 0.3, 2)
+                station = Station(f"{frame}/{number}", SIZE, given=filmed.cameras[frame])
+                point = BallAnnotation(point=ImagePoint(*pixel.tolist()))
+                extras = Extras(metadata={"recording": said})
+                views.append(View(f"{number}.png", station, (point,), extras=extras))
+            groups.append(Group(f"final/{frame}.png", tuple(views), match="final"))
+        stretch = only(gather_stretches(map(record, groups), PAPER, {"final": [(0, 99)]}))
+        assert stretch.measurements.names == ("final", "final link 3")
+        track = make_track(TrackInputs.of(stretch))
+        assert track.reason is None
+        off = np.linalg.norm(track.position - at_times(ball, times), axis=1)
+        both = sum(views == ("final", "final link 3") for views in track.views)
+        if later:
+            assert both >= 65 and track.state.count("measured") >= 65
+            assert np.nanmedian(off) < 0.06
+        else:
+            assert np.nanmedian(off) > 0.08 or both < 40
 
     def test_a_recording_without_shots_is_cut_at_long_gaps(self) -> None:
         numbers = [0, 10, 20, 400, 410]

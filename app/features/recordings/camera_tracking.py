@@ -1,0 +1,372 @@
+"""Cameras over time made: tracked by a process, turned by half, kept in place of those before, and given to groups.
+
+People mend them by annotating a frame: the lines of every group that was taken from the stretch are known to the tracker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.canonical import canonical, digest_of
+from app.config import Settings
+from app.db.store import Store
+from app.durable import replace_file
+from app.errors import ConflictError, InputError, StorageError
+from app.features.audit.audit_events import add_audit_event
+from app.features.datasets.service import get_dataset_head
+from app.features.file_tools.track import count_outcomes
+from app.features.pitches.queries import edited_pitches
+from app.features.recordings.camera_groups import give_cameras, views_of_stretch
+from app.features.recordings.camera_queries import (
+    delete_overlapping,
+    digests_of,
+    insert_cameras,
+)
+from app.features.recordings.cameras import (
+    CameraSummary,
+    ShotCameras,
+    camera_place,
+    cameras_at,
+    get_cameras,
+    list_cameras,
+    read_cameras,
+)
+from app.features.recordings.index import in_worker, read_index
+from app.features.recordings.service import Recording, get_recording, need_recording
+from app.progress import ReportProgress
+from app.soccer.annotation import Lines
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CLICKED, CalibrationPolicy
+from app.solving.calibrate import calibrate
+from app.tracking.camera_file import frames_to_bytes
+from app.tracking.clip import Clip
+from app.tracking.sides import stand_opposite, turned_frame
+from app.tracking.track import FrameCamera, track_clip
+from app.worker_process import WorkerLimits
+
+LIMITS = WorkerLimits(memory=3 * 2**30, processor=6 * 3600.0, silence=600.0)
+"""For tracking a stretch."""
+MOST_FRAMES = 15_000
+"""Of one stretch: ten minutes of 25 frames a second, of which no shot has as many."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What the process that tracks returns: a camera of each frame, and which lines were of no use.
+
+    ``turned``: as of ``CameraSummary``.
+    """
+
+    frames: list[FrameCamera]
+    unusable: tuple[int, ...]
+    turned: bool = False
+
+
+def require_stretch(recording: Recording, first: int, last: int) -> None:
+    """Require that a stretch can be tracked.
+
+    Raises:
+        ConflictError: The recording cannot be read.
+        InputError: It is outside of the recording, or too long.
+    """
+    recording.require_readable()
+    if not first <= last < (recording.frames or 0):
+        raise InputError(
+            f'the frames {first} to {last} are none of "{recording.name}"; its last one is '
+            f"{(recording.frames or 0) - 1}",
+            pointer="/last",
+        )
+    if last - first >= MOST_FRAMES:
+        raise InputError(
+            f"{last - first + 1:,} frames are too many; {MOST_FRAMES:,} can be tracked at once",
+            hint="Split the shot, and track its parts.",
+            pointer="/last",
+        )
+
+
+def track_now(
+    store: Store,
+    recording_id: int,
+    first: int,
+    last: int,
+    *,
+    actor: str,
+    progress: ReportProgress,
+    stop: Callable[[], None],
+) -> tuple[ShotCameras, int]:
+    """Track a stretch of a recording in a worker process, and keep its cameras.
+
+    They take the place of those that the same frames had; other frames of the stretches that these are of
+    keep theirs. Groups that were taken from the stretch get them
+    as given cameras, where nobody has given them another one and no lines say otherwise.
+
+    Args:
+        store: The database.
+        recording_id: Which recording.
+        first, last: Numbers of its frames.
+        actor: Who wants it.
+        progress: Called with frames done and in all.
+        stop: Called every now and then; an error that it raises ends the process.
+
+    Returns:
+        The cameras, and how many groups were given another one.
+
+    Raises:
+        ConflictError: The recording cannot be read, or it became another one meanwhile.
+        InputError: As ``require_stretch``.
+    """
+    recording = get_recording(store, recording_id)
+    require_stretch(recording, first, last)
+    sha256 = recording.require_readable()
+    policy = get_dataset_head(store, recording.dataset_id).policy.calibration
+    lines: dict[int, Lines] = {}
+    with store.read() as session:
+        drawn = views_of_stretch(session, recording, first, last, with_lines=True)
+        pitch = edited_pitches(session, recording.dataset_id, [recording.name])
+    for number, stored, key in drawn:
+        station = stored.stations[key].station
+        if not (station.flipped or station.picture):
+            lines.setdefault(number, station.lines)
+    known = (store.settings, sha256, first, last, lines, pitch.get(recording.name), policy)
+    tracked: Tracked = in_worker(
+        recording.path, track_stretch, *known, progress=progress, stop=stop, limits=LIMITS
+    )
+    if not set(lines) - set(tracked.unusable):
+        tracked = _on_its_side(store, recording, tracked)
+    return save_cameras(store, recording, (first, last), tracked, sorted(lines), actor)
+
+
+def _on_its_side(store: Store, recording: Recording, tracked: Tracked) -> Tracked:
+    """Cameras without lines on the side to which a person turned those before."""
+    first, last = tracked.frames[0].number, tracked.frames[-1].number
+    overlapping = (one for one in list_cameras(store, recording.id) if one.first <= last)
+    if not any(one.summary.turned and first <= one.last for one in overlapping):
+        return tracked
+    before = cameras_at(store, recording, range(first, last + 1))
+    if not stand_opposite(tracked.frames, before):
+        return tracked
+    return Tracked([turned_frame(frame) for frame in tracked.frames], tracked.unusable, True)
+
+
+def turn_cameras(
+    store: Store, recording_id: int, frame: int, turned: bool, *, actor: str
+) -> tuple[ShotCameras, int]:
+    """Turn the cameras of a stretch by half a turn of the pitch against what the tracker gave, or back.
+
+    Groups of its frames follow, as they do when it is tracked.
+
+    Args:
+        store: The database.
+        recording_id: Which recording.
+        frame: Any frame of the stretch.
+        turned: Whether they shall be turned.
+        actor: Who wants it.
+
+    Returns:
+        The cameras, and how many groups were given another one.
+
+    Raises:
+        ConflictError: As ``require_turnable``, the cameras cannot be read, or somebody tracked the stretch meanwhile.
+        NotFoundError: There are no cameras at that frame.
+    """
+    found = require_turnable(store, recording_id, frame, turned)
+    if found.summary.turned == turned:
+        return found, 0
+    frames = [turned_frame(one) for one in read_cameras(store.settings, found.digest)]
+    return save_cameras(
+        store,
+        get_recording(store, recording_id),
+        (found.first, found.last),
+        Tracked(frames, found.summary.unusable, turned),
+        found.summary.annotated,
+        actor,
+        turned_from=found,
+    )
+
+
+def require_turnable(store: Store, recording_id: int, frame: int, turned: bool) -> ShotCameras:
+    """The cameras at a frame, which may be turned by half.
+
+    Raises:
+        ConflictError: They are of another video, or lines of a frame say which half of the pitch is left.
+        NotFoundError: There are none.
+    """
+    found = get_cameras(store, recording_id, frame)
+    if found.stale:
+        raise ConflictError("the video is another one since", hint="Track the shot again.")
+    fixed = sorted(set(found.summary.annotated) - set(found.summary.unusable))
+    if fixed and turned != found.summary.turned:
+        raise ConflictError(
+            f"the lines of frame {fixed[0]} say which half of the pitch is left",
+            hint="Name its lines for the other half, and track the shot again.",
+        )
+    return found
+
+
+def track_stretch(
+    path: Path,
+    settings: Settings,
+    sha256: str,
+    first: int,
+    last: int,
+    lines: Mapping[int, Lines],
+    pitch: Pitch | None,
+    policy: CalibrationPolicy,
+    send: Callable[[tuple[int, int | None, str]], object],
+) -> Tracked:
+    """The work of the process: decode, calibrate and follow."""
+    clip = Clip.open(path, read_index(settings, sha256), first, last)
+
+    def makes_camera(drawn: Lines) -> bool:
+        return calibrate(drawn, pitch or Pitch(), clip.size, CLICKED).camera is not None
+
+    def tell(done: int) -> None:
+        send((done, total, ""))
+
+    usable = {number: drawn for number, drawn in lines.items() if makes_camera(drawn)}
+    total = last - first + 1
+    found = track_clip(clip, usable, pitch, policy, tell)
+    return Tracked(found.frames, tuple(sorted(set(lines) - set(usable))))
+
+
+def save_cameras(
+    store: Store,
+    recording: Recording,
+    stretch: tuple[int, int],
+    tracked: Tracked,
+    annotated: Sequence[int],
+    actor: str,
+    *,
+    turned_from: ShotCameras | None = None,
+) -> tuple[ShotCameras, int]:
+    """Keep what was found of a stretch (first and last frame): ``track_now`` without the tracking.
+
+    ``turned_from`` are the cameras of which it was made by turning them.
+
+    Raises:
+        ConflictError: The video is another one by now, or so are the cameras that were turned.
+    """
+    first, last = stretch
+    made = _keep(store.settings, recording, tracked, annotated)
+    rests = [
+        (rest, _keep(store.settings, recording, rest, one.summary.annotated))
+        for one in list_cameras(store, recording.id)
+        for rest in _outside(store.settings, one, first, last)
+    ]
+    tracked_before = cameras_at(store, recording, range(first, last + 1))
+    common = {
+        "dataset_id": recording.dataset_id,
+        "recording_id": recording.id,
+        "sha256": recording.sha256,
+    }
+    with store.write() as session:
+        row = need_recording(session, recording.id)
+        if row.sha256 != recording.sha256:
+            raise ConflictError(
+                f'"{recording.name}" became another file while it was tracked',
+                hint="Track the shot again.",
+            )
+        replaced = delete_overlapping(session, recording.id, first, last)
+        if turned_from is not None and [old.digest for old in replaced] != [turned_from.digest]:
+            raise ConflictError("somebody tracked this shot meanwhile", hint="Look at it again.")
+        same = next((old for old in replaced if (old.first, old.last) == stretch), None)
+        insert_cameras(
+            session,
+            **common,
+            **made,
+            before=same and same.digest,
+            before_summary=same and same.summary,
+            revision=1 + max((old.revision for old in replaced), default=0),
+            actor=actor,
+        )
+        for old in replaced:
+            for rest, values in rests:
+                if old.first <= rest.frames[0].number <= old.last:
+                    insert_cameras(
+                        session, **common, **values, revision=old.revision, actor=old.actor
+                    )
+        views = views_of_stretch(session, recording, first, last)
+        changed = give_cameras(session, recording, tracked.frames, views, tracked_before, actor)
+        add_audit_event(
+            session,
+            actor,
+            "cameras tracked" if turned_from is None else "cameras turned",
+            recording.dataset_id,
+            recording=recording.id,
+            name=recording.name,
+            frames=f"{first} to {last}",
+        )
+        used = digests_of(session)
+    for old in replaced:
+        for name in {old.digest, old.before} - used - {None}:
+            # What stays is reported by doctor.
+            with suppress(OSError):
+                camera_place(store.settings, name).unlink(missing_ok=True)
+    return get_cameras(store, recording.id, first), changed
+
+
+def _keep(
+    settings: Settings, recording: Recording, tracked: Tracked, annotated: Sequence[int]
+) -> dict[str, Any]:
+    """Write the file of some cameras; returns what their row says of them."""
+    content = frames_to_bytes(tracked.frames)
+    digest = digest_of(content)
+    try:
+        settings.recordings.mkdir(mode=0o700, parents=True, exist_ok=True)
+        replace_file(camera_place(settings, digest), content)
+    except OSError as error:
+        raise StorageError(
+            f"the cameras of {recording.name} cannot be kept ({error.strerror})",
+            hint="Free some space, and track the shot again.",
+        ) from error
+    numbers = [frame.number for frame in tracked.frames]
+    inside = tuple(number for number in annotated if numbers[0] <= number <= numbers[-1])
+    summary = _summary(tracked, inside)
+    return {
+        "first": numbers[0],
+        "last": numbers[-1],
+        "digest": digest,
+        "summary": canonical(vars(summary)),
+    }
+
+
+def _outside(settings: Settings, old: ShotCameras, first: int, last: int) -> list[Tracked]:
+    """The parts of cameras before and behind a stretch that overlaps them; those of another video, or
+    that cannot be read, are none."""
+    if old.last < first or last < old.first or old.stale:
+        return []
+    try:
+        frames = read_cameras(settings, old.digest)
+    except ConflictError:
+        return []
+    parts = (
+        [frame for frame in frames if frame.number < first],
+        [frame for frame in frames if frame.number > last],
+    )
+    return [
+        Tracked(
+            part,
+            tuple(one for one in old.summary.unusable if part[0].number <= one <= part[-1].number),
+            old.summary.turned,
+        )
+        for part in parts
+        if part
+    ]
+
+
+def _summary(tracked: Tracked, annotated: Sequence[int]) -> CameraSummary:
+    counts = count_outcomes([{"outcome": frame.outcome} for frame in tracked.frames])
+    measured = [frame for frame in tracked.frames if frame.error_px is not None]
+    worst = max(measured, key=lambda frame: frame.error_px or 0.0, default=None)
+    return CameraSummary(
+        **counts,
+        worst_frame=None if worst is None else worst.number,
+        worst_px=None if worst is None else worst.error_px,
+        annotated=tuple(annotated),
+        unusable=tracked.unusable,
+        turned=tracked.turned,
+    )

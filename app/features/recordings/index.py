@@ -1,0 +1,208 @@
+"""The index of a recording: its file decoded once in a worker process, and what is kept of each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+from app.canonical import canonical
+from app.config import Settings
+from app.db.store import Store
+from app.durable import replace_file
+from app.errors import ConflictError, ImageError, InputError, NotFoundError, StorageError
+from app.features.audit.audit_events import add_audit_event
+from app.features.recordings.link_queries import delete_links
+from app.features.recordings.queries import update_recording
+from app.features.recordings.service import (
+    Details,
+    Recording,
+    file_stamp,
+    name_of_video,
+    need_recording,
+    recording_of,
+)
+from app.geometry.arrays import FloatArray
+from app.media.frames import refused_picture
+from app.progress import ReportProgress
+from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds
+from app.video.indexing import index_recording
+from app.video.shots import shots_of_indexed
+from app.worker_process import COUNTS, WorkerEnded, WorkerLimits, WorkerProcess
+
+LIMITS = WorkerLimits(memory=1536 * 2**20, processor=6 * 3600.0, silence=600.0)
+"""For decoding a whole recording once."""
+Send = Callable[[tuple[int, int | None, str]], object]
+"""Takes what is done, how much there is, and what is being done."""
+Found = TypeVar("Found")
+
+
+def index_now(
+    store: Store,
+    recording_id: int,
+    *,
+    progress: ReportProgress,
+    stop: Callable[[], None],
+) -> Recording:
+    """Decode a recording once in a worker process: its index, its facts, and its shots.
+
+    Shots that people have changed stay, unless the file is another one than before.
+
+    Args:
+        store: The database.
+        recording_id: Which.
+        progress: Called with frames decoded, and about how many there are.
+        stop: Called every now and then; an error that it raises ends the process.
+
+    Raises:
+        ImageError: It is no video that can be read, or a part of it is missing.
+        NotFoundError: The file is not there.
+    """
+    with store.read() as session:
+        row = need_recording(session, recording_id)
+    path = Path(row.path)
+    stamp = file_stamp(path)
+    if stamp is None:
+        raise NotFoundError(f"{path.name} is not where it was imported from")
+    facts, shots = in_worker(path, index_file, store.settings, progress=progress, stop=stop)
+    if file_stamp(path) != stamp:
+        raise ImageError(f"{path.name} changed while it was read", hint="Import it again.")
+    with store.write() as session:
+        row = need_recording(session, recording_id)
+        what: Details
+        found = {"stamp": stamp, "sha256": facts["sha256"], "facts": canonical(facts)}
+        if row.sha256 != facts["sha256"]:
+            name = name_of_video(session, row, facts["sha256"])
+            if name != row.name:
+                found["name"] = name
+                what = {"recording": recording_id, "name": name, "before": row.name}
+                add_audit_event(session, row.actor, "recording renamed", row.dataset_id, **what)
+        if row.sha256 != facts["sha256"] or row.shots == "[]":
+            found |= {"shots": canonical(shots), "revision": row.revision + 1}
+        if row.sha256 != facts["sha256"] and (gone := delete_links(session, recording_id)):
+            # Their frames are those of another film.
+            what = {"recording": recording_id, "name": row.name, "links": gone}
+            add_audit_event(session, row.actor, "links removed", row.dataset_id, **what)
+        update_recording(session, recording_id, **found)
+        return recording_of(need_recording(session, recording_id))
+
+
+def in_worker(
+    path: Path,
+    work: Callable[..., Found],
+    *arguments: Any,
+    progress: ReportProgress,
+    stop: Callable[[], None],
+    limits: WorkerLimits = LIMITS,
+) -> Found:
+    """The result of ``work(path, *arguments, send)`` in a worker process."""
+
+    def answer(place: tuple[int, int | None, str]) -> None:
+        done, total, sentence = place
+        progress(done, total, *([sentence] if sentence else []))
+
+    with closing(WorkerProcess(limits)) as worker, COUNTS["recordings"].working():
+        try:
+            found: Found = worker.run(work, path, *arguments, on_message=answer, stop=stop)
+        except WorkerEnded as error:
+            raise refused_picture(path.name, error) from error
+    return found
+
+
+def index_file(
+    path: Path, settings: Settings, send: Send
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Facts and shots of a recording, whose index is written; in a worker process."""
+    index = index_recording(path, settings, lambda done, total: send((done, total, "")))
+    place = index_place(settings, index.facts.sha256)
+    try:
+        place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        replace_file(place, index_to_bytes(index))
+    except OSError as error:
+        raise StorageError(f"the index of {path.name} cannot be kept ({error.strerror})") from error
+    facts = {
+        **asdict(index.facts),
+        "frames": len(index),
+        "fps": index.fps,
+        "variable": index.is_variable,
+        "seconds": index.end,
+    }
+    return facts, _found_shots(path, index, send)
+
+
+def _found_shots(path: Path, index: RecordingIndex, send: Send) -> list[dict[str, Any]]:
+    def tell(done: int, total: int | None = None, sentence: str = "") -> None:
+        send((done, total, sentence))
+
+    found = shots_of_indexed(path, index, tell).shots
+    return [
+        {
+            "first": one.first,
+            "last": one.last,
+            "kind": one.kind,
+            "entered_by": one.entered_by,
+            "kept": None,
+        }
+        for one in found
+    ]
+
+
+def index_place(settings: Settings, sha256: str) -> Path:
+    """Where the index of a recording lies."""
+    return settings.recordings / f"{sha256}.npz"
+
+
+def read_index(settings: Settings, sha256: str) -> RecordingIndex:
+    """The index of a recording.
+
+    Raises:
+        ConflictError: It is gone, or of an older version.
+    """
+    return read_index_at(index_place(settings, sha256))
+
+
+def read_index_at(place: Path) -> RecordingIndex:
+    """The same by the place where it lies."""
+    try:
+        return index_from_bytes(place.read_bytes())
+    except (OSError, InputError) as error:
+        raise _no_index() from error
+
+
+def _no_index() -> ConflictError:
+    return ConflictError("the index of this recording cannot be read", hint="Index it again.")
+
+
+def has_index(store: Store, recording: Recording) -> bool:
+    """Whether the index of a recording fits its file, and this version can read it."""
+    try:
+        read_index_seconds(index_place(store.settings, recording.require_readable()))
+    except (ConflictError, InputError, OSError):
+        return False
+    return True
+
+
+def shots_of(path: Path, settings: Settings, sha256: str, send: Send) -> list[dict[str, Any]]:
+    """Shots of a recording that is indexed; in a worker process."""
+    return _found_shots(path, read_index(settings, sha256), send)
+
+
+@lru_cache(maxsize=4)
+def _seconds(index: Path) -> FloatArray:
+    """When each frame is shown, by the place of an index: that of a whole match takes a second to read."""
+    try:
+        return read_index_seconds(index)
+    except (OSError, InputError) as error:
+        raise _no_index() from error
+
+
+def frame_seconds(settings: Settings, sha256: str) -> FloatArray:
+    """When each frame of a recording is shown, seconds after the first one, shape (N,).
+
+    Raises:
+        ConflictError: Its index is gone, or of an older version.
+    """
+    return _seconds(index_place(settings, sha256))

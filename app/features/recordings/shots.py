@@ -1,0 +1,156 @@
+"""The shots of a recording: found anew, split, merged and named by people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+from app.canonical import canonical, digest_of
+from app.config import Settings
+from app.db.json_columns import parse
+from app.db.store import Store
+from app.errors import InputError
+from app.features.audit.audit_events import add_audit_event
+from app.features.groups.state import require_etag
+from app.features.recordings.index import frame_seconds, in_worker, shots_of
+from app.features.recordings.queries import RecordingRow, update_recording
+from app.features.recordings.service import Details, Recording, need_recording, recording_of
+from app.formats.csv_text import csv_line
+from app.plural import plural
+from app.progress import ReportProgress
+from app.soccer.choices import ShotKind, ShotStart
+
+MAX_SHOTS = 20_000
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A stretch of a recording without a cut.
+
+    Attributes:
+        first, last: Numbers of its frames, decoded ones from 0.
+        kind: ``main``, ``replay``, ``closeup`` or ``other``.
+        entered_by: How it begins: ``start``, ``cut``, ``dissolve``, ``wipe`` or ``fade``. The frames of
+            a soft transition belong to neither shot.
+        kept: Whether somebody wants to work on it; None: nobody said.
+    """
+
+    first: int
+    last: int
+    kind: ShotKind
+    entered_by: ShotStart
+    kept: bool | None = None
+
+
+@dataclass(frozen=True)
+class RecordingShots:
+    """The shots of a recording in their order; ``times`` are those of their first and last frames."""
+
+    recording: Recording
+    items: tuple[Shot, ...]
+    times: tuple[tuple[float, float], ...]
+    etag: str
+
+
+def find_again(
+    store: Store,
+    recording_id: int,
+    *,
+    actor: str,
+    progress: ReportProgress,
+    stop: Callable[[], None],
+) -> RecordingShots:
+    """Find the shots of a recording anew, in place of those that it has.
+
+    Raises:
+        ConflictError: It cannot be read.
+        StaleRevisionError: Somebody changed them meanwhile.
+    """
+    before = get_shots(store, recording_id)
+    path, sha256 = before.recording.path, before.recording.require_readable()
+    asked = (shots_of, store.settings, sha256)
+    found = in_worker(path, *asked, progress=progress, stop=stop)
+    shots = [Shot(**one) for one in found]
+    return put_shots(store, recording_id, shots, before.etag, actor=actor)
+
+
+def get_shots(store: Store, recording_id: int) -> RecordingShots:
+    """The shots of a recording.
+
+    Raises:
+        NotFoundError: There is no such recording.
+    """
+    with store.read() as session:
+        row = need_recording(session, recording_id)
+    return _shots(store.settings, row)
+
+
+def shots_csv(found: RecordingShots) -> str:
+    """The shots of a recording as CSV, a row for each."""
+    columns = ("first", "last", "start_s", "end_s", "kind", "entered_by", "kept")
+    lines = [csv_line(("recording", "shot", *columns))]
+    for number, (shot, times) in enumerate(zip(found.items, found.times, strict=True), 1):
+        place = (found.recording.name, number, shot.first, shot.last, *times)
+        lines.append(csv_line((*place, shot.kind, shot.entered_by, shot.kept)))
+    return "".join(lines)
+
+
+def put_shots(
+    store: Store, recording_id: int, shots: Sequence[Shot], if_match: str | None, *, actor: str
+) -> RecordingShots:
+    """Replace the list of shots: split, merged, of other kinds, kept or dropped.
+
+    Args:
+        store: The database.
+        recording_id: Which.
+        shots: All of them, in their order.
+        if_match: ETag of the list that the change builds on; None: whatever it is.
+        actor: Who changes it.
+
+    Raises:
+        InputError: Shots overlap, are out of order, or are outside of the recording.
+        StaleRevisionError: Somebody else was faster.
+    """
+    with store.write() as session:
+        row = need_recording(session, recording_id)
+        if if_match is not None:
+            require_etag(_etag(row), if_match, f'the list of shots of "{row.name}"')
+        frames = parse(row.facts)["frames"] if row.facts else 0
+        _require_sound(shots, frames)
+        text = canonical([asdict(shot) for shot in shots])
+        if text != row.shots:
+            update_recording(session, recording_id, shots=text, revision=row.revision + 1)
+            what: Details = {"recording": recording_id, "name": row.name, "shots": len(shots)}
+            add_audit_event(session, actor, "shots changed", row.dataset_id, **what)
+        found = _shots(store.settings, need_recording(session, recording_id))
+        session.respond(found)
+    return found
+
+
+def _require_sound(shots: Sequence[Shot], frames: int) -> None:
+    if len(shots) > MAX_SHOTS:
+        raise InputError(f"a recording has at most {MAX_SHOTS:,} shots", pointer="/shots")
+    before = -1
+    for number, shot in enumerate(shots):
+        if not before < shot.first <= shot.last < frames:
+            raise InputError(
+                f"shot {number + 1} has the frames {shot.first} to {shot.last}: shots follow each "
+                f"other without overlap, in a recording of {plural(frames, 'frame')}",
+                pointer=f"/shots/{number}",
+            )
+        before = shot.last
+
+
+def _shots(settings: Settings, row: RecordingRow) -> RecordingShots:
+    recording = recording_of(row)
+    items = tuple(Shot(**shot) for shot in parse(row.shots))
+    times: tuple[tuple[float, float], ...] = ()
+    if items and recording.sha256 is not None:
+        seconds = frame_seconds(settings, recording.sha256)
+        ends = ((float(seconds[shot.first]), float(seconds[shot.last])) for shot in items)
+        times = tuple(ends)
+    return RecordingShots(recording, items, times, _etag(row))
+
+
+def _etag(row: RecordingRow) -> str:
+    return f'"{row.revision}-{digest_of(row.shots.encode())[:12]}"'
