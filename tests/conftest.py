@@ -41,6 +41,7 @@ BROAD = (
     "tests/real/test_versions.py::TestFreeze::test_two_homes",
     "tests/security/test_gold.py::TestGold::test_no_answer_tells",
     "tests/unit/db/test_migrate.py::TestOldHomes",
+    "tests/unit/features/practice/test_recording.py::test_each_lesson",
     "tests/unit/features/integrity/test_upgrades.py",
     "tests/unit/http/test_web_processes.py::TestServeWith",
 )

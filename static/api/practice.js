@@ -28,3 +28,26 @@ export function getPractice(signal) {
 export function postPractice(again) {
 	return request('/practice', { method: 'POST', body: { again } });
 }
+
+/**
+ * @typedef {object} RecordingLessonJson
+ * @property {'shots' | 'cameras' | 'side' | 'link'} name
+ * @property {string} question
+ * @property {string} hint
+ * @property {'open' | 'almost' | 'right'} state
+ * @property {string} feedback
+ * @property {number} frame where to look
+ * @property {number} right
+ * @property {number} total
+ * @property {number | null} off
+ */
+
+/** @param {AbortSignal} [signal] @returns {Promise<{dataset: string, recording: number | null, lessons: RecordingLessonJson[]}>} */
+export function getRecordingPractice(signal) {
+	return request('/practice/recording', { signal });
+}
+
+/** @param {boolean} again begin afresh @returns {Promise<JobJson>} */
+export function postRecordingPractice(again) {
+	return request('/practice/recording', { method: 'POST', body: { again } });
+}

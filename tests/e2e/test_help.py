@@ -286,6 +286,15 @@ class TestPractice:
         assert states == {"open"}
         assert serious_in_both(page) == []
 
+    def test_the_practice_on_a_recording_is_offered_below(
+        self, lessons: tuple[Page, list[Json]]
+    ) -> None:
+        page, _ = lessons
+        page.goto("/help/practice")
+        part = page.get_by_role("region", name="With a recording")
+        expect(part).to_contain_text("four known faults")
+        expect(part.get_by_role("button", name="Make the recording")).to_be_visible()
+
 
 MOST_KEYS = 5
 """From the cause that is seen to the verdict."""

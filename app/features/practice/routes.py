@@ -1,4 +1,4 @@
-"""Practice: eight groups with known answers, and what was said to them."""
+"""Practice: eight groups with known answers, a recording with known faults, and what was said to them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from fastapi import APIRouter, Depends, Request
 
 from app.features.groups.submit import load
 from app.features.jobs.queries import Job
-from app.features.practice.schemas import LessonDocument, PracticeBody, PracticeDocument
+from app.features.practice.recording import RecordingPractice, read_recording_practice
+from app.features.practice.schemas import (
+    LessonDocument,
+    PracticeBody,
+    PracticeDocument,
+    RecordingPracticeDocument,
+)
 from app.features.practice.service import (
     Practice,
     PracticeLesson,
@@ -76,6 +82,47 @@ def start_practice(
         again=request.again,
         actor=actor,
         person=person,
+    )
+
+
+@router.get(
+    "/practice/recording",
+    operation_id="getRecordingPractice",
+    response_model=RecordingPracticeDocument,
+    responses=responses(),
+)
+@may(Action.READ, where=Where.SOMEWHERE)
+def get_recording_practice(
+    services: AppServices, visibility: Sees, person: Person
+) -> RecordingPractice:
+    """The practice recording: what is right of its shots, its cameras and the link of its replay."""
+    return read_recording_practice(services.store, services.settings, visibility, person)
+
+
+@router.post(
+    "/practice/recording",
+    operation_id="startRecordingPractice",
+    **by_job(409, 413, 415, 503),
+)
+@may(Action.ANNOTATE, where=Where.OWN)
+@responds(job_answer)
+def start_recording_practice(
+    request: PracticeBody, services: AppServices, actor: Actor, person: Person
+) -> Job:
+    """Draw a film with planted faults as a recording of the dataset `recording practice`; with `again` it begins afresh.
+
+    Where people log in, the dataset is the person's own, `recording practice NAME`: they lead in it.
+
+    The job's result has `dataset`, and `recording`, its id.
+    """
+    return request_practice(
+        services.jobs,
+        services.store,
+        services.settings,
+        again=request.again,
+        actor=actor,
+        person=person,
+        recording=True,
     )
 
 

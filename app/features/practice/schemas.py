@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
+from app.features.practice.recording_lessons import LessonName, RecordingLesson
 from app.http.documents import Document
 
 LessonState = Literal["open", "mended", "right", "almost", "wrong"]
@@ -51,3 +52,29 @@ class PracticeDocument(Document):
 
     dataset: str
     lessons: list[LessonDocument]
+
+
+class RecordingLessonDocument(Document, shows=RecordingLesson):
+    """One lesson on the practice recording."""
+
+    name: LessonName = Field(description="Which.")
+    question: str = Field(description="What to do.")
+    hint: str = Field(description="With which keys.")
+    state: Literal["open", "almost", "right"] = Field(
+        description="Weighed against the film's truth."
+    )
+    feedback: str = Field(description="What is right and what is not, in words and numbers.")
+    frame: int = Field(description="Where to look: a frame of the recording.")
+    right: int = Field(description="How many shots, frames or links are right.")
+    total: int = Field(description="Of how many.")
+    off: float | None = Field(
+        description="How far from the truth: pixels of the grass (cameras), metres (side), live frames (link)."
+    )
+
+
+class RecordingPracticeDocument(Document):
+    """The practice recording; no lessons until it is made."""
+
+    dataset: str
+    recording: int | None = Field(description="Id of the recording.")
+    lessons: list[RecordingLessonDocument]

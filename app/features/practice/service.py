@@ -25,6 +25,7 @@ from app.features.people.queries import person_by_name, set_dataset_role
 from app.features.people.roles import Role, note
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
 from app.features.practice.lessons import WORDS, Feedback, judge, kind_of
+from app.features.practice.recording import recording_practice_work, require_own_recording
 from app.features.solutions.service import solve_dataset
 from app.formats.match_frames import ARCHIVE
 from app.progress import ReportProgress, partial_progress
@@ -86,22 +87,28 @@ def request_practice(
     again: bool,
     actor: str,
     person: str | None = None,
+    recording: bool = False,
 ) -> Job:
     """Make the practice dataset soon; what is there already stays, unless it shall begin again.
 
-    ``person`` is whose practice it is (``practice_name``).
+    ``person`` is whose practice it is (``practice_name``); ``recording``: the practice on a recording instead.
 
     Raises:
         ConflictError: There is a dataset of that name that is not the practice.
     """
-    _require_own(store, settings, person)
+    if recording:
+        require_own_recording(store, person)
+        title = "Begin the practice on a recording again" if again else "Make a practice recording"
+    else:
+        _require_own(store, settings, person)
+        title = "Begin the practice again" if again else "Make the practice groups"
     return jobs.submit(
         KIND,
-        "Begin the practice again" if again else "Make the practice groups",
+        title,
         partial(practice_work, store),
         actor=actor,
-        request={"again": again, "person": person},
-        once=True,
+        request={"again": again, "person": person, "recording": recording},
+        once=not recording,
     )
 
 
@@ -114,6 +121,8 @@ def resume_practice(jobs: Jobs, store: Store) -> None:
 def practice_work(store: Store, progress: JobProgress) -> Json:
     """The work itself; its result names the dataset and its first group."""
     asked = progress.job.request or {}
+    if asked.get("recording"):
+        return recording_practice_work(store, progress)
     return run_job_in_worker(
         store,
         "practice",

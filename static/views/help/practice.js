@@ -12,6 +12,7 @@ import { isTeam } from '../../state/me.js';
 import { isJudged, making, makingFailed, startPractice } from '../../state/practice.js';
 import { JobProgress } from '../job_progress.js';
 import { MARKS, WORDS } from '../lesson_card.js';
+import { RecordingPracticePart } from './practice_recording.js';
 
 /** @import {LessonJson} from '../../api/practice.js' */
 
@@ -61,6 +62,7 @@ export function PracticePart({ onLeave }) {
 					<thead><tr><th scope="col">lesson</th><th scope="col">answer</th><th scope="col">what it is about</th></tr></thead>
 					<tbody>${lessons.map((lesson) => html`<${Row} key=${lesson.number} lesson=${lesson} onLeave=${onLeave} />`)}</tbody>
 				</table>` : null}
+			<${RecordingPracticePart} onLeave=${onLeave} />
 		</div>
 	`;
 }

@@ -1,0 +1,266 @@
+"""Practice on a recording: a film of the sample with planted faults, and what people made of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from app.config import Settings
+from app.db.json_columns import Json
+from app.db.locks import practice_lock
+from app.db.store import Store
+from app.errors import ConflictError
+from app.features.datasets.queries import find_dataset
+from app.features.datasets.service import delete_dataset, insert_dataset
+from app.features.imports.queries import known_groups
+from app.features.jobs.runner import JobProgress, left_to_next_server
+from app.features.people.queries import person_by_name, set_dataset_role
+from app.features.people.roles import Role, note
+from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
+from app.features.practice.recording_lessons import (
+    FilmTruth,
+    RecordingLesson,
+    judge_cameras,
+    judge_link,
+    judge_shots,
+    judge_side,
+)
+from app.features.recordings.camera_tracking import Tracked, save_cameras, track_now
+from app.features.recordings.cameras import cameras_at
+from app.features.recordings.index import Send, in_worker, index_now
+from app.features.recordings.links import list_links
+from app.features.recordings.service import Recording, add_recording, list_recordings
+from app.features.recordings.shots import Shot, get_shots, put_shots
+from app.progress import ReportProgress, partial_progress
+from app.sample.order import SEED
+from app.soccer.policy import TOUCHLINE
+
+DATASET = "recording practice"
+"""Name of the dataset where nobody logs in."""
+FILM = Path("practice") / "recording" / "derby.mp4"
+"""In the home; its truth lies beside it."""
+PARTS = (
+    ("main", 5, "start"),
+    ("closeup", 2, "cut"),
+    ("main", 7, "cut"),
+    ("replay", 6, "wipe", 0.5, 0),
+    ("main", 3, "wipe"),
+)
+"""What the film shows, as ``sample.recording.Part``; the replay is filmed from the far side."""
+LOST = (0.4, 0.6)
+"""Which part of the live shot has no cameras."""
+
+
+@dataclass(frozen=True)
+class RecordingPractice:
+    """The practice recording; ``lessons`` is empty until it is made.
+
+    Attributes:
+        dataset: Name of its dataset.
+        recording: Its id; None until it is made.
+        lessons: What is to do, and what has come of it.
+    """
+
+    dataset: str
+    recording: int | None
+    lessons: tuple[RecordingLesson, ...]
+
+
+def recording_practice_name(person: str | None) -> str:
+    """Name of the dataset in which a person practises on a recording; None: where nobody logs in."""
+    return DATASET if person is None else f"{DATASET} {person}"
+
+
+def recording_practice_work(store: Store, progress: JobProgress) -> Json:
+    """The work itself; its result names the dataset and the recording."""
+    asked = progress.job.request
+    with left_to_next_server(progress):
+        return make_recording_practice(
+            store,
+            progress,
+            again=bool(asked["again"]),
+            actor=progress.job.actor,
+            person=asked["person"],
+            stop=progress.check,
+        )
+
+
+def make_recording_practice(
+    store: Store,
+    progress: ReportProgress,
+    *,
+    again: bool = False,
+    actor: str,
+    person: str | None = None,
+    stop: Callable[[], None] = lambda: None,
+) -> dict[str, Json]:
+    """Draw the film, find its shots, track two of them and plant the faults; done once, nothing more unless ``again``.
+
+    Returns:
+        ``dataset``, ``recording`` (its id) and ``made`` (False where everything was there already).
+
+    Raises:
+        ConflictError: There is a dataset of that name that is not the practice.
+    """
+    settings, name = store.settings, recording_practice_name(person)
+    film = settings.home / FILM
+    with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes it.")):
+        require_own_recording(store, person)
+        there = _recording(store, person)
+        if there is not None and not again and _truth(settings) and there.problem is None:
+            return {"dataset": name, "recording": there.id, "made": False}
+        if _truth(settings) is None or not film.is_file():
+            film.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            drawing = partial_progress(progress, "Drawing the film.")
+            in_worker(film, draw_film, PARTS, progress=drawing, stop=stop)
+        if there is not None:
+            delete_dataset(store, name, confirm=name, actor=actor)
+        _open(store, person, actor)
+        recording = add_recording(store, name, film.absolute(), actor=actor)
+        reading = partial_progress(progress, "Finding its shots.")
+        recording = index_now(store, recording.id, progress=reading, stop=stop)
+        truth = _truth(settings)
+        assert truth is not None
+        _plant(store, recording, truth, progress, actor, stop)
+    return {"dataset": name, "recording": recording.id, "made": True}
+
+
+def draw_film(path: Path, parts: Sequence[Sequence[Any]], send: Send) -> None:
+    """Draw the practice film, in a worker process."""
+    from app.sample.recording import Part, write_recording
+
+    def tell(done: int, total: int | None = None, sentence: str = "") -> None:
+        send((done, total, sentence))
+
+    write_recording(
+        path,
+        seed=SEED + 1,
+        parts=[Part(*part) for part in parts],
+        progress=tell,
+    )
+
+
+def _plant(
+    store: Store,
+    recording: Recording,
+    truth: FilmTruth,
+    progress: ReportProgress,
+    actor: str,
+    stop: Callable[[], None],
+) -> None:
+    """Track live shot and replay, and put faults into shots and cameras."""
+    live, replay = truth.shots[truth.live], truth.shots[truth.replay]
+    for shot, what in ((live, "the live shot"), (replay, "the replay")):
+        telling = partial_progress(progress, f"Following the camera of {what}.")
+        track_now(
+            store, recording.id, shot.first, shot.last, actor=actor, progress=telling, stop=stop
+        )
+    begin, end = (live.first + round(share * (live.last - live.first)) for share in LOST)
+    frames = [
+        replace(
+            frame,
+            outcome="lost",
+            camera=None,
+            covariance=None,
+            supported=None,
+            explained=None,
+            error_px=None,
+            is_keyframe=False,
+            reason="the practice took this camera away",
+        )
+        if begin <= frame.number <= end
+        else frame
+        for _, frame in sorted(
+            cameras_at(store, recording, range(live.first, live.last + 1)).items()
+        )
+    ]
+    save_cameras(store, recording, (live.first, live.last), Tracked(frames, ()), [], actor)
+    first, second, *rest = truth.shots
+    planted = [
+        Shot(first.first, second.last, first.kind, first.entered_by),
+        *(replace(shot, kind="main") if shot == replay else shot for shot in rest),
+    ]
+    put_shots(store, recording.id, planted, None, actor=actor)
+
+
+def _open(store: Store, person: str | None, actor: str) -> None:
+    """Make the practice dataset, empty, where it is missing; a person leads in their own."""
+    with store.write() as session:
+        name = recording_practice_name(person)
+        if find_dataset(session, name) is not None:
+            return
+        made = insert_dataset(session, name, TOUCHLINE, actor, hidden=person is not None)
+        row = None if person is None else person_by_name(session, person)
+        if row is not None and person is not None:
+            set_dataset_role(session, row.id, made, Role.LEAD, by=actor)
+            note(session, actor, person, "role in dataset", Role.LEAD, dataset_id=made)
+
+
+def read_recording_practice(
+    store: Store, settings: Settings, visibility: Visibility = EVERYTHING, person: str | None = None
+) -> RecordingPractice:
+    """What is right of the practice recording; no lessons where it is not made yet, or not seen."""
+    name, truth = recording_practice_name(person), _truth(settings)
+    recording = _recording(store, person)
+    if recording is None or truth is None or not recording.indexed:
+        return RecordingPractice(name, None, ())
+    if not visibility.sees(recording.dataset_id):
+        return RecordingPractice(name, None, ())
+    frames = cameras_at(store, recording, range(recording.frames or 0))
+    lessons = (
+        judge_shots(truth, get_shots(store, recording.id).items),
+        judge_cameras(truth, frames),
+        judge_side(truth, frames),
+        judge_link(truth, list_links(store, recording.id)),
+    )
+    return RecordingPractice(name, recording.id, lessons)
+
+
+def _recording(store: Store, person: str | None) -> Recording | None:
+    """The practice recording of a person, if it is there."""
+    with store.read() as session:
+        row = find_dataset(session, recording_practice_name(person))
+    if row is None or _is_ordinary(row, person):
+        return None
+    found = list_recordings(store, int(row.id))
+    film = str((store.settings.home / FILM).absolute())
+    return next((one for one in found if str(one.path) == film), None)
+
+
+def _is_ordinary(row: Any, person: str | None) -> bool:
+    """Whether a dataset with the name of a person's practice is not theirs: that one is hidden."""
+    return person is not None and row.id <= COPIES
+
+
+def require_own_recording(store: Store, person: str | None) -> None:
+    """Raise ConflictError where somebody's own dataset has the name."""
+    name = recording_practice_name(person)
+    with store.read() as session:
+        row = find_dataset(session, name)
+        groups = 0 if row is None else len(known_groups(session, row.id))
+    if row is None:
+        return
+    is_empty = not groups and not list_recordings(store, int(row.id))
+    if _is_ordinary(row, person) or not (is_empty or _recording(store, person)):
+        raise ConflictError(
+            f'there is a dataset "{name}" of your own',
+            hint="The practice needs that name. Rename or delete your dataset first.",
+        )
+
+
+def _truth(settings: Settings) -> FilmTruth | None:
+    """What is true of the film; None where it is not drawn."""
+    file = (settings.home / FILM).with_suffix(".json")
+    try:
+        return _read(file, file.stat().st_mtime_ns)
+    except FileNotFoundError:
+        return None
+
+
+@lru_cache(maxsize=4)
+def _read(file: Path, _changed: int) -> FilmTruth:
+    return FilmTruth.of(json.loads(file.read_text(encoding="utf-8")))

@@ -1,0 +1,266 @@
+"""What is right of a practice recording: its shots, its cameras over time and the link of its replay, beside the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from app.features.recordings.link_values import ShotLink
+from app.features.recordings.shots import Shot
+from app.formats.camera_json import camera_from_json
+from app.geometry.arrays import FloatArray
+from app.geometry.camera import Camera
+from app.plural import plural
+from app.soccer.frames import ImageSize
+from app.solving.sides import turned_camera
+from app.tracking.track import FrameCamera
+
+LessonName = Literal["shots", "cameras", "side", "link"]
+State = Literal["open", "almost", "right"]
+NEAR_FRAMES = 2
+"""Between the ends of a shot and where they are."""
+NEAR_PX, OFF_PX = 2.0, 5.0
+"""Median distance of the grass from where it is, pixels at 1280 wide: a camera that is right, and one that is not."""
+NEAR_LIVE_FRAMES, NEAR_PERCENT = 1.0, 5.0
+"""Of a link: live frames in the middle of the replay, and of the speed."""
+_KINDS = {"main": "the main camera", "replay": "a replay", "closeup": "a close-up"}
+
+
+@dataclass(frozen=True)
+class RecordingLesson:
+    """One lesson on the practice recording, as it stands.
+
+    Attributes:
+        name: Which.
+        question: What to do.
+        hint: With which keys.
+        state: ``open`` as it was made, ``almost``, or ``right``.
+        feedback: What is right and what is not, in words and numbers.
+        frame: Where to look.
+        right, total: How many shots or frames are right, of how many; of a link 0 or 1 of 1.
+        off: How far from the truth: pixels of the grass (median), metres of the tripod, live frames of a link; None where
+            nothing is known.
+    """
+
+    name: LessonName
+    question: str
+    hint: str
+    state: State
+    feedback: str
+    frame: int
+    right: int
+    total: int
+    off: float | None = None
+
+
+@dataclass(frozen=True)
+class FilmTruth:
+    """What is true of a recording of the sample.
+
+    Attributes:
+        fps: Frames a second.
+        size: Of a frame.
+        shots: As the film shows them.
+        replay, live: Numbers of the replay and of the shot that it shows again, in ``shots``.
+        offset_s, speed: ``t_live = offset + speed * t_replay``, seconds after the first frame of the recording.
+        cameras: Of each frame.
+    """
+
+    fps: float
+    size: ImageSize
+    shots: tuple[Shot, ...]
+    live: int
+    replay: int
+    offset_s: float
+    speed: float
+    cameras: Mapping[int, Camera]
+
+    @staticmethod
+    def of(told: Mapping[str, Any]) -> FilmTruth:
+        """The truth that ``write_recording`` writes beside a film."""
+        link = told["links"][0]
+        shots = [
+            Shot(shot["first"], shot["last"], shot["kind"], shot["entered_by"])
+            for shot in told["shots"]
+        ]
+        return FilmTruth(
+            told["fps"],
+            ImageSize(told["width"], told["height"]),
+            tuple(shots),
+            link["live"],
+            link["replay"],
+            link["offset_s"],
+            link["speed"],
+            {row["frame"]: camera_from_json(row["camera"], "film") for row in told["each"]},
+        )
+
+
+def judge_shots(truth: FilmTruth, shots: Sequence[Shot]) -> RecordingLesson:
+    """How many shots are where they are in truth, and of their kind."""
+    wrong = [one for one in truth.shots if not any(_is_same(one, other) for other in shots)]
+    right = len(truth.shots) - len(wrong)
+    told = f"{right} of {plural(len(truth.shots), 'shot')} are right."
+    if wrong:
+        one = wrong[0]
+        shown = _KINDS.get(one.kind, "something else")
+        told += f" Frames {one.first} to {one.last} are one shot of their own, and show {shown}."
+        beside = [other for other in shots if abs(other.first - one.first) <= NEAR_FRAMES]
+        if beside and abs(beside[0].last - one.last) <= NEAR_FRAMES:
+            told += f" Here they are called {_KINDS.get(beside[0].kind, 'something else')}."
+    elif len(shots) > len(truth.shots):
+        told += f" {plural(len(shots) - len(truth.shots), 'shot')} too many."
+    done = not wrong and len(shots) == len(truth.shots)
+    return RecordingLesson(
+        "shots",
+        "One cut is missing from the list of shots, and one shot is called what it is not. Make the list right.",
+        "Step through the film with the arrows. S splits the shot at the frame on screen, 1 to 4 say what a shot is.",
+        "right" if done else "open",
+        told,
+        (wrong[0] if wrong else truth.shots[0]).first,
+        right,
+        len(truth.shots),
+    )
+
+
+def _is_same(one: Shot, other: Shot) -> bool:
+    ends = max(abs(one.first - other.first), abs(one.last - other.last))
+    return ends <= NEAR_FRAMES and one.kind == other.kind
+
+
+def judge_cameras(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> RecordingLesson:
+    """How many frames of the live shot have a camera that lies where it is in truth."""
+    shot = truth.shots[truth.live]
+    numbers = range(shot.first, shot.last + 1)
+    off = {
+        number: grass_off_px(truth.cameras[number], frame.camera, truth.size)
+        for number in numbers
+        if (frame := frames.get(number)) is not None and frame.camera is not None
+    }
+    lost = [number for number in numbers if number not in off]
+    right = [number for number, px in off.items() if px <= NEAR_PX]
+    told = f"{len(right)} of {plural(len(numbers), 'frame')} have a camera that is right."
+    if lost:
+        told += f" {plural(len(lost), 'frame')} from {lost[0]} to {lost[-1]} have none."
+    middle = float(np.median(list(off.values()))) if off else None
+    if middle is not None:
+        worst = max(off, key=lambda number: off[number])
+        told += f" The grass lies {middle:.1f} px from where it is (median; {off[worst]:.1f} px in frame {worst})."
+    state: State = "right" if len(right) == len(numbers) else "open"
+    if state == "open" and len(right) >= 0.95 * len(numbers):
+        state = "almost"
+    return RecordingLesson(
+        "cameras",
+        "The camera of this shot is lost for a while. Mend one of these frames, and let the shot follow.",
+        "N goes to a lost frame, E draws its lines; when they are saved, T tracks the shot again.",
+        state,
+        told,
+        lost[0] if lost else shot.first,
+        len(right),
+        len(numbers),
+        middle,
+    )
+
+
+def judge_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> RecordingLesson:
+    """Whether the cameras of the replay stand on the side where they are in truth."""
+    shot = truth.shots[truth.replay]
+    numbers = range(shot.first, shot.last + 1)
+    found = {
+        number: frame.camera
+        for number in numbers
+        if (frame := frames.get(number)) is not None and frame.camera is not None
+    }
+    away = [_apart_m(truth.cameras[number], camera) for number, camera in found.items()]
+    turned = [
+        _apart_m(truth.cameras[number], turned_camera(camera)) for number, camera in found.items()
+    ]
+    is_right = bool(away) and float(np.median(away)) < float(np.median(turned))
+    if not away:
+        told = "The replay has no cameras: track it."
+    elif is_right:
+        told = f"The camera of the replay stands {np.median(away):.2f} m from where it is (median)."
+    else:
+        told = (
+            f"The camera of the replay stands {np.median(away):.0f} m from where it is; turned by half it would be "
+            f"{np.median(turned):.2f} m."
+        )
+    return RecordingLesson(
+        "side",
+        "The paint of a pitch is the same from both sides. On which side does the camera of the replay stand?",
+        "Compare stands, benches and the goal that is attacked with the live shot. Shift T turns the cameras by half.",
+        "right" if is_right else "open",
+        told,
+        shot.first,
+        len(found) if is_right else 0,
+        len(numbers),
+        float(np.median(away)) if away else None,
+    )
+
+
+def judge_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingLesson:
+    """How far the times of the replay are from the truth."""
+    live, replay = truth.shots[truth.live], truth.shots[truth.replay]
+    mine = [one for one in links if _meets(one.replay.frames, replay)]
+    fitting = [one for one in mine if _meets(one.live.frames, live)]
+    known = next((one for one in fitting if one.map.is_usable), None)
+    state: State = "open"
+    off = None
+    if known is None:
+        told = "The replay is not linked yet."
+        if fitting:
+            told = "The replay is linked to the right shot; no instant says its times yet."
+        elif mine:
+            told = f"The replay does not show frames {mine[0].live.first} to {mine[0].live.last}."
+    else:
+        middle = (replay.first + replay.last) / 2
+        shown = known.map.live(np.array([(middle - known.replay.first) / truth.fps]))[0]
+        shown += known.live.first / truth.fps
+        off = float(abs(shown - truth.offset_s - truth.speed * middle / truth.fps) * truth.fps)
+        told = f"In its middle the replay is {off:.1f} live frames off."
+        speed = known.map.speed
+        if known.map.outcome == "offset":
+            told += " Its speed is assumed: link a second instant."
+        elif speed is not None:
+            percent = 100 * abs(speed / truth.speed - 1)
+            told += (
+                f" Its speed is {speed:.3f}; in truth it is {truth.speed:g} ({percent:.1f} % off)."
+            )
+            near = off <= NEAR_LIVE_FRAMES and percent <= NEAR_PERCENT
+            state = "right" if near else "almost"
+    return RecordingLesson(
+        "link",
+        "Which live shot does the replay show, from when, and how slowly?",
+        "Link to live beside the replay. Scrub both sides to the same instant and press I, twice, far apart.",
+        state,
+        told,
+        replay.first,
+        int(state == "right"),
+        1,
+        off,
+    )
+
+
+def _meets(frames: range, shot: Shot) -> bool:
+    """Whether most of a shot's frames are among some."""
+    both = min(frames[-1], shot.last) - max(frames[0], shot.first) + 1
+    return both > (shot.last - shot.first + 1) / 2
+
+
+def _apart_m(one: Camera, other: Camera) -> float:
+    return float(np.linalg.norm(one.position - other.position))
+
+
+def grass_off_px(truth: Camera, found: Camera, size: ImageSize) -> float:
+    """Median distance of the visible grass from where a camera puts it, pixels; infinite where it puts none in view."""
+    xs, ys = np.linspace(0, size.width - 1, 9), np.linspace(0, size.height - 1, 7)
+    pixels: FloatArray = np.stack(np.meshgrid(xs, ys), -1).reshape(-1, 2)
+    ground = truth.on_ground(pixels)
+    inside = np.isfinite(ground).all(axis=1) & (np.abs(ground) < (52.5, 34.0)).all(axis=1)
+    if not inside.any():
+        return float("inf")
+    places = np.column_stack([ground[inside], np.zeros(int(inside.sum()))])
+    off = np.hypot(*(found.project(places) - pixels[inside]).T)
+    return float(np.median(np.where(np.isfinite(off), off, np.inf)))

@@ -1,0 +1,67 @@
+// @ts-check
+/** The practice on a recording: a film with known faults, and what is right of it by now. */
+
+import { html } from 'htm/preact';
+import { useState } from 'preact/hooks';
+
+import { getRecordingPractice, postRecordingPractice } from '../../api/practice.js';
+import { useAttempt } from '../../lib/attempt.js';
+import { useResource } from '../../lib/resource.js';
+import { loadDatasets } from '../../state/datasets.js';
+import { follow, isOver } from '../../state/jobs.js';
+import { loadSession, isTeam } from '../../state/me.js';
+import { FormError } from '../form_error.js';
+import { JobProgress } from '../job_progress.js';
+import { MARKS, WORDS } from '../lesson_card.js';
+
+/** @import {JobJson} from '../../api/jobs.js' */
+
+const NAMES = { shots: 'Shots', cameras: 'Cameras', side: 'Side', link: 'Replay' };
+
+/** @param {{onLeave: () => void}} props */
+export function RecordingPracticePart({ onLeave }) {
+	const { value, error, reload } = useResource(getRecordingPractice, []);
+	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { error: refused, attempt } = useAttempt();
+	const busy = job !== null && !isOver(job);
+	const lessons = value?.lessons ?? [];
+	const next = lessons.find(({ state }) => state !== 'right');
+	/** @param {boolean} again */
+	function begin(again) {
+		if (busy) return;
+		attempt(postRecordingPractice(again), async (begun) => {
+			const over = await follow(begun, setJob);
+			if (over.state === 'done' && isTeam) await Promise.all([loadSession(), loadDatasets()]);
+			reload();
+		});
+	}
+	/** @param {number} frame */
+	const place = (frame) => `/recordings/${value?.recording}?frame=${frame}`;
+	return html`
+		<section class="practice" aria-labelledby="practice-recording">
+			<h3 id="practice-recording">With a recording</h3>
+			<p>A made-up film of 23 seconds with four known faults: a cut is missing, a shot is called what it is not, a camera is lost, and a replay is neither on its side nor linked. You mend it as in real work; here stands, in words and numbers, what is right by now. It takes about ten minutes, and a minute to be drawn.</p>
+			${error ? html`<p role="alert">The practice on a recording could not be read.</p>` : null}
+			<p class="buttons">
+				${lessons.length === 0 ? html`<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(false)}>Make the recording</button>`
+					: html`
+						${next ? html`<a class="button" href=${place(next.frame)} onClick=${onLeave}>Go to: ${NAMES[next.name].toLowerCase()}</a>` : null}
+						<button class="button" type="button" onClick=${reload}>Compare again</button>
+						<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Start it again</button>`}
+			</p>
+			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
+			${refused ? html`<${FormError} error=${refused} />` : null}
+			${lessons.length ? html`
+				<table class="table">
+					<thead><tr><th scope="col">lesson</th><th scope="col">state</th><th scope="col">what is right</th><th scope="col">what to do</th></tr></thead>
+					<tbody>${lessons.map((lesson) => html`
+						<tr key=${lesson.name} data-state=${lesson.state}>
+							<th scope="row"><a class="link" href=${place(lesson.frame)} onClick=${onLeave}>${NAMES[lesson.name]}</a></th>
+							<td class="lesson__state"><span aria-hidden="true">${MARKS[lesson.state]}</span> ${WORDS[lesson.state]}</td>
+							<td>${lesson.feedback}</td>
+							<td>${lesson.question} <span class="note">${lesson.hint}</span></td>
+						</tr>`)}</tbody>
+				</table>` : null}
+		</section>
+	`;
+}
