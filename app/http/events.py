@@ -226,7 +226,7 @@ class Events:
 
     def open_jobs(self, dataset_id: int | None, visibility: Visibility) -> list[bytes]:
         """Jobs that are under way, for whoever begins to listen."""
-        return [_job_event(job) for job in self._jobs.under_way(dataset_id, visibility)]
+        return [_job_event(job) for job in self._jobs.open_jobs(dataset_id, visibility)]
 
     def close(self) -> None:
         """End every feed, so that the server can stop; may be called twice."""

@@ -16,9 +16,9 @@ from app.errors import BusyError
 from app.features.agreement.service import compare_left
 from app.features.exports.folder import ExportFolder
 from app.features.exports.jobs import resume_exports
-from app.features.groups.large_edit_routes import LargeEdits
-from app.features.groups.preview_routes import Previews
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.large_edit_routes import LargeGroupSolver
+from app.features.groups.preview_routes import PreviewSolver
+from app.features.groups.view_paint import PaintUpdater
 from app.features.imports.jobs import resume_imports
 from app.features.jobs.service import Jobs, Pool
 from app.features.jobs.shared import SharedJobs
@@ -80,8 +80,8 @@ class Services:
     frames: Frames
     recordings: RecordingFrames
     balls: BallFollower
-    large: LargeEdits
-    previews: Previews
+    large: LargeGroupSolver
+    previews: PreviewSolver
     predictions: PredictionReader
     exports: ExportFolder
     jobs: Jobs
@@ -94,9 +94,9 @@ class Services:
     stopping: Stopping = field(default_factory=Stopping)
 
     @property
-    def paint(self) -> PaintFollower:
+    def paint(self) -> PaintUpdater:
         """Reads the paint of edited lines again."""
-        return PaintFollower(self.frames)
+        return PaintUpdater(self.frames)
 
     @staticmethod
     def open(settings: Settings, pool: Pool = nullcontext) -> Services:
@@ -104,7 +104,7 @@ class Services:
         store = Store.open(settings)
         jobs = SharedJobs(store, pool=pool) if store.sharing.is_shared else Jobs(store, pool=pool)
         exports, frames = ExportFolder(settings.exports), Frames(settings)
-        large = LargeEdits(settings)
+        large = LargeGroupSolver(settings)
         return Services(
             settings,
             store,
@@ -112,7 +112,7 @@ class Services:
             RecordingFrames(settings),
             BallFollower(settings),
             large,
-            Previews(settings, store, PaintFollower(frames), large),
+            PreviewSolver(settings, store, PaintUpdater(frames), large),
             PredictionReader(settings),
             exports,
             jobs,

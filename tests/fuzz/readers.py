@@ -23,7 +23,13 @@ from app.db.store import Store
 from app.errors import DatasetFormatError, ReviewError
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
-from app.features.imports.sources import STATIC, Source, _groups, _static, import_source
+from app.features.imports.sources import (
+    STATIC,
+    Source,
+    _open_static_folder,
+    _read_groups,
+    import_source,
+)
 from app.features.policies.text import MAX_CHARACTERS, policy_from_yaml
 from app.features.queue.query import parse_query
 from app.finite import json_text
@@ -151,8 +157,8 @@ class Readers:
 def _groups_of(source: Source, settings: Settings) -> Iterator[Group]:
     report = Report()
     if source.format in STATIC:
-        return _static(source, report, LIMITS).groups()
-    return _groups(source, settings, report, LIMITS)
+        return _open_static_folder(source, report, LIMITS).groups()
+    return _read_groups(source, settings, report, LIMITS)
 
 
 def _use(groups: list[Group]) -> None:

@@ -28,7 +28,7 @@ from app import features
 from app.evaluation.figure import Axis, Figure, Panel, Series, figure_csv
 from app.features.findings.service import GroupFindings
 from app.features.groups.solution_schemas import SolutionDocument
-from app.features.jobs.queries import _text as job_text
+from app.features.jobs.queries import _json_column as job_text
 from app.features.solutions.codec import dumps, from_json, to_json
 from app.finite import finite, json_text
 from app.formats.export_formats import FORMATS, WriteOptions, write_format

@@ -13,7 +13,7 @@ from app.features.agreement.service import settle, submitted_annotations
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.view_paint import PaintUpdater
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.return_work import return_annotation
@@ -115,7 +115,7 @@ def decide(
     *,
     as_start: bool = False,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
 ) -> GroupState:
     """Take one of the annotations, or begin a third one from it.
 
@@ -154,7 +154,7 @@ def adopt_into_group(
     annotation: IndependentAnnotation,
     *,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
 ) -> GroupState:
     """Take an annotation and its verdict over into the group; where it waits for a decision, this is it.
 

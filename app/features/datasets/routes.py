@@ -99,7 +99,7 @@ def delete_dataset(
     """
     contents = read_contents(services.store, dataset)
     if not dry_run:
-        exports = services.jobs.every(dataset_id=contents.id, kind="export")
+        exports = services.jobs.all_ids(dataset_id=contents.id, kind="export")
         if request.confirm == contents.name:
             services.jobs.cancel_all(contents.id)
         contents = deletion.delete_dataset(

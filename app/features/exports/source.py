@@ -13,7 +13,7 @@ from app.errors import InputError
 from app.features.datasets.service import DatasetHead
 from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
 from app.features.groups.state import GroupState, VerdictState, read_states
-from app.features.groups.view_queries import ViewFileFields, named_views
+from app.features.groups.view_queries import ViewFileFields, view_file_fields
 from app.features.versions.membership import policy_settings, version_settings, version_stamp
 from app.features.versions.queries import BATCH, VersionGroup, read_rows
 from app.features.versions.service import FrozenGroup, Version, thaw, thaw_outlines
@@ -122,7 +122,7 @@ class LiveSource:
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
         for start in range(0, self.count, BATCH):
-            views = named_views(self._session, self._ids[start : start + BATCH])
+            views = view_file_fields(self._session, self._ids[start : start + BATCH])
             for _, run in groupby(views, key=lambda view: view.group_id):
                 yield _outline(list(run)), {}
 

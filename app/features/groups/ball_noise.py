@@ -14,7 +14,7 @@ from app.db.log import Entry, append, read_entries_of, single_edits
 from app.db.session import Session, now
 from app.features.datasets.queries import group_ids
 from app.features.groups.edit import CompositeEdit, Edit, SetBall, SetBalls, SetNoise, need_view
-from app.features.groups.group_edits import give_edits
+from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup
 from app.features.groups.undo_stacks import GROUP_KINDS
 from app.features.match_estimates.queries import (
@@ -28,7 +28,7 @@ from app.features.match_estimates.queries import (
 from app.soccer.group import Group, View
 
 
-def read_placed(session: Session, groups: Sequence[int]) -> dict[int, dict[str, str]]:
+def read_last_ball_actors(session: Session, groups: Sequence[int]) -> dict[int, dict[str, str]]:
     """Who placed the ball of each view last, by id of the group and key of the view.
 
     A ball that somebody accepted from predictions is not placed by them.
@@ -44,7 +44,7 @@ def read_placed(session: Session, groups: Sequence[int]) -> dict[int, dict[str, 
     return placed
 
 
-def give_factors(session: Session, dataset_id: int, factors: Factors, actor: str) -> int:
+def apply_noise_factors(session: Session, dataset_id: int, factors: Factors, actor: str) -> int:
     """Give the balls of a dataset the noise of their cameras and people; how many groups change.
 
     They are stale until they are solved again. No factors: all balls are as noisy as the dataset's.
@@ -55,20 +55,20 @@ def give_factors(session: Session, dataset_id: int, factors: Factors, actor: str
     append(session, [Entry(NOISE, actor, now(), body, dataset_id)])
     ids = group_ids(session, dataset_id)
 
-    def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:
-        placed = read_placed(session, [*some])
+    def noise_edits(some: Mapping[int, StoredGroup]) -> dict[int, SetNoise]:
+        placed = read_last_ball_actors(session, [*some])
         return {
-            number: SetNoise(_noise(stored.group, placed.get(number, {}), factors))
+            number: SetNoise(_noise_by_view(stored.group, placed.get(number, {}), factors))
             for number, stored in some.items()
         }
 
-    return give_edits(session, dataset_id, NOISE, ids, edits, actor=actor)
+    return edit_groups(session, dataset_id, NOISE, ids, noise_edits, actor=actor)
 
 
-def with_noise(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
+def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
     """The edit with the noise of who makes it, where it places a ball."""
     if isinstance(edit, CompositeEdit):
-        own = (with_noise(factors, group, one, actor) for one in edit.edits)
+        own = (add_noise_of_actor(factors, group, one, actor) for one in edit.edits)
         return CompositeEdit(tuple(own))
     if not isinstance(edit, SetBall | SetBalls):
         return edit
@@ -76,24 +76,28 @@ def with_noise(factors: Factors, group: Group, edit: Edit, actor: str) -> Edit:
     if any(ball is None or ball.predicted_by for ball in balls):
         return edit
     view = need_view(group, edit.view)
-    return replace(edit, noise=factor_of(factors, _camera(view), actor)) if factors else edit
+    return (
+        replace(edit, noise=factor_of(factors, _static_camera_key(view), actor))
+        if factors
+        else edit
+    )
 
 
-def keeping_noise(group: Group, edit: Edit) -> Edit:
+def keep_view_noise(group: Group, edit: Edit) -> Edit:
     """The edit with the noise that its view has: nobody is known to make it yet."""
     if not isinstance(edit, SetBall | SetBalls):
         return edit
     return replace(edit, noise=need_view(group, edit.view).noise)
 
 
-def _noise(group: Group, placed: Mapping[str, str], factors: Factors) -> dict[str, float]:
+def _noise_by_view(group: Group, placed: Mapping[str, str], factors: Factors) -> dict[str, float]:
     return {
-        view.key: factor_of(factors, _camera(view), placed.get(view.key))
+        view.key: factor_of(factors, _static_camera_key(view), placed.get(view.key))
         for view in group.views
         if view.ball is not None and not view.ball.predicted_by
     }
 
 
-def _camera(view: View) -> str | None:
+def _static_camera_key(view: View) -> str | None:
     """Key of a view's static camera."""
     return view.station.key if view.station.shared else None

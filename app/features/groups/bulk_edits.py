@@ -29,8 +29,8 @@ from app.features.groups.edit import Edit, SetLines
 from app.features.groups.edit_codec import REQUEST_POINTS
 from app.features.groups.queries import StoredGroup, find_views, read_groups
 from app.features.groups.state import GroupState, read_etags, require_etag
-from app.features.groups.submit import Then, checked_edit, current_etag, require_open, submit_all
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.submit import Then, combine_edits, current_etag, require_open, submit_all
+from app.features.groups.view_paint import PaintUpdater
 from app.features.solutions.service import Solve, solve_encoded
 
 MAX_ITEMS = 200
@@ -108,10 +108,10 @@ def plan_edits(
     Raises:
         TooManyPointsError: The items bring more points than a request may.
     """
-    _require_few_points(items)
+    _require_request_point_limit(items)
     with store.read() as session:
-        outcomes, _ = _plan(session, dataset_id, dict(enumerate(items)), actor)
-    return _report(outcomes, dry_run=True)
+        outcomes, _ = _plan_items(session, dataset_id, dict(enumerate(items)), actor)
+    return _make_report(outcomes, dry_run=True)
 
 
 def edit_views(
@@ -120,7 +120,7 @@ def edit_views(
     items: Sequence[ViewEdits],
     *,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
     solve: Solve = solve_encoded,
 ) -> BulkEditReport:
     """Edit the groups of many views, one after the other; one that was killed goes on.
@@ -136,24 +136,24 @@ def edit_views(
         TooManyPointsError: The items bring more points than a request may.
         StorageError: What is not in the log was not saved.
     """
-    _require_few_points(items)
+    _require_request_point_limit(items)
     with store.read() as session:
-        saved = _saved_before(session)
+        saved = _read_saved_outcomes(session)
         left = {index: item for index, item in enumerate(items) if index not in saved}
-        outcomes, groups = _plan(session, dataset_id, left, actor)
-    run = _Run({**outcomes, **saved}, saved)
+        outcomes, groups = _plan_items(session, dataset_id, left, actor)
+    run = _BulkEditRun({**outcomes, **saved}, saved)
     for group in groups:
-        then = run.ending(group, is_last=group is groups[-1])
+        then = run.transaction_ending(group, is_last=group is groups[-1])
         try:
-            state = _submit(store, group, actor, then=then, paint=paint, solve=solve)
+            state = _submit_group(store, group, actor, then=then, paint=paint, solve=solve)
         except (ConflictError, InputError, NotFoundError, OverloadedError) as error:
-            run.refuse(group, error)
+            run.mark_refused(group, error)
         else:
-            run.close(group, state)
-    return run.finish(store)
+            run.mark_saved(group, state)
+    return run.finish_report(store)
 
 
-class _Run:
+class _BulkEditRun:
     """A bulk edit while it is done, group by group.
 
     Args:
@@ -166,43 +166,45 @@ class _Run:
         self._new: dict[int, ItemOutcome] = {}
         self._last: BulkEditReport | None = None
 
-    def ending(self, group: _GroupPlan, *, is_last: bool) -> Then:
+    def transaction_ending(self, group: _GroupPlan, *, is_last: bool) -> Then:
         """What ends the transaction of a group: the response with the last, else how far it is."""
         self._new = {}
 
         def then(session: Session, state: GroupState) -> None:
-            self._new = _with_state(group, self._outcomes, state.etag)
+            self._new = _outcomes_with_etag(group, self._outcomes, state.etag)
             if is_last:
-                self._last = _report({**self._outcomes, **self._new})
+                self._last = _make_report({**self._outcomes, **self._new})
                 session.respond(self._last)
             else:
                 _save_progress(session, [*self._saved.values(), *self._new.values()])
 
         return then
 
-    def close(self, group: _GroupPlan, state: GroupState) -> None:
+    def mark_saved(self, group: _GroupPlan, state: GroupState) -> None:
         """The group is as it was asked for."""
         self._saved |= self._new
         # Where nothing is new somebody has made the same change since it was planned.
-        self._outcomes |= self._new or _with_state(group, self._outcomes, state.etag, "unchanged")
+        self._outcomes |= self._new or _outcomes_with_etag(
+            group, self._outcomes, state.etag, "unchanged"
+        )
 
-    def refuse(self, group: _GroupPlan, error: ReviewError) -> None:
+    def mark_refused(self, group: _GroupPlan, error: ReviewError) -> None:
         """The group was refused when its turn came."""
-        self._outcomes |= _refused(group, error)
+        self._outcomes |= _refused_outcomes(group, error)
         self._last = None
 
-    def finish(self, store: Store) -> BulkEditReport:
+    def finish_report(self, store: Store) -> BulkEditReport:
         """The report; where the last group was not saved, the request is answered here."""
         if self._last is not None:
             return self._last
-        report = _report(self._outcomes)
+        report = _make_report(self._outcomes)
         if self._saved:
             with store.write() as session:
                 session.respond(report)
         return report
 
 
-def _submit(store: Store, group: _GroupPlan, actor: str, **how: Any) -> GroupState:
+def _submit_group(store: Store, group: _GroupPlan, actor: str, **how: Any) -> GroupState:
     """Save the edit of a group; one that builds on any state is tried again."""
     for _ in range(TRIES - 1):
         if group.etag is not None:
@@ -216,11 +218,11 @@ def _submit(store: Store, group: _GroupPlan, actor: str, **how: Any) -> GroupSta
     return submit_all(store, group.id, group.edits, if_match=etag, actor=actor, **how)
 
 
-def _plan(
+def _plan_items(
     session: Session, dataset_id: int, items: Mapping[int, ViewEdits], actor: str
 ) -> tuple[dict[int, ItemOutcome], list[_GroupPlan]]:
     """What becomes of each item, and the groups that change, in the order of the request."""
-    outcomes, groups = _located(session, dataset_id, items)
+    outcomes, groups = _locate_items(session, dataset_id, items)
     numbers, changing = [*groups], []
     for start in range(0, len(numbers), _BATCH):
         some = numbers[start : start + _BATCH]
@@ -235,7 +237,7 @@ def _plan(
     return outcomes, changing
 
 
-def _located(
+def _locate_items(
     session: Session, dataset_id: int, items: Mapping[int, ViewEdits]
 ) -> tuple[dict[int, ItemOutcome], dict[int, _GroupPlan]]:
     """Items by their groups; those whose view the reader does not see are refused as unknown ones."""
@@ -294,7 +296,7 @@ def _plan_group(
             require_open(session, stored.dataset_id, stored.id)
             place = f"/items/{index}"
             edits = item.edits_of(keys[view])
-            after = checked_edit(stored, edits, actor).apply(group)
+            after = combine_edits(stored, edits, actor).apply(group)
         except (ConflictError, InputError, NotFoundError) as error:
             draws = isinstance(error, SharedStationError | TooManyPointsError)
             error.pointer = f"{place}/lines" if draws else place
@@ -311,30 +313,30 @@ def _plan_group(
         )
         for index, one in outcomes.items():
             if one.error is None:
-                why = _error_at(spoilt, f"/items/{index}")
+                why = _error_with_pointer(spoilt, f"/items/{index}")
                 outcomes[index] = ItemOutcome(index, "refused", stored.id, one.view, etag, why)
     return outcomes
 
 
-def _refused(group: _GroupPlan, error: ReviewError) -> dict[int, ItemOutcome]:
+def _refused_outcomes(group: _GroupPlan, error: ReviewError) -> dict[int, ItemOutcome]:
     """The items of a group that was refused when its turn came."""
     etag = error.current_etag if isinstance(error, StaleRevisionError) else None
     return {
         index: ItemOutcome(
-            index, "refused", group.id, view, etag, _error_at(error, f"/items/{index}")
+            index, "refused", group.id, view, etag, _error_with_pointer(error, f"/items/{index}")
         )
         for index, view in group.views.items()
     }
 
 
-def _error_at(error: ReviewError, pointer: str) -> ReviewError:
+def _error_with_pointer(error: ReviewError, pointer: str) -> ReviewError:
     """The same error at another place of the request."""
     found = copy(error)
     found.pointer = pointer
     return found
 
 
-def _with_state(
+def _outcomes_with_etag(
     group: _GroupPlan,
     outcomes: Mapping[int, ItemOutcome],
     etag: str,
@@ -347,7 +349,7 @@ def _with_state(
     }
 
 
-def _require_few_points(items: Sequence[ViewEdits]) -> None:
+def _require_request_point_limit(items: Sequence[ViewEdits]) -> None:
     edits = [edit for item in items for edit in item.edits_of("") if isinstance(edit, SetLines)]
     count = sum(len(points or ()) for edit in edits for points in edit.lines.values())
     if count > REQUEST_POINTS:
@@ -358,11 +360,11 @@ def _require_few_points(items: Sequence[ViewEdits]) -> None:
         )
 
 
-def _report(outcomes: Mapping[int, ItemOutcome], *, dry_run: bool = False) -> BulkEditReport:
+def _make_report(outcomes: Mapping[int, ItemOutcome], *, dry_run: bool = False) -> BulkEditReport:
     return BulkEditReport(dry_run, tuple(outcomes[index] for index in sorted(outcomes)))
 
 
-def _saved_before(session: Session) -> dict[int, ItemOutcome]:
+def _read_saved_outcomes(session: Session) -> dict[int, ItemOutcome]:
     """The items whose groups were saved before the run was killed."""
     value = read_progress(session)
     return {} if value is None else {one[0]: ItemOutcome(*one) for one in value["saved"]}

@@ -42,7 +42,7 @@ def edit_many(
     The views of one group are one edit, which is done whole or not at all and undone like any
     other. Groups do not depend on each other: the answer says of each item what came of it.
     """
-    _require_states(edit)
+    _require_etags(edit)
     store, found = services.store, dataset_id(services.store, dataset)
     if dry_run:
         plan = plan_edits(store, found, edit.edits(), actor=actor)
@@ -53,11 +53,11 @@ def edit_many(
         edit.edits(),
         actor=actor,
         paint=services.paint,
-        solve=partial(services.large.run, solve_encoded),
+        solve=partial(services.large.solve, solve_encoded),
     )
 
 
-def _require_states(edit: BulkEdit) -> None:
+def _require_etags(edit: BulkEdit) -> None:
     """Refuse items that do not name the state that they build on, as ``require_if_match`` does."""
     for index, item in enumerate(edit.items):
         pointer = f"/items/{index}/etag"

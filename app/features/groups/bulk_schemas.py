@@ -15,7 +15,7 @@ from app.features.groups.bulk_edits import (
     ViewEdits,
 )
 from app.features.groups.edit import Edit, SetBall, SetLines
-from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_of
+from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
 from app.finite import MAX_ID
 from app.http.documents import Document
 from app.http.errors import status_of
@@ -64,12 +64,12 @@ class ViewEditItem(BaseModel):
 
     def edits(self) -> ViewEdits:
         """The item as a value."""
-        return ViewEdits(self.view, self.group, self.etag, self._edits_of)
+        return ViewEdits(self.view, self.group, self.etag, self._edits_for_view)
 
-    def _edits_of(self, key: str) -> list[Edit]:
+    def _edits_for_view(self, key: str) -> list[Edit]:
         edits: list[Edit] = []
         if self.lines:
-            edits.append(SetLines(key, points_of(self.lines), tuple(self.proposed)))
+            edits.append(SetLines(key, points_by_marking(self.lines), tuple(self.proposed)))
         if "ball" in self.model_fields_set:
             edits.append(SetBall(key, None if self.ball is None else self.ball.ball()))
         return edits

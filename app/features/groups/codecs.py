@@ -129,7 +129,7 @@ def covariance_from_json(value: Sequence[float] | None) -> tuple[float, ...] | N
     return camera_covariance(value)
 
 
-def logged_camera(body: Mapping[str, Any]) -> tuple[Camera | None, tuple[float, ...] | None]:
+def camera_of_log_entry(body: Mapping[str, Any]) -> tuple[Camera | None, tuple[float, ...] | None]:
     """The camera of an entry of the log, None where it was taken away, and its covariance where the entry has
     one."""
     given = body["given"]
@@ -137,14 +137,14 @@ def logged_camera(body: Mapping[str, Any]) -> tuple[Camera | None, tuple[float, 
     return camera, covariance_from_json(body.get("covariance"))
 
 
-def given_to_json(station: Station) -> Json:
+def given_camera_to_json(station: Station) -> Json:
     """The given camera of a station, with its covariance where there is one; or None."""
     if station.given is None:
         return None
-    return {**camera_to_json(station.given), **_known_covariance(station, "covariance")}
+    return {**camera_to_json(station.given), **_covariance_entry(station, "covariance")}
 
 
-def _known_covariance(station: Station, name: str) -> dict[str, Json]:
+def _covariance_entry(station: Station, name: str) -> dict[str, Json]:
     covariance = covariance_to_json(station.given_covariance)
     return {} if covariance is None else {name: covariance}
 
@@ -182,7 +182,7 @@ def station_to_json(station: Station) -> Json:
         "given": None if station.given is None else camera_to_json(station.given),
         "calibration": station.calibration,
         "flipped": station.flipped,
-        **_known_covariance(station, "given_covariance"),
+        **_covariance_entry(station, "given_covariance"),
         **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
         **({"proposed": [*station.proposed]} if station.proposed else {}),
     }
@@ -274,7 +274,10 @@ def view_from_json(value: Mapping[str, Any], station: Station | None = None) -> 
 
 def group_to_json(group: Group) -> Json:
     """A group; each shared station is written once a view, in full, and so is what was read of paint."""
-    whole = {**group_head_to_json(group), "views": [view_to_json(view) for view in group.views]}
+    whole = {
+        **group_without_views_to_json(group),
+        "views": [view_to_json(view) for view in group.views],
+    }
     if group.paint:
         whole["paint"] = {view: reading.text for view, reading in group.paint.items()}
     return whole
@@ -314,7 +317,7 @@ def positions_from_json(value: Mapping[str, Any] | None) -> dict[str, SharedPosi
     }
 
 
-def group_head_to_json(group: Group) -> dict[str, Json]:
+def group_without_views_to_json(group: Group) -> dict[str, Json]:
     """What a group is without its views.
 
     ``positions`` and ``paint`` stand there only where there are any, so that digests of all other
@@ -343,10 +346,14 @@ def policy_from_json(value: Mapping[str, Any]) -> Policy:
     Thresholds that are not named keep their default, and those that this version does not know
     (a home that a newer one has used) say nothing to it.
     """
-    calibration = CalibrationPolicy(**_known(CalibrationPolicy, value.get("calibration", {})))
-    return Policy(**{**_known(Policy, value), "calibration": calibration})
+    calibration = CalibrationPolicy(
+        **_known_fields(CalibrationPolicy, value.get("calibration", {}))
+    )
+    return Policy(**{**_known_fields(Policy, value), "calibration": calibration})
 
 
-def _known(kind: type[Policy | CalibrationPolicy], value: Mapping[str, Any]) -> dict[str, Any]:
+def _known_fields(
+    kind: type[Policy | CalibrationPolicy], value: Mapping[str, Any]
+) -> dict[str, Any]:
     names = {item.name for item in fields(kind)}
     return {name: item for name, item in value.items() if name in names}

@@ -8,7 +8,7 @@ from app.canonical import canonical, digest_of
 from app.db.json_columns import Json
 from app.features.groups.codecs import (
     ball_to_json,
-    group_head_to_json,
+    group_without_views_to_json,
     paint_to_json,
     positions_to_json,
     station_to_json,
@@ -103,4 +103,4 @@ def source_hash(group: Group) -> str:
         view_to_json(view, view.station.key if view.station.shared else None)
         for view in group.views
     ]
-    return digest([group_head_to_json(group), views])
+    return digest([group_without_views_to_json(group), views])

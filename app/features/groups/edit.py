@@ -70,7 +70,7 @@ class SetStationLines:
         for name, points in self.lines.items():
             marking = canonical_marking(name)
             if points:
-                lines[marking] = _checked_points(marking, points)
+                lines[marking] = _validated_points(marking, points)
             else:
                 lines.pop(marking, None)
             own.discard(marking)
@@ -88,7 +88,7 @@ class SetStationLines:
 
     def inverse(self, station: Station) -> SetStationLines:
         """Each changed marking as it was before."""
-        before = _before(station.lines, self.lines)
+        before = _lines_before(station.lines, self.lines)
         proposed, unseen = (
             tuple(name for name in names if name in before)
             for names in (station.proposed, station.not_visible)
@@ -160,15 +160,15 @@ class SetLines:
     def apply(self, group: Group) -> Group:
         """The group with these markings in the view (and in others that share its station)."""
         view = need_view(group, self.view)
-        return with_station(group, view, self._of_station.apply(view.station))
+        return with_station(group, view, self._as_station_edit.apply(view.station))
 
     def inverse(self, group: Group) -> SetLines:
         """Each changed marking as it was before."""
-        before = self._of_station.inverse(need_view(group, self.view).station)
+        before = self._as_station_edit.inverse(need_view(group, self.view).station)
         return SetLines(self.view, before.lines, before.proposed, before.not_visible)
 
     @property
-    def _of_station(self) -> SetStationLines:
+    def _as_station_edit(self) -> SetStationLines:
         return SetStationLines(self.lines, self.proposed, self.not_visible)
 
 
@@ -243,13 +243,13 @@ class SetBall:
 
     def apply(self, group: Group) -> Group:
         """The group with this ball in the view."""
-        return self._all().apply(group)
+        return self._as_set_balls().apply(group)
 
     def inverse(self, group: Group) -> SetBalls:
         """The balls as they were."""
-        return self._all().inverse(group)
+        return self._as_set_balls().inverse(group)
 
-    def _all(self) -> SetBalls:
+    def _as_set_balls(self) -> SetBalls:
         return SetBalls(self.view, () if self.ball is None else (self.ball,), self.noise)
 
 
@@ -389,12 +389,12 @@ def with_station(group: Group, view: View, station: Station) -> Group:
     return group
 
 
-def _before(lines: Lines, changes: LineChanges) -> LineChanges:
+def _lines_before(lines: Lines, changes: LineChanges) -> LineChanges:
     names = map(canonical_marking, changes)
     return {name: tuple(lines[name]) if name in lines else None for name in names}
 
 
-def _checked_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[ImagePoint, ...]:
+def _validated_points(marking: str, points: tuple[ImagePoint, ...]) -> tuple[ImagePoint, ...]:
     if len(points) > MAX_POINTS:
         raise InputError(f"{marking} has more than {MAX_POINTS} points")
     for index, point in enumerate(points):

@@ -44,7 +44,7 @@ from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
 
 
-def step_to_json(edit: Edit | StationEdit, inverse: Edit | StationEdit) -> Json:
+def edit_and_inverse_to_json(edit: Edit | StationEdit, inverse: Edit | StationEdit) -> Json:
     """An edit with the one that takes it back, as entries of the log have them."""
     return {"edit": edit_to_json(edit), "inverse": edit_to_json(inverse)}
 
@@ -53,13 +53,19 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
     """An edit with its name under ``edit``."""
     match edit:
         case SetLines(view, lines, proposed, not_visible):
-            fields = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
+            fields = {
+                "lines": _lines_to_json(lines),
+                **_line_sources_to_json(proposed, not_visible),
+            }
             return {"edit": "set_lines", "view": view, **fields}
         case SetBalls(view, balls, noise):
-            fields = {"balls": [*map(ball_to_json, balls)], **_noise(noise)}
+            fields = {"balls": [*map(ball_to_json, balls)], **_noise_to_json(noise)}
             return {"edit": "set_balls", "view": view, **fields}
         case SetBall(view, ball, noise):
-            fields = {"balls": [] if ball is None else [ball_to_json(ball)], **_noise(noise)}
+            fields = {
+                "balls": [] if ball is None else [ball_to_json(ball)],
+                **_noise_to_json(noise),
+            }
             return {"edit": "set_balls", "view": view, **fields}
         case IncludeView(view, included, reason, note):
             why = {} if reason is None else {"reason": reason, "note": note}
@@ -79,7 +85,10 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
         case SetPaint(paint):
             return {"edit": "set_paint", "paint": paint_to_json(paint)}
         case SetStationLines(lines, proposed, not_visible):
-            fields = {"lines": _lines_to_json(lines), **_source(proposed, not_visible)}
+            fields = {
+                "lines": _lines_to_json(lines),
+                **_line_sources_to_json(proposed, not_visible),
+            }
             return {"edit": "set_station_lines", **fields}
         case SetStationCalibration(calibration):
             return {"edit": "set_station_calibration", "calibration": calibration}
@@ -97,7 +106,9 @@ def edit_from_json(value: Mapping[str, Any]) -> Edit:
     """Back from ``edit_to_json``, for edits of a group."""
     match value["edit"]:
         case "set_lines":
-            return SetLines(value["view"], _lines_from_json(value["lines"]), *_sources(value))
+            return SetLines(
+                value["view"], _lines_from_json(value["lines"]), *_line_sources_from_json(value)
+            )
         case "set_balls":
             balls = tuple(map(ball_from_json, value["balls"]))
             return SetBalls(value["view"], balls, float(value.get("noise", 1.0)))
@@ -123,7 +134,9 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
     """Back from ``edit_to_json``, for edits of a station."""
     match value["edit"]:
         case "set_station_lines":
-            return SetStationLines(_lines_from_json(value["lines"]), *_sources(value))
+            return SetStationLines(
+                _lines_from_json(value["lines"]), *_line_sources_from_json(value)
+            )
         case "set_station_calibration":
             return SetStationCalibration(value["calibration"])
         case "set_station_camera":
@@ -136,19 +149,19 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
     raise ValueError(f"the log holds an unknown edit: {value['edit']}")
 
 
-def _noise(noise: float) -> Json:
-    """Only where there is something to say, as of ``_source``."""
+def _noise_to_json(noise: float) -> Json:
+    """Only where there is something to say, as of ``_line_sources_to_json``."""
     return {} if noise == 1 else {"noise": float(noise)}
 
 
-def _source(proposed: tuple[str, ...], not_visible: tuple[str, ...]) -> Json:
+def _line_sources_to_json(proposed: tuple[str, ...], not_visible: tuple[str, ...]) -> Json:
     """Where lines come from, or why there are none, only where there is something to say: all other
     entries are as ever."""
     sources = dict.fromkeys(proposed, "proposed") | dict.fromkeys(not_visible, "not_visible")
     return {"source": sources} if sources else {}
 
 
-def _sources(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _line_sources_from_json(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The markings that were proposed, and those that are not visible."""
     sources = value.get("source", {})
     proposed, not_visible = (
@@ -180,7 +193,7 @@ REQUEST_POINTS = 2000
 """Of all lines that one request brings."""
 
 
-def require_few_points(view: str, lines: Lines, changes: LineChanges) -> None:
+def require_point_limits(view: str, lines: Lines, changes: LineChanges) -> None:
     """Refuse new points where a view or a marking of it would have too many.
 
     Args:
@@ -196,23 +209,25 @@ def require_few_points(view: str, lines: Lines, changes: LineChanges) -> None:
     for marking, points in changes.items():
         count = len(points or ())
         if count > max(MARKING_POINTS, counts.get(marking, 0)):
-            raise _too_many(f"{view}: {marking} has {count} points", "a marking", MARKING_POINTS)
+            raise _too_many_points_error(
+                f"{view}: {marking} has {count} points", "a marking", MARKING_POINTS
+            )
         counts[marking] = count
     after = sum(counts.values())
     if after > max(VIEW_POINTS, before):
         names = ", ".join(changes)
-        raise _too_many(
+        raise _too_many_points_error(
             f"{view}: with {names} its lines have {after} points", "a view", VIEW_POINTS
         )
 
 
-def require_few_points_in_all(group: Group, edits: Sequence[Edit]) -> None:
-    """``require_few_points`` for every edit of one request, and for the request as a whole."""
+def require_point_limits_of_edits(group: Group, edits: Sequence[Edit]) -> None:
+    """``require_point_limits`` for every edit of one request, and for the request as a whole."""
     drawn = [edit for edit in edits if isinstance(edit, SetLines)]
     for edit in drawn:
         view = group.view(edit.view)
         if view is not None:
-            require_few_points(f"view {edit.view}", view.station.lines, edit.lines)
+            require_point_limits(f"view {edit.view}", view.station.lines, edit.lines)
     counts = {
         (edit.view, marking): len(points or ())
         for edit in drawn
@@ -220,14 +235,14 @@ def require_few_points_in_all(group: Group, edits: Sequence[Edit]) -> None:
     }
     if sum(counts.values()) > REQUEST_POINTS:
         (view_key, marking), count = max(counts.items(), key=lambda item: item[1])
-        raise _too_many(
+        raise _too_many_points_error(
             f"view {view_key}: {marking} brings {count} of {sum(counts.values())} points",
             "a request",
             REQUEST_POINTS,
         )
 
 
-def _too_many(found: str, what: str, most: int) -> TooManyPointsError:
+def _too_many_points_error(found: str, what: str, most: int) -> TooManyPointsError:
     return TooManyPointsError(
         f"{found}, {what} may have {most}", hint="Leave points out: a few on each line suffice."
     )

@@ -61,13 +61,13 @@ _HEADS = (
 )
 
 
-def find_head(session: Session, group_id: int) -> Any | None:
+def find_etag_row(session: Session, group_id: int) -> Any | None:
     """Row (inputs_hash, revision, policy_hash, last, last_dismissal) of a group; ``last`` is its
     newest verdict."""
     return session.execute(_HEAD, {"group": group_id}).one_or_none()
 
 
-def read_heads(session: Session, group_ids: Sequence[int]) -> Sequence[Any]:
-    """Rows as of ``find_head`` with ``id``, the ``policy``, the ``summary`` of the solution and the
+def read_etag_rows(session: Session, group_ids: Sequence[int]) -> Sequence[Any]:
+    """Rows as of ``find_etag_row`` with ``id``, the ``policy``, the ``summary`` of the solution and the
     sum of its views' stations' revisions, ``station_revisions``."""
     return session.execute(_HEADS, {"ids": list(group_ids)}).all()

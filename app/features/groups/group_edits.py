@@ -8,7 +8,7 @@ from app.db.json_columns import Json
 from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.features.groups.edit import Edit
-from app.features.groups.edit_codec import step_to_json
+from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import next_revision, save_revision
 from app.features.queue.refresh_queries import refresh_queue
@@ -16,7 +16,7 @@ from app.features.queue.refresh_queries import refresh_queue
 _BATCH = 100
 
 
-def give_edits(
+def edit_groups(
     session: Session,
     dataset_id: int,
     kind: str,
@@ -52,7 +52,7 @@ def give_edits(
             if group == stored.group and number != always_logged:
                 continue
             save_revision(session, stored, next_revision(stored, group, at))
-            step = step_to_json(edit, edit.inverse(stored.group))
+            step = edit_and_inverse_to_json(edit, edit.inverse(stored.group))
             entries.append(Entry(kind, actor, at, {**(body or {}), **step}, dataset_id, number))
             changed.append(number)
         append(session, entries)

@@ -41,7 +41,7 @@ class ChangedView:
 
 
 @dataclass(frozen=True)
-class Step:
+class EntryChanges:
     """What an entry has changed of a group: the views that differ, and the pitch.
 
     ``first`` says that there was nothing before it.
@@ -70,7 +70,7 @@ def history(store: Store, group_id: int) -> list[LogEntry]:
         return [replace(entry, id=place) for place, entry in enumerate(entries, start=1)]
 
 
-def read_step(store: Store, group_id: int, entry_id: int) -> Step:
+def read_entry_changes(store: Store, group_id: int, entry_id: int) -> EntryChanges:
     """What one entry has changed of a group, found by saying everything again up to it.
 
     Raises:
@@ -81,22 +81,22 @@ def read_step(store: Store, group_id: int, entry_id: int) -> Step:
         if reads_blind():
             place, entries = entry_id - 1, _group_entries(session, stored)
             entry_id = entries[place].id if place < len(entries) else 0
-        snapshot = _static_cameras(stored)
+        snapshot = _snapshot_of_static_cameras(stored)
         before: Group | None = None
-        for entry in _entries(session, stored):
+        for entry in _merged_entries(session, stored):
             known = group_id in snapshot.groups
             if entry.id == entry_id:
                 before = snapshot.group(group_id) if known else None
             apply_entry(snapshot, entry)
             if entry.id == entry_id and group_id in snapshot.groups:
                 (shown,) = shown_entries(session, [entry])
-                return _step(shown, before, snapshot.group(group_id), stored.view_ids)
+                return _changes_between(shown, before, snapshot.group(group_id), stored.view_ids)
     raise NotFoundError(f"group {group_id} has no entry {entry_id}")
 
 
 def _group_entries(session: Session, stored: StoredGroup) -> list[LogEntry]:
     """The entries of a group's history."""
-    entries = list(_entries(session, stored))
+    entries = list(_merged_entries(session, stored))
     first = next(entry.id for entry in entries if entry.group_id is not None)
     return [
         entry
@@ -105,7 +105,7 @@ def _group_entries(session: Session, stored: StoredGroup) -> list[LogEntry]:
     ]
 
 
-def _entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
+def _merged_entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
     shared = [
         station_entries(session, item.id)
         for item in stored.stations.values()
@@ -114,7 +114,7 @@ def _entries(session: Session, stored: StoredGroup) -> Iterator[LogEntry]:
     return heapq.merge(group_entries(session, stored.id), *shared, key=lambda entry: entry.id)
 
 
-def _static_cameras(stored: StoredGroup) -> StateSnapshot:
+def _snapshot_of_static_cameras(stored: StoredGroup) -> StateSnapshot:
     """A state snapshot of the static cameras alone, as they are now; their own entries tell what they were."""
     snapshot = StateSnapshot()
     for item in stored.stations.values():
@@ -125,7 +125,9 @@ def _static_cameras(stored: StoredGroup) -> StateSnapshot:
     return snapshot
 
 
-def _step(entry: LogEntry, before: Group | None, after: Group, view_ids: Mapping[str, int]) -> Step:
+def _changes_between(
+    entry: LogEntry, before: Group | None, after: Group, view_ids: Mapping[str, int]
+) -> EntryChanges:
     old = {} if before is None else {view.key: view for view in before.views}
     new = {view.key: view for view in after.views}
     keys = list(dict.fromkeys([*new, *old]))
@@ -135,4 +137,4 @@ def _step(entry: LogEntry, before: Group | None, after: Group, view_ids: Mapping
         if old.get(key) != new.get(key)
     )
     pitch = None if before is None else before.pitch
-    return Step(entry, changed, pitch, after.pitch, before is None)
+    return EntryChanges(entry, changed, pitch, after.pitch, before is None)

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.groups.history import ChangedView, Step
+from app.features.groups.history import ChangedView, EntryChanges
 from app.features.groups.schemas import (
     Ball,
     BallEdit,
@@ -79,7 +79,7 @@ class StepDocument(Document):
     pitch_after: PitchSize
 
     @classmethod
-    def of(cls, step: Step) -> Self:
+    def of(cls, step: EntryChanges) -> Self:
         """The document of a step."""
         old = step.pitch_before
         return cls(

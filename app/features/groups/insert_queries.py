@@ -22,7 +22,7 @@ from app.soccer.group import Group, Station, View
 
 def station_values(station: Station) -> dict[str, Any]:
     """Columns of a station that follow from its value."""
-    given = codecs.given_to_json(station)
+    given = codecs.given_camera_to_json(station)
     return {
         "key": station.key,
         "shared": station.shared,
@@ -59,18 +59,18 @@ def view_values(view: View, position: int) -> dict[str, Any]:
     }
 
 
-def paint_text(paint: Mapping[str, str]) -> str | None:
+def paint_column(paint: Mapping[str, str]) -> str | None:
     """The column of what was read of a group's pictures, by digest; None where nothing was."""
     return canonical(dict(paint)) if paint else None
 
 
-def positions_text(group: Group) -> str | None:
+def positions_column(group: Group) -> str | None:
     """The column of a group's shared positions; None where it has none."""
     shared = codecs.positions_to_json(group.positions)
     return canonical(shared) if shared else None
 
 
-def head_values(
+def group_values(
     group: Group,
     paint: Mapping[str, str] | None = None,
     views: Iterable[tuple[str, str]] | None = None,
@@ -90,8 +90,8 @@ def head_values(
         "label": group.label,
         "pitch_length": group.pitch.length,
         "pitch_width": group.pitch.width,
-        "positions": positions_text(group),
-        "paint": paint_text(read),
+        "positions": positions_column(group),
+        "paint": paint_column(read),
         "inputs_hash": group_inputs_hash(group, read, views),
     }
 
@@ -101,11 +101,11 @@ def next_id(session: Session, model: Any) -> int:
 
     Ids of deleted datasets are not given again: the log still speaks of what had them.
     """
-    return int(session.scalar(_last_id(model)) or 0) + 1
+    return int(session.scalar(_last_id_statement(model)) or 0) + 1
 
 
 @cache
-def _last_id(model: Any) -> Select[Any]:
+def _last_id_statement(model: Any) -> Select[Any]:
     table, used_id = model.__table__, UsedIdModel.__table__
     newest = select(func.coalesce(func.max(table.c.id), 0)).scalar_subquery()
     used = select(used_id.c.id).where(used_id.c.table == table.name)
@@ -155,7 +155,7 @@ class NewRows:
             digests = [(view["digest"], station["digest"]) for view, station in own]
         self.groups.append(
             {
-                **head_values(group, views=digests),
+                **group_values(group, views=digests),
                 "id": identity,
                 "dataset_id": self.dataset_id,
                 "number": self._number + len(self.groups) + 1,

@@ -29,7 +29,7 @@ LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=120.0)
 NICENESS = 5
 
 
-class LargeEdits:
+class LargeGroupSolver:
     """Has large groups solved.
 
     Args:
@@ -39,10 +39,12 @@ class LargeEdits:
     def __init__(self, settings: Settings):
         apart = settings.solves_apart
         self.workers = (
-            [ReadyWorker("large", LIMITS, _process_ended, prepare_process)] if apart else []
+            [ReadyWorker("large", LIMITS, _process_ended_error, prepare_solver_process)]
+            if apart
+            else []
         )
 
-    def run(
+    def solve(
         self,
         work: Callable[[Group, Policy, Mapping[str, Calibration]], Solved],
         group: Group,
@@ -73,7 +75,7 @@ class LargeEdits:
             worker.close()
 
 
-def prepare_process() -> None:
+def prepare_solver_process() -> None:
     """In the process: give way to others, and load the solver's kernels."""
     os.nice(NICENESS)
     warm_up()
@@ -81,5 +83,5 @@ def prepare_process() -> None:
     gc.freeze()
 
 
-def _process_ended(error: WorkerEnded) -> OverloadedError:
+def _process_ended_error(error: WorkerEnded) -> OverloadedError:
     return OverloadedError(f"solving this {error}", hint="Nothing was saved. Try it again.")

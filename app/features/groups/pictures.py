@@ -71,7 +71,7 @@ class PaintTask:
         return self.group.views[0]
 
     @property
-    def fitting(self) -> PaintReading | None:
+    def reusable_reading(self) -> PaintReading | None:
         """What was read before, where it was for the same clicks beside the same people, and as
         it is read today."""
         old = self.old
@@ -82,12 +82,14 @@ class PaintTask:
         return old if old.evidence.version == EXTRACTOR_VERSION else None
 
     @property
-    def is_old(self) -> bool:
+    def is_outdated(self) -> bool:
         """Whether something was read that is to be read again."""
-        return self.old is not None and self.old.reason != NO_FRAME and self.fitting is None
+        return (
+            self.old is not None and self.old.reason != NO_FRAME and self.reusable_reading is None
+        )
 
     @property
-    def without_frame(self) -> PaintReading:
+    def reading_without_frame(self) -> PaintReading:
         """What is kept where no picture can be read."""
         return PaintReading("", self.sought_for, NOTHING, NO_FRAME)
 
@@ -100,7 +102,7 @@ def people_digest(view: View) -> str:
     return digest(sorted([box.x, box.y, box.width, box.height] for box in boxes))
 
 
-def outdated_beside_others(
+def mark_outdated_beside_other_people(
     group: Group, readings: Mapping[str, PaintReading]
 ) -> dict[str, PaintReading]:
     """Readings as they are given to a group: of those that were made beside other people than its
@@ -115,7 +117,7 @@ def outdated_beside_others(
     return given
 
 
-def outdated_where_people_moved(old: Group, new: Group) -> dict[str, PaintReading]:
+def mark_outdated_where_people_moved(old: Group, new: Group) -> dict[str, PaintReading]:
     """The readings of a group after others hide paint in some of its views.
 
     Those say nothing of any clicks any more: solving goes without them and names the mending.
@@ -136,28 +138,28 @@ def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
     A picture that was read for the same clicks before is not decoded again. Where it is missing,
     what was read of it stays.
     """
-    fitting, media = task.fitting, task.view.media
+    reusable, media = task.reusable_reading, task.view.media
     if media is None:
-        return fitting
+        return reusable
     try:
-        known = "" if fitting is None else fitting.frame
+        known = "" if reusable is None else reusable.frame
         frame, image = read_pixels(media, task.view.station.flipped, settings, known)
     except NotFoundError:
-        return fitting or task.without_frame
+        return reusable or task.reading_without_frame
     except (ImageError, StorageError, TooLargeError):
-        return task.without_frame
+        return task.reading_without_frame
     if image is None:
-        return fitting
-    return _read(task, frame, image)
+        return reusable
+    return _read_paint_of_image(task, frame, image)
 
 
-def _read(task: PaintTask, frame: str, image: Image) -> PaintReading | None:
+def _read_paint_of_image(task: PaintTask, frame: str, image: Image) -> PaintReading | None:
     size, policy = task.view.size, task.policy
     clicked = task.clicked or calibrate_clicks(task.group, task.view, policy)
     if clicked.camera is None:
         return None
     if why_unreadable(image, size) is not None:
-        return replace(task.without_frame, frame=frame)
+        return replace(task.reading_without_frame, frame=frame)
     seen = paint_of(image, size, clicked, task.group.pitch, policy, task.view.extras.places)
     reason = NO_PAINT if seen.outcome == "nothing" else seen.reason
     evidence = seen.evidence if reason is None else NOTHING
@@ -202,7 +204,7 @@ class ProposalTask:
     beside: str = ""
 
     @property
-    def fitting_frame(self) -> str:
+    def reusable_frame_digest(self) -> str:
         """Digest of the picture of which nothing else would be said now; empty: there is none.
 
         What was proposed stays as it was seen. Where nothing could be, more is perhaps known of
@@ -214,11 +216,11 @@ class ProposalTask:
         is_usable = old.outcome == "proposed" or old.sought_with == self.sought_with
         return old.frame if is_usable else ""
 
-    def without_picture(self, sentence: str) -> Proposal:
+    def proposal_without_picture(self, sentence: str) -> Proposal:
         """What is kept where no picture can be read."""
-        return self.kept(ViewProposal("nothing", sentence, {}), "")
+        return self.proposal_to_keep(ViewProposal("nothing", sentence, {}), "")
 
-    def kept(self, found: ViewProposal, frame: str) -> Proposal:
+    def proposal_to_keep(self, found: ViewProposal, frame: str) -> Proposal:
         """What is kept of an answer for the picture with this digest."""
         return Proposal(
             view_id=self.view_id,
@@ -232,17 +234,19 @@ class ProposalTask:
 
 def read_proposal(task: ProposalTask, settings: Settings) -> Proposal | None:
     """What is to be kept for a view; None where what was proposed before still stands."""
-    known = task.fitting_frame
+    known = task.reusable_frame_digest
     try:
         digest, image = read_pixels(task.media, task.flipped, settings, known)
     except NotFoundError:
-        return task.without_picture(MISSING)
+        return task.proposal_without_picture(MISSING)
     except (ImageError, StorageError, TooLargeError):
-        return task.without_picture(UNREADABLE)
+        return task.proposal_without_picture(UNREADABLE)
     if image is None:
         return None
     found = proposal_of(image, task.size, task.known, task.pitch, task.policy)
-    return task.kept(beside_drawn(found, task.drawn, task.pitch, task.size, task.policy), digest)
+    return task.proposal_to_keep(
+        beside_drawn(found, task.drawn, task.pitch, task.size, task.policy), digest
+    )
 
 
 class PictureTask:
@@ -255,7 +259,7 @@ class PictureTask:
     """
 
     def __init__(self, pool: WorkerPool, work: Callable[..., Any], *arguments: Any):
-        self._ask = partial(pool.submit, work, *arguments, explain=_explained, bounded=False)
+        self._ask = partial(pool.submit, work, *arguments, explain=_picture_error, bounded=False)
         self._task = self._ask()
 
     def result(self) -> Any:
@@ -271,5 +275,5 @@ class PictureTask:
             return self._ask().future.result()
 
 
-def _explained(error: WorkerEnded) -> ReviewError:
+def _picture_error(error: WorkerEnded) -> ReviewError:
     return refused_picture("the picture", error)

@@ -14,11 +14,11 @@ from app.db.store import Store
 from app.errors import InputError, OverloadedError
 from app.features.groups.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
 from app.features.groups.history_schemas import PreviewDocument, PreviewRequest, ViewPreview
-from app.features.groups.large_edit_routes import LargeEdits
-from app.features.groups.schemas import points_of
+from app.features.groups.large_edit_routes import LargeGroupSolver
+from app.features.groups.schemas import points_by_marking
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, preview
-from app.features.groups.view_paint import PaintFollower, WithoutPictures
+from app.features.groups.view_paint import PaintUpdater, WithoutPictures
 from app.http.request_limits import PREVIEWS, is_large
 from app.log import log_to_stderr
 from app.soccer.group import Group
@@ -49,7 +49,7 @@ def preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
 def _view_edits(key: str, change: ViewPreview) -> list[Edit]:
     edits: list[Edit] = []
     if change.lines:
-        edits.append(SetLines(key, points_of(change.lines)))
+        edits.append(SetLines(key, points_by_marking(change.lines)))
     if "ball" in change.model_fields_set:
         edits.append(SetBall(key, None if change.ball is None else change.ball.ball()))
     if change.included is not None:
@@ -66,7 +66,7 @@ _stores: dict[str, Store] = {}
 """In the process of previews: the database, once it was opened."""
 
 
-class Previews:
+class PreviewSolver:
     """Solves what-ifs of single groups; nothing is saved.
 
     Args:
@@ -76,15 +76,19 @@ class Previews:
         large: Solves large ones, for one of them would keep drags waiting.
     """
 
-    def __init__(self, settings: Settings, store: Store, paint: PaintFollower, large: LargeEdits):
+    def __init__(
+        self, settings: Settings, store: Store, paint: PaintUpdater, large: LargeGroupSolver
+    ):
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
         places = PREVIEWS.apart if settings.solves_apart else None
         self.workers = [
-            ReadyWorker("previews", LIMITS, _process_ended, make_ready, settings)
+            ReadyWorker("previews", LIMITS, _process_ended_error, prepare_preview_process, settings)
             for _ in range(places or 0)
         ]
 
-    async def answer(self, request: Request, group_id: int, changes: PreviewRequest) -> bytes:
+    async def preview_document(
+        self, request: Request, group_id: int, changes: PreviewRequest
+    ) -> bytes:
         """The document of a what-if; empty where nobody waits for it any more.
 
         Raises:
@@ -96,15 +100,17 @@ class Previews:
         large = is_large(request.scope)
         worker = least_busy(self._large.workers if large else self.workers)
         if worker is not None:
-            task = worker.submit(solve_apart, self._settings, group_id, changes)
+            task = worker.submit(solve_preview_in_process, self._settings, group_id, changes)
             found: bytes | None = await task.result_unless_client_gone(request.is_disconnected)
             if found is not None:
                 return found
             if await request.is_disconnected():
                 return b""
         # It reads pictures, or there is no process: the solving alone may be done elsewhere.
-        solver: Solver = partial(self._large.run, solve) if large else solve
-        return await run_in_threadpool(_solve, self._store, group_id, changes, self._paint, solver)
+        solver: Solver = partial(self._large.solve, solve) if large else solve
+        return await run_in_threadpool(
+            _solve_preview, self._store, group_id, changes, self._paint, solver
+        )
 
     def close(self) -> None:
         """End the processes."""
@@ -112,34 +118,36 @@ class Previews:
             worker.close()
 
 
-def make_ready(settings: Settings) -> None:
+def prepare_preview_process(settings: Settings) -> None:
     """In the process: open the database and load the solver's kernels."""
     log_to_stderr(settings.log_format)
-    _opened(settings)
+    _store_of_process(settings)
     warm_up()
     gc.collect()
     gc.freeze()
 
 
-def solve_apart(settings: Settings, group_id: int, changes: PreviewRequest) -> bytes | None:
-    """In the process: ``_solve``; None where pictures would have to be read."""
+def solve_preview_in_process(
+    settings: Settings, group_id: int, changes: PreviewRequest
+) -> bytes | None:
+    """In the process: ``_solve_preview``; None where pictures would have to be read."""
     without = WithoutPictures()
-    found = _solve(_opened(settings), group_id, changes, without)
+    found = _solve_preview(_store_of_process(settings), group_id, changes, without)
     return None if without.missed else found
 
 
-def _opened(settings: Settings) -> Store:
+def _store_of_process(settings: Settings) -> Store:
     key = settings.model_dump_json()
     if key not in _stores:
         _stores[key] = Store.open(settings)
     return _stores[key]
 
 
-def _solve(
+def _solve_preview(
     store: Store,
     group_id: int,
     changes: PreviewRequest,
-    paint: PaintFollower,
+    paint: PaintUpdater,
     solve: Solver = solve,
 ) -> bytes:
     def edits(found: Group) -> Sequence[Edit]:
@@ -150,5 +158,5 @@ def _solve(
     return document.model_dump_json().encode()
 
 
-def _process_ended(error: WorkerEnded) -> OverloadedError:
+def _process_ended_error(error: WorkerEnded) -> OverloadedError:
     return OverloadedError(f"this preview {error}", hint="Nothing was changed. Try it again.")

@@ -65,13 +65,13 @@ def all_unassigned(session: Session) -> Iterator[Any]:
     return iter(session.execute(select(*UnassignedFrameModel.__table__.columns)))
 
 
-def all_noticed(session: Session) -> Iterator[Any]:
+def all_import_findings(session: Session) -> Iterator[Any]:
     """The row of everything that imports noticed; what was computed or seen of pictures is not among it."""
     statement = select(*ImportFindingModel.__table__.columns)
     return iter(session.execute(statement.where(ImportFindingModel.kind.not_in(SEEN))))
 
 
-def rewrite(
+def replace_all_rows(
     session: Session, *, stations: Rows, groups: Rows, views: Rows, noticed: Rows, unassigned: Rows
 ) -> None:
     """Put rows in the place of all stations, groups, views and what hangs on them.
@@ -81,7 +81,7 @@ def rewrite(
     """
     # Solutions and verdicts refer to groups, which are gone for a moment.
     session.execute(DeferReferences())
-    with _keeping_view_rows(session):
+    with _preserve_view_rows(session):
         for model in (QueueModel, ImportFindingModel, UnassignedFrameModel, ViewModel):
             session.execute(delete(model))
         session.execute(delete(GroupModel))
@@ -98,7 +98,7 @@ def rewrite(
 
 
 @contextmanager
-def _keeping_view_rows(session: Session) -> Iterator[None]:
+def _preserve_view_rows(session: Session) -> Iterator[None]:
     """What goes with its view and is in no log comes back after this, where its view did."""
     for table in _tables_of_views():
         session.execute(text(f"CREATE TEMP TABLE kept_{table} AS SELECT * FROM {table}"))

@@ -78,20 +78,20 @@ class StoredGroup:
         return key in self.edited_views or (not own.station.shared and own.edited)
 
 
-def _row_of(table: FromClause) -> Any:
+def _row_type(table: FromClause) -> Any:
     """A row of one table, cut out of a row of several."""
     return namedtuple("Row", table.columns.keys())
 
 
 _GROUP, _VIEW, _STATION = GroupModel.__table__, ViewModel.__table__, StationModel.__table__
 _DATASET = DatasetModel.__table__
-_ViewRow, _StationRow = _row_of(_VIEW), _row_of(_STATION)
+_ViewRow, _StationRow = _row_type(_VIEW), _row_type(_STATION)
 _STATION_START = -len(_STATION.columns)
 _VIEW_START = _STATION_START - len(_VIEW.columns)
 _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
 
 
-def _whole(*columns: Any) -> Any:
+def _group_statement(*columns: Any) -> Any:
     """Groups with these columns of their views: a row a view, or one without any."""
     head = (
         *_GROUP.columns,
@@ -110,8 +110,8 @@ def _whole(*columns: Any) -> Any:
 
 
 _OF_VIEW = select(_VIEW.c.group_id).where(_VIEW.c.id == bindparam("view"))
-_WHOLE = _whole(*_VIEW.columns)
-_WITHOUT_EXTRAS = _whole(*(null() if c.name == "extras" else c for c in _VIEW.columns))
+_WHOLE = _group_statement(*_VIEW.columns)
+_WITHOUT_EXTRAS = _group_statement(*(null() if c.name == "extras" else c for c in _VIEW.columns))
 
 
 def read_groups(
@@ -189,8 +189,8 @@ def _stored_group(
         pitch=Pitch(head.pitch_length, head.pitch_width),
         split=head.split,
         label=head.label,
-        positions=positions_of(head.positions),
-        paint={} if head.paint is None else _paint(head.paint, readings),
+        positions=positions_from_text(head.positions),
+        paint={} if head.paint is None else _paint_from_text(head.paint, readings),
     )
     return StoredGroup(
         id=head.id,
@@ -218,21 +218,21 @@ def _view_from_row(row: Any, station: Station) -> View:
     return View(
         key=row.key,
         station=station,
-        balls=_balls(row.balls),
+        balls=_balls_from_text(row.balls),
         media=media,
         included=row.included,
-        extras=Extras() if extras is None else _extras(extras),
-        left_out=None if why is None else _left_out(why),
+        extras=Extras() if extras is None else _extras_from_bytes(extras),
+        left_out=None if why is None else _left_out_from_text(why),
         noise=1.0 if row.noise is None else row.noise,
     )
 
 
-def _paint(text: str, readings: Mapping[str, PaintReading]) -> dict[str, PaintReading]:
+def _paint_from_text(text: str, readings: Mapping[str, PaintReading]) -> dict[str, PaintReading]:
     with as_written():
         return {view: readings[digest] for view, digest in paint_digests(text).items()}
 
 
-def positions_of(text: str | None) -> dict[str, SharedPosition]:
+def positions_from_text(text: str | None) -> dict[str, SharedPosition]:
     """Shared positions of a group from its column, by the views' keys."""
     if text is None:
         return {}
@@ -240,20 +240,20 @@ def positions_of(text: str | None) -> dict[str, SharedPosition]:
         return codecs.positions_from_json(parse(text))
 
 
-def _left_out(text: str) -> LeftOut | None:
+def _left_out_from_text(text: str) -> LeftOut | None:
     with as_written():
         return codecs.left_out_from_json(parse(text))
 
 
 # Most requests ask for what the one before asked for.
 @lru_cache(maxsize=1024)
-def _balls(text: str) -> tuple[BallAnnotation, ...]:
+def _balls_from_text(text: str) -> tuple[BallAnnotation, ...]:
     with as_written():
         return tuple(map(codecs.ball_from_json, parse(text)))
 
 
 @lru_cache(maxsize=256)
-def _extras(data: bytes) -> Extras:
+def _extras_from_bytes(data: bytes) -> Extras:
     with as_written():
         return codecs.extras_from_json(unpack(data))
 
@@ -299,7 +299,7 @@ def sorted_unassigned_rows(session: Session, dataset_id: int) -> Iterator[Stored
         yield StoredUnassignedFrame(row.camera, row.frame, row.extras)
 
 
-def known_unassigned(
+def unassigned_extras(
     session: Session, dataset_id: int, frames: Collection[str]
 ) -> dict[tuple[str, str], bytes]:
     """Extras of the unassigned frames of these names, by camera and frame."""
@@ -310,7 +310,7 @@ def known_unassigned(
     return {(row.camera, row.frame): row.extras for row in session.execute(statement)}
 
 
-def put_unassigned(
+def upsert_unassigned(
     session: Session, dataset_id: int, bodies: Mapping[tuple[str, str], bytes]
 ) -> None:
     """Insert unassigned frames, or replace what is known of them."""

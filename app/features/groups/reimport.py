@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from app.db.log import Entry, append, station_entries
 from app.db.session import Session, now
 from app.features.findings.queries import replace_station_finding, station_finding
-from app.features.groups.codecs import logged_camera, station_from_json, station_to_json
+from app.features.groups.codecs import camera_of_log_entry, station_from_json, station_to_json
 from app.features.groups.digest import station_digest, view_digest
 from app.features.groups.insert_queries import NewRows
 from app.features.groups.queries import StoredGroup
@@ -50,7 +50,7 @@ class MergedStation:
     kept: KeptEdit | None
 
 
-def follow_group(stored: StoredGroup, incoming: Group) -> MergedGroup:
+def update_group_from_dataset(stored: StoredGroup, incoming: Group) -> MergedGroup:
     """The stored group brought up to the incoming one, but for what a person edited.
 
     Shared stations are the incoming group's own; they are followed once, elsewhere.
@@ -59,7 +59,7 @@ def follow_group(stored: StoredGroup, incoming: Group) -> MergedGroup:
     bases: list[View] = []
     kept: list[KeptEdit] = []
     for view in incoming.views:
-        result, base, noticed = _follow_view(stored, view)
+        result, base, noticed = _update_view_from_dataset(stored, view)
         views.append(result)
         bases.append(base)
         kept.extend(noticed)
@@ -74,7 +74,7 @@ def follow_group(stored: StoredGroup, incoming: Group) -> MergedGroup:
     )
 
 
-def follow_station(
+def update_station_from_dataset(
     stored: StoredStation,
     incoming: Station,
     source: Station | None = None,
@@ -116,7 +116,7 @@ def follow_station(
     return MergedStation(station, incoming, kept)
 
 
-def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[KeptEdit]]:
+def _update_view_from_dataset(stored: StoredGroup, view: View) -> tuple[View, View, list[KeptEdit]]:
     old = stored.group.view(view.key)
     if old is None or not keeps_station(stored, view):
         return view, view, []
@@ -137,7 +137,7 @@ def _follow_view(stored: StoredGroup, view: View) -> tuple[View, View, list[Kept
         # How noisy they are is no word of the dataset's.
         result = replace(result, noise=old.noise)
     if not view.station.shared:
-        followed = follow_station(stored.stations[view.key], view.station)
+        followed = update_station_from_dataset(stored.stations[view.key], view.station)
         result = replace(result, station=followed.station)
         base = replace(base, station=followed.base)
         if followed.kept is not None:
@@ -173,28 +173,30 @@ class SharedStations:
             self._stored[stored.station.key] = stored
             self.ids[stored.station.key] = stored.id
 
-    def follow(self, stations: Iterable[Station]) -> None:
+    def insert_or_update(self, stations: Iterable[Station]) -> None:
         """Insert the shared ones among stations, or bring them up to what they are now."""
         for station in stations:
             if not station.shared or self._seen.get(station.key) is station:
                 continue
             if station.key not in self._seen:
-                self._follow(station)
+                self._insert_or_update_one(station)
             self._seen[station.key] = station
 
-    def _follow(self, incoming: Station) -> None:
+    def _insert_or_update_one(self, incoming: Station) -> None:
         stored = self._stored.get(incoming.key)
         if stored is None:
-            self._insert(incoming)
+            self._insert_station(incoming)
             return
-        source = self._source_of(stored)
-        followed = follow_station(stored, incoming, source, lines_left=self._lines_left)
+        source = self._dataset_version_of(stored)
+        followed = update_station_from_dataset(
+            stored, incoming, source, lines_left=self._lines_left
+        )
         changed = followed.station != stored.station
         if changed or station_digest(followed.base) != stored.source_digest:
-            self._save(stored, followed)
+            self._save_station(stored, followed)
             self.changed.append(incoming.key)
 
-    def _source_of(self, stored: StoredStation) -> Station | None:
+    def _dataset_version_of(self, stored: StoredStation) -> Station | None:
         """A station as its dataset last brought it; under an edit only the log remembers."""
         if not stored.edited:
             return stored.station
@@ -203,20 +205,20 @@ class SharedStations:
             if entry.kind == "station":
                 station = station_from_json(entry.body["base"] or entry.body["station"])
             elif entry.kind == "camera" and station is not None:
-                station = station.with_given(*logged_camera(entry.body))
+                station = station.with_given(*camera_of_log_entry(entry.body))
             if station is not None and station_digest(station) == stored.source_digest:
                 found = station
         return found
 
-    def _insert(self, station: Station) -> None:
+    def _insert_station(self, station: Station) -> None:
         rows = NewRows(self._session, self._dataset_id)
         self.ids[station.key] = rows.add_station(station)
         rows.insert()
-        self._log(self.ids[station.key], MergedStation(station, station, None), None)
+        self._log_station(self.ids[station.key], MergedStation(station, station, None), None)
 
-    def _save(self, stored: StoredStation, followed: MergedStation) -> None:
+    def _save_station(self, stored: StoredStation, followed: MergedStation) -> None:
         save_station(self._session, stored, followed.station, source=followed.base)
-        self._log(stored.id, followed, self._save_finding(stored.id, followed))
+        self._log_station(stored.id, followed, self._save_finding(stored.id, followed))
         groups = groups_of_station(self._session, stored.id)
         refresh_inputs_hashes(self._session, groups)
         refresh_queue(self._session, groups)
@@ -233,7 +235,7 @@ class SharedStations:
         replace_station_finding(self._session, station_id, KIND, sentence)
         return sentence
 
-    def _log(self, station_id: int, followed: MergedStation, kept: str | None) -> None:
+    def _log_station(self, station_id: int, followed: MergedStation, kept: str | None) -> None:
         same = followed.base == followed.station
         body = {
             "source": self._source,

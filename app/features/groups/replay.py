@@ -13,8 +13,8 @@ from app.db.session import Session
 from app.db.store import Store
 from app.features.findings.queries import DISMISSAL
 from app.features.groups.codecs import (
+    camera_of_log_entry,
     extras_from_json,
-    logged_camera,
     policy_from_json,
     positions_from_json,
     station_from_json,
@@ -22,8 +22,8 @@ from app.features.groups.codecs import (
 )
 from app.features.groups.digest import station_digest, view_digest
 from app.features.groups.edit_codec import edit_from_json, station_edit_from_json
-from app.features.groups.insert_queries import head_values, station_values, view_values
-from app.features.groups.projection_queries import rewrite
+from app.features.groups.insert_queries import group_values, station_values, view_values
+from app.features.groups.projection_queries import replace_all_rows
 from app.features.groups.reimport import KIND
 from app.features.groups.state_snapshot import (
     GroupRecord,
@@ -59,7 +59,7 @@ def replay(session: Session) -> StateSnapshot:
 def apply_entry(snapshot: StateSnapshot, entry: LogEntry, number: int = 0) -> None:
     """Bring one entry of the log into the state snapshot; ``number`` is that of a group that is new."""
     if entry.kind == "import" and entry.group_id not in snapshot.groups:
-        _new_group(snapshot, entry, number)
+        _replay_new_group(snapshot, entry, number)
     else:
         _STEPS[entry.kind](snapshot, entry)
 
@@ -72,24 +72,24 @@ def rebuild(store: Store) -> int:
     """
     with store.write() as session:
         snapshot = replay(session)
-        rewrite(session, **_rows(snapshot))
+        replace_all_rows(session, **_rows_by_table(snapshot))
         refresh_queue(session, list(snapshot.groups))
     return len(snapshot.groups)
 
 
-def _dataset(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_dataset(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.dataset_id is not None
     policy = policy_from_json(entry.body["policy"])
     snapshot.datasets[entry.dataset_id] = (entry.body["name"], policy)
 
 
-def _policy(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_policy(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.dataset_id is not None
     name, _ = snapshot.datasets[entry.dataset_id]
     snapshot.datasets[entry.dataset_id] = (name, policy_from_json(entry.body["policy"]))
 
 
-def _station(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_station(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None and entry.dataset_id is not None
     station, base = entry.body["station"], entry.body["base"]
     _save_station(
@@ -115,15 +115,15 @@ def _save_station(
     snapshot.stations[station_id] = StationRecord(dataset_id, station, revision, digest)
 
 
-def _new_group(snapshot: StateSnapshot, entry: LogEntry, number: int) -> None:
+def _replay_new_group(snapshot: StateSnapshot, entry: LogEntry, number: int) -> None:
     assert entry.group_id is not None and entry.dataset_id is not None
     snapshot.groups[entry.group_id] = GroupRecord(
         entry.dataset_id, number, 0, "", "", Group("", ()), []
     )
-    _import(snapshot, entry)
+    _replay_import(snapshot, entry)
 
 
-def _import(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_import(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
     record, body = snapshot.groups[entry.group_id], entry.body
     base = {view["key"]: view for view in (body["base"] or body["group"])["views"]}
@@ -132,18 +132,21 @@ def _import(snapshot: StateSnapshot, entry: LogEntry) -> None:
     for value in body["group"]["views"]:
         view_id, station_id = body["ids"][value["key"]]
         gone.discard(station_id)
-        item = _import_view(snapshot, record, value, base[value["key"]], station_id)
+        item = _replay_imported_view(snapshot, record, value, base[value["key"]], station_id)
         record.views.append(replace(item, id=view_id))
     for station_id in gone:
         if not snapshot.stations[station_id].station.shared:
             del snapshot.stations[station_id]
-    record.head, record.paint = _head(body["group"]), dict(body["group"].get("paint", {}))
+    record.head, record.paint = (
+        _group_without_views(body["group"]),
+        dict(body["group"].get("paint", {})),
+    )
     record.source_hash = body["source_hash"]
     record.revision, record.changed = record.revision + 1, entry.at
     _replay_noticed(snapshot, entry.group_id, None, body.get("kept", []))
 
 
-def _import_view(
+def _replay_imported_view(
     snapshot: StateSnapshot,
     record: GroupRecord,
     value: Mapping[str, Any],
@@ -159,7 +162,7 @@ def _import_view(
     return ViewRecord(0, station_id, without_station(view_from_json(value, station)), source_digest)
 
 
-def _head(value: Mapping[str, Any]) -> Group:
+def _group_without_views(value: Mapping[str, Any]) -> Group:
     return Group(
         key=value["key"],
         views=(),
@@ -171,7 +174,7 @@ def _head(value: Mapping[str, Any]) -> Group:
     )
 
 
-def _edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
     record, group = snapshot.groups[entry.group_id], snapshot.group(entry.group_id)
     changed = edit_from_json(entry.body["edit"]).apply(group)
@@ -183,31 +186,31 @@ def _edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
     record.revision, record.changed = record.revision + 1, entry.at
 
 
-def _noise(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_noise(snapshot: StateSnapshot, entry: LogEntry) -> None:
     # What is accepted for a dataset changes none of its groups by itself.
     if entry.group_id is not None:
-        _edit(snapshot, entry)
+        _replay_edit(snapshot, entry)
 
 
-def _paint(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_paint(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
     record = snapshot.groups[entry.group_id]
     record.paint = dict(entry.body["edit"]["paint"])
     record.revision, record.changed = record.revision + 1, entry.at
 
 
-def _station_edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_station_edit(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None
     record = snapshot.stations[entry.station_id]
     station = station_edit_from_json(entry.body["edit"]).apply(record.station)
     _save_station(snapshot, record.dataset_id, entry.station_id, station, None)
 
 
-def _camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None
     record = snapshot.stations[entry.station_id]
     edited = station_digest(record.station) != record.source_digest
-    station = record.station.with_given(*logged_camera(entry.body))
+    station = record.station.with_given(*camera_of_log_entry(entry.body))
     base = None if edited else station
     _save_station(snapshot, record.dataset_id, entry.station_id, station, base)
     if entry.group_id is not None:
@@ -215,19 +218,19 @@ def _camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
         group.revision, group.changed = group.revision + 1, entry.at
 
 
-def _verdict(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_verdict(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
     snapshot.verdicts.setdefault(entry.group_id, []).append(dict(entry.body))
 
 
-def _dismissal(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_dismissal(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.group_id is not None
     # One that was brought from elsewhere says itself whose it is.
     dismissal = {"actor": entry.actor, "at": entry.at, **entry.body}
     snapshot.dismissals.setdefault(entry.group_id, []).append(dismissal)
 
 
-def _dataset_deleted(snapshot: StateSnapshot, entry: LogEntry) -> None:
+def _replay_dataset_deletion(snapshot: StateSnapshot, entry: LogEntry) -> None:
     """Everything of the dataset goes; its entries before this one still tell what it was."""
     gone = entry.dataset_id
     assert gone is not None
@@ -267,8 +270,8 @@ def _replay_noticed(
             snapshot.noticed.add((*place, view, sentence))
 
 
-def _rows(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
-    """Rows of the tables, as ``rewrite`` takes them."""
+def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
+    """Rows of the tables, as ``replace_all_rows`` takes them."""
     stations = [
         {
             **station_values(item.station),
@@ -295,7 +298,7 @@ def _rows(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
         for group, station, view, sentence in sorted(snapshot.noticed, key=repr)
     ]
     unassigned = [
-        {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": _packed(extras)}
+        {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": _pack_extras(extras)}
         for key, extras in snapshot.unassigned.items()
     ]
     groups = [_group_row(snapshot, key) for key in snapshot.groups]
@@ -311,7 +314,7 @@ def _rows(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
 def _group_row(snapshot: StateSnapshot, group_id: int) -> dict[str, Any]:
     record = snapshot.groups[group_id]
     return {
-        **head_values(snapshot.group(group_id), record.paint),
+        **group_values(snapshot.group(group_id), record.paint),
         "id": group_id,
         "dataset_id": record.dataset_id,
         "number": record.number,
@@ -321,29 +324,29 @@ def _group_row(snapshot: StateSnapshot, group_id: int) -> dict[str, Any]:
     }
 
 
-def _packed(extras: Any) -> bytes:
+def _pack_extras(extras: Any) -> bytes:
     return pack(extras.values())
 
 
 _STEPS: dict[str, Callable[[StateSnapshot, LogEntry], None]] = {
-    "dataset": _dataset,
-    "dataset_deleted": _dataset_deleted,
-    "policy": _policy,
-    "station": _station,
-    "import": _import,
-    "edit": _edit,
-    "undo": _edit,
-    "redo": _edit,
-    PITCH: _edit,
-    POSITION: _edit,
-    NOISE: _noise,
-    PAINT: _paint,
-    "station_edit": _station_edit,
-    "station_undo": _station_edit,
-    "station_redo": _station_edit,
-    "camera": _camera,
-    "verdict": _verdict,
-    DISMISSAL: _dismissal,
+    "dataset": _replay_dataset,
+    "dataset_deleted": _replay_dataset_deletion,
+    "policy": _replay_policy,
+    "station": _replay_station,
+    "import": _replay_import,
+    "edit": _replay_edit,
+    "undo": _replay_edit,
+    "redo": _replay_edit,
+    PITCH: _replay_edit,
+    POSITION: _replay_edit,
+    NOISE: _replay_noise,
+    PAINT: _replay_paint,
+    "station_edit": _replay_station_edit,
+    "station_undo": _replay_station_edit,
+    "station_redo": _replay_station_edit,
+    "camera": _replay_camera,
+    "verdict": _replay_verdict,
+    DISMISSAL: _replay_dismissal,
     "spare": _replay_unassigned,
     # What a batch did stands in the verdicts themselves.
     "verdict_batch": lambda _ledger, _entry: None,

@@ -23,13 +23,13 @@ from app.features.groups import codecs
 from app.features.groups.digest import inputs_hash, station_digest, view_digest
 from app.features.groups.insert_queries import (
     NewRows,
-    head_values,
-    paint_text,
-    positions_text,
+    group_values,
+    paint_column,
+    positions_column,
     station_values,
     view_values,
 )
-from app.features.groups.queries import StoredGroup, positions_of
+from app.features.groups.queries import StoredGroup, positions_from_text
 from app.features.groups.view_queries import save_station
 from app.features.paint.queries import paint_digests
 from app.features.solutions.queries import is_current
@@ -53,7 +53,7 @@ def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
                 station=view.station,
                 digest=station_digest(view.station),
             )
-        if _differs(view, old):
+        if _view_row_differs(view, old):
             digests[view.key] = (view_digest(view), digests[view.key][1])
     pairs = [(digests[view.key][0], stations[view.key].digest) for view in group.views]
     return replace(
@@ -72,34 +72,34 @@ def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
 def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> None:
     """Write what ``next_revision`` changed; solutions and queue are the caller's to refresh."""
     for position, (view, old) in enumerate(zip(after.group.views, stored.group.views, strict=True)):
-        if _differs(view, old):
-            _update(
+        if _view_row_differs(view, old):
+            _update_row(
                 session, ViewModel.__table__, after.view_ids[view.key], view_values(view, position)
             )
         own = after.stations[view.key]
         if own != stored.stations[view.key]:
             values = {**station_values(own.station), "revision": own.revision}
-            _update(session, StationModel.__table__, own.id, values)
+            _update_row(session, StationModel.__table__, own.id, values)
     names = ("revision", "changed", "inputs_hash")
     values = {name: getattr(after, name) for name in names}
     pitch = after.group.pitch
     values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
-    values["positions"] = positions_text(after.group)
-    values["paint"] = paint_text(codecs.paint_to_json(after.group.paint))
-    _update(session, GroupModel.__table__, after.id, values)
+    values["positions"] = positions_column(after.group)
+    values["paint"] = paint_column(codecs.paint_to_json(after.group.paint))
+    _update_row(session, GroupModel.__table__, after.id, values)
 
 
-def _differs(view: View, old: View) -> bool:
+def _view_row_differs(view: View, old: View) -> bool:
     """Whether the view's own row is another; its station has one of its own."""
     return replace(view, station=old.station) != old
 
 
-def _update(session: Session, table: Any, identity: int, values: Mapping[str, Any]) -> None:
-    session.execute(_update_of(table), {"row": identity, **values})
+def _update_row(session: Session, table: Any, identity: int, values: Mapping[str, Any]) -> None:
+    session.execute(_update_statement(table), {"row": identity, **values})
 
 
 @cache
-def _update_of(table: Any) -> Any:
+def _update_statement(table: Any) -> Any:
     return update(table).where(table.c.id == bindparam("row"))
 
 
@@ -136,7 +136,7 @@ def save_group(
             if view.key not in kept:
                 rows.add_view(stored.id, view, position, shared or {})
         rows.insert()
-    values = {**head_values(group), "revision": stored.revision + 1, "changed": at}
+    values = {**group_values(group), "revision": stored.revision + 1, "changed": at}
     if digest is not None:
         values["source_hash"] = digest
     session.execute(update(GroupModel).where(GroupModel.id == stored.id).values(values))
@@ -207,7 +207,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
             noise.setdefault(row.id, {})[row.view] = row.noise
     rows = []
     for key, row in heads.items():
-        positions = positions_of(row.positions)
+        positions = positions_from_text(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
         paint = paint_digests(row.paint)
         digest = inputs_hash(pitch, pairs[key], positions, paint, noise.get(key, {}))
@@ -216,7 +216,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
         session.execute(update(GroupModel).where(GroupModel.id == bindparam("of")), rows)
 
 
-def bump_groups(session: Session, group_ids: Sequence[int], at: str) -> None:
+def bump_group_revisions(session: Session, group_ids: Sequence[int], at: str) -> None:
     """Count a revision of groups that a change of something of theirs made."""
     session.execute(
         update(GroupModel)
@@ -225,7 +225,7 @@ def bump_groups(session: Session, group_ids: Sequence[int], at: str) -> None:
     )
 
 
-def newest_change(session: Session) -> int:
+def newest_change_id(session: Session) -> int:
     """Number of the last change of any group; 0 where there is none."""
     return session.scalar(select(func.max(GroupChangeModel.id))) or 0
 
@@ -239,12 +239,12 @@ def count_groups(session: Session, dataset_id: int) -> int:
 def count_changes(session: Session, dataset_id: int, after: int) -> int:
     """How many groups of a dataset have changed after a change."""
     statement = select(func.count()).select_from(GroupChangeModel)
-    return session.scalar(statement.where(*_since(dataset_id, after))) or 0
+    return session.scalar(statement.where(*_changed_since(dataset_id, after))) or 0
 
 
-def changed_ids(session: Session, dataset_id: int, after: int) -> list[int]:
+def changed_group_ids(session: Session, dataset_id: int, after: int) -> list[int]:
     """Ids of the groups of a dataset that have changed after a change."""
-    statement = select(GroupChangeModel.group_id).where(*_since(dataset_id, after))
+    statement = select(GroupChangeModel.group_id).where(*_changed_since(dataset_id, after))
     return list(session.scalars(statement))
 
 
@@ -252,20 +252,20 @@ def changed_groups(session: Session, dataset_id: int, after: int, limit: int) ->
     """Groups of a dataset that have changed after a change, in the order of their last ones.
 
     Returns:
-        Rows as of ``groups_from``, with ``change_id``.
+        Rows as of ``groups_after``, with ``change_id``.
     """
     statement = (
-        _groups()
+        _changed_groups_statement()
         .add_columns(GroupChangeModel.id.label("change_id"))
         .join(GroupChangeModel, GroupChangeModel.group_id == GroupModel.id)
-        .where(*_since(dataset_id, after))
+        .where(*_changed_since(dataset_id, after))
         .order_by(GroupChangeModel.id)
         .limit(limit)
     )
     return session.execute(statement).all()
 
 
-def groups_from(session: Session, dataset_id: int, after: int, limit: int) -> Sequence[Any]:
+def groups_after(session: Session, dataset_id: int, after: int, limit: int) -> Sequence[Any]:
     """Groups of a dataset in order, from the one after a number on.
 
     Returns:
@@ -273,11 +273,11 @@ def groups_from(session: Session, dataset_id: int, after: int, limit: int) -> Se
         pitch_width); the solution is the one that fits the group as it is.
     """
     mine = (GroupModel.dataset_id == dataset_id, GroupModel.number > after)
-    statement = _groups().where(*mine).order_by(GroupModel.number).limit(limit)
+    statement = _changed_groups_statement().where(*mine).order_by(GroupModel.number).limit(limit)
     return session.execute(statement).all()
 
 
-def _groups() -> Any:
+def _changed_groups_statement() -> Any:
     group = GroupModel
     return (
         select(
@@ -290,7 +290,7 @@ def _groups() -> Any:
     )  # fmt: skip
 
 
-def _since(dataset_id: int, after: int) -> tuple[Any, ...]:
+def _changed_since(dataset_id: int, after: int) -> tuple[Any, ...]:
     return GroupChangeModel.id > after, GroupChangeModel.dataset_id == dataset_id
 
 
@@ -305,7 +305,7 @@ class StoredChange:
     group_id: int | None
 
 
-def logged_changes(session: Session, after: int) -> Iterator[StoredChange]:
+def changes_after_entry(session: Session, after: int) -> Iterator[StoredChange]:
     """What the log tells after an entry, in order; a static camera's stand once for each group."""
     columns = (LogModel.id, LogModel.dataset_id, LogModel.kind, LogModel.actor)
     new = (
@@ -325,7 +325,7 @@ def logged_changes(session: Session, after: int) -> Iterator[StoredChange]:
         yield StoredChange(*row)
 
 
-def solved_groups(session: Session, after: int) -> list[tuple[int, int]]:
+def groups_solved_after(session: Session, after: int) -> list[tuple[int, int]]:
     """Dataset and id of each group that got a solution after another one."""
     statement = (
         select(GroupModel.dataset_id, GroupModel.id)

@@ -11,7 +11,7 @@ from app.errors import NotFoundError
 from app.features.datasets.service import dataset_id
 from app.features.groups import submit
 from app.features.groups import undo as undoing
-from app.features.groups.history import history, read_step
+from app.features.groups.history import history, read_entry_changes
 from app.features.groups.history_schemas import PreviewDocument, PreviewRequest, StepDocument
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.solution_schemas import SolutionDocument
@@ -177,7 +177,7 @@ def get_history(group: Id, store: AppStore) -> History:
 @limit(LOOKS)
 def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     """What one entry of the history has changed: the views that differ, before and after."""
-    return StepDocument.of(read_step(store, group, entry))
+    return StepDocument.of(read_entry_changes(store, group, entry))
 
 
 @router.post(
@@ -192,7 +192,7 @@ async def preview_group(
     group: Id, changes: PreviewRequest, services: AppServices, request: Request
 ) -> Response:
     """What the solution would be; nothing is saved."""
-    found = await services.previews.answer(request, group, changes)
+    found = await services.previews.preview_document(request, group, changes)
     return Response(found, media_type="application/json")
 
 

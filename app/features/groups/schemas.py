@@ -33,14 +33,14 @@ from app.soccer.pitch import MARKINGS, canonical_marking
 from app.soccer.reasons import MAX_NOTE, LeftOut, Reason
 
 
-def _known(name: str) -> str:
+def _known_marking(name: str) -> str:
     try:
         return canonical_marking(name)
     except UnknownMarkingError as error:
         raise ValueError(error.message) from None
 
 
-def _distinct(lines: Any) -> Any:
+def _require_distinct_markings(lines: Any) -> Any:
     if isinstance(lines, dict):
         names = [name.strip() for name in lines if isinstance(name, str)]
         if len(set(names)) < len(names):
@@ -49,7 +49,7 @@ def _distinct(lines: Any) -> Any:
 
 
 Marking = Annotated[
-    str, AfterValidator(_known), WithJsonSchema({"type": "string", "enum": list(MARKINGS)})
+    str, AfterValidator(_known_marking), WithJsonSchema({"type": "string", "enum": list(MARKINGS)})
 ]
 """One of the 26 names; spaces at the ends do not matter."""
 Pixel = Annotated[float, Field(ge=-MAX_PIXEL, le=MAX_PIXEL, allow_inf_nan=False, strict=True)]
@@ -72,7 +72,7 @@ Points = Annotated[list[Point], Field(fail_fast=True)]
 """Of one marking; the first that is wrong is told, for each costs as much as ten that are right."""
 LineEdits = Annotated[
     dict[Marking, Points | None],
-    BeforeValidator(_distinct),
+    BeforeValidator(_require_distinct_markings),
 ]
 
 
@@ -116,10 +116,12 @@ class LinesEdit(BaseModel):
 
     def points(self) -> dict[str, tuple[ImagePoint, ...] | None]:
         """The edit in values of the pitch's vocabulary."""
-        return points_of(self.lines)
+        return points_by_marking(self.lines)
 
 
-def points_of(lines: dict[str, list[Point] | None]) -> dict[str, tuple[ImagePoint, ...] | None]:
+def points_by_marking(
+    lines: dict[str, list[Point] | None],
+) -> dict[str, tuple[ImagePoint, ...] | None]:
     """Line edits as values."""
     return {
         marking: None if points is None else tuple(ImagePoint(p.x, p.y) for p in points)
@@ -127,14 +129,14 @@ def points_of(lines: dict[str, list[Point] | None]) -> dict[str, tuple[ImagePoin
     }
 
 
-def _as_union(schema: dict[str, Any]) -> None:
+def _describe_ball_alternatives(schema: dict[str, Any]) -> None:
     """Describe the ball edit as the three things that it may be, each complete in itself."""
     fields = schema.pop("properties")
     del schema["type"], schema["additionalProperties"]
     box, point = (fields[name].pop("anyOf")[0] for name in ("box", "point"))
     nowhere = {"type": "null"}
 
-    def one(title: str, place: str, **own: Any) -> dict[str, Any]:
+    def alternative(title: str, place: str, **own: Any) -> dict[str, Any]:
         own = {"box": nowhere, "point": nowhere, "out_of_view": {"const": False}, **own}
         properties = {name: fields[name] | own.get(name, {}) for name in fields}
         properties[place].pop("default", None)
@@ -152,16 +154,16 @@ def _as_union(schema: dict[str, Any]) -> None:
         {"out_of_view": True},
     ]
     schema["oneOf"] = [
-        one("BallByBox", "box", box=box),
-        one("BallByPoint", "point", point=point),
-        one("BallOutOfView", "out_of_view", out_of_view={"const": True}),
+        alternative("BallByBox", "box", box=box),
+        alternative("BallByPoint", "point", point=point),
+        alternative("BallOutOfView", "out_of_view", out_of_view={"const": True}),
     ]
 
 
 class BallEdit(BaseModel):
     """The ball of a view: its box, or its centre alone, or that it is out of view."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra=_as_union)
+    model_config = ConfigDict(extra="forbid", json_schema_extra=_describe_ball_alternatives)
 
     box: BoxNumbers | None = None
     point: PointNumbers | None = None
@@ -173,7 +175,7 @@ class BallEdit(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _one_place(self) -> BallEdit:
+    def _check_one_place(self) -> BallEdit:
         placed = (self.box is not None) + (self.point is not None)
         if placed == 2:
             raise ValueError("give a box or a point, not both")
@@ -359,7 +361,7 @@ class GroupDocument(Document):
             verdicts=[VerdictDocument.model_validate(verdict) for verdict in state.verdicts],
             policy=PolicyDocument.model_validate(state.policy),
             views=[
-                _view(state, view, index, label)
+                _view_document(state, view, index, label)
                 for index, (view, label) in enumerate(
                     zip(group.views, view_labels(group), strict=True)
                 )
@@ -389,7 +391,7 @@ def image_address(view_id: int) -> str:
     return f"/api/v1/views/{view_id}/image"
 
 
-def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument:
+def _view_document(state: GroupState, view: View, index: int, label: str) -> ViewDocument:
     view_id, why = state.view_ids[view.key], view.left_out
     return ViewDocument.model_construct(
         id=view_id,
@@ -400,24 +402,24 @@ def _view(state: GroupState, view: View, index: int, label: str) -> ViewDocument
         height=view.size.height,
         included=view.included,
         left_out=None if why is None else why,
-        station=_station(state, view),
+        station=_station_document(state, view),
         lines=lines_document(view.station.lines),
         proposed=[*view.station.proposed],
         not_visible=[*view.station.not_visible],
         balls=[Ball.of(ball, edited=view.key in state.stored.edited_views) for ball in view.balls],
         image=None if view.media is None else image_address(view_id),
-        neighbours=_neighbours(state.key, view, view_id),
+        neighbours=_neighbours_address(state.key, view, view_id),
     )
 
 
-def _neighbours(group: str, view: View, view_id: int) -> str | None:
+def _neighbours_address(group: str, view: View, view_id: int) -> str | None:
     media = view.media
     if media is None or not counts_time(media, group, view.station.shared):
         return None
     return f"/api/v1/views/{view_id}/neighbours"
 
 
-def _station(state: GroupState, view: View) -> StationDocument:
+def _station_document(state: GroupState, view: View) -> StationDocument:
     station = view.station
     values: dict[str, Any] = {
         "id": state.station_ids[station.key],
@@ -494,7 +496,7 @@ class ViewEdit(BaseModel):
     )
 
     @model_validator(mode="after")
-    def _one_thing(self) -> ViewEdit:
+    def _check_one_change(self) -> ViewEdit:
         if len({"included", "calibration", "picture"} & self.model_fields_set) != 1:
             raise ValueError("change one of included, calibration and picture at a time")
         if "included" not in self.model_fields_set and (self.reason or self.note):

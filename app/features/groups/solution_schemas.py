@@ -26,17 +26,17 @@ from app.solving.calibrate import DRAWN_DIGITS
 from app.solving.jaccard import project_markings
 
 
-def _numbers(box: Any) -> Any:
+def _box_numbers(box: Any) -> Any:
     return (box.x, box.y, box.width, box.height) if isinstance(box, Box) else box
 
 
-def _by_gamma(values: Any) -> Any:
+def _values_by_gamma(values: Any) -> Any:
     if not isinstance(values, tuple):
         return values
     return {f"{gamma:g}": value for gamma, value in zip(GAMMAS_PERCENT, values, strict=True)}
 
 
-def _camera(camera: Any) -> Any:
+def _camera_json(camera: Any) -> Any:
     return camera_to_json(camera) if isinstance(camera, Camera) else camera
 
 
@@ -44,8 +44,8 @@ Measured = float | None
 """A number that may have no end (the sigma of parallel rays): it travels as null."""
 XY = tuple[float, float]
 XYZ = tuple[float, float, float]
-XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_numbers)]
-Jac = Annotated[dict[str, float], BeforeValidator(_by_gamma)]
+XYWH = Annotated[tuple[float, float, float, float], BeforeValidator(_box_numbers)]
+Jac = Annotated[dict[str, float], BeforeValidator(_values_by_gamma)]
 """By gamma in per cent of the diagonal."""
 _NOT_SEEN = np.empty((0, 2))
 
@@ -126,7 +126,7 @@ class CalibrationDocument(Document):
     """The camera of a view and how well it is known."""
 
     source: str = Field(description="`given`, `lines` or `paint`.")
-    camera: Annotated[CameraDocument, BeforeValidator(_camera)] | None
+    camera: Annotated[CameraDocument, BeforeValidator(_camera_json)] | None
     sigma: CameraSigma | None = Field(
         description="How well the camera is known; null for a given one of which nothing more is known."
     )
@@ -143,7 +143,9 @@ class CalibrationDocument(Document):
     )
 
 
-def _calibration(calibration: Calibration, pitch: Pitch, size: ImageSize) -> CalibrationDocument:
+def _make_calibration_document(
+    calibration: Calibration, pitch: Pitch, size: ImageSize
+) -> CalibrationDocument:
     """The document of a calibration, with its markings where they are seen."""
     seen = {}
     if calibration.camera is not None:
@@ -169,7 +171,7 @@ def _calibration(calibration: Calibration, pitch: Pitch, size: ImageSize) -> Cal
 
 
 _kept_document: IdentityCache[Calibration, CalibrationDocument] = IdentityCache(
-    _calibration, size=256
+    _make_calibration_document, size=256
 )
 
 
@@ -214,7 +216,7 @@ class ViewSolutionDocument(Document):
 
     @field_validator("ball", mode="before")
     @classmethod
-    def _errors_alone(cls, fit: Any, info: ValidationInfo) -> Any:
+    def _keep_errors_only(cls, fit: Any, info: ValidationInfo) -> Any:
         """What a view outside every valid pair says of the ball: its errors, and no size."""
         if not isinstance(fit, BallFit) or info.data["included"]:
             return fit
@@ -279,7 +281,7 @@ class FixDocument(Document, shows=Fix):
     """An edit that a finding proposes."""
 
 
-def _edit_values(edit: Any) -> Any:
+def _edit_json(edit: Any) -> Any:
     return edit if isinstance(edit, dict) else edit_to_json(edit)
 
 
@@ -287,7 +289,7 @@ class OfferDocument(Document):
     """An edit that carries a fix out."""
 
     label: str = Field(description="What a button for it says.")
-    edit: Annotated[dict[str, Any], BeforeValidator(_edit_values)] = Field(
+    edit: Annotated[dict[str, Any], BeforeValidator(_edit_json)] = Field(
         description="As the history writes edits: `set_lines`, `set_balls`, "
         "`set_picture` or `include_view`."
     )
@@ -351,7 +353,7 @@ class FindingDocument(Document, shows=Finding):
 
     @model_validator(mode="before")
     @classmethod
-    def _with_offers(cls, value: Any, info: ValidationInfo) -> Any:
+    def _add_suggested_edits(cls, value: Any, info: ValidationInfo) -> Any:
         group: Any = info.context
         if isinstance(value, Finding):
             found = {"offers": offers_of_finding(group, value), "guide": guide_of_finding(value)}

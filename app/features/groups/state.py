@@ -11,7 +11,7 @@ from app.errors import NotFoundError, StaleRevisionError
 from app.features.datasets.queries import policy_of
 from app.features.findings.queries import NOTHING_DISMISSED, GroupDismissals
 from app.features.groups.digest import digest
-from app.features.groups.etag_queries import find_head, read_heads
+from app.features.groups.etag_queries import find_etag_row, read_etag_rows
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.undo_stacks import UndoStacks, read_stacks
 from app.features.groups.view_queries import StoredStation
@@ -62,7 +62,7 @@ def group_etag(
 
 
 @dataclass(frozen=True)
-class Head:
+class GroupHead:
     """What a change of a group rests on.
 
     Attributes:
@@ -74,13 +74,13 @@ class Head:
     policy_hash: str
 
 
-def read_head(session: Session, group_id: int) -> Head | None:
+def read_group_head(session: Session, group_id: int) -> GroupHead | None:
     """What a change of a group would rest on now; None where there is no such group."""
-    row = find_head(session, group_id)
+    row = find_etag_row(session, group_id)
     if row is None:
         return None
     content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
-    return Head(content, row.policy_hash)
+    return GroupHead(content, row.policy_hash)
 
 
 def content_tag_of(etag: str) -> str:
@@ -101,7 +101,7 @@ def require_unchanged(session: Session, group_id: int, if_match: str, what: str)
         NotFoundError: The group is gone.
         StaleRevisionError: With both ETags.
     """
-    head = read_head(session, group_id)
+    head = read_group_head(session, group_id)
     if head is None:
         raise NotFoundError.group(group_id)
     require_content(session, group_id, head.content, if_match, what)
@@ -132,7 +132,7 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """ETags by group id; at most a few hundred groups, those that do not exist are left out."""
     noticed = import_findings(session, group_ids)
     etags = {}
-    for row in read_heads(session, group_ids):
+    for row in read_etag_rows(session, group_ids):
         content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
         findings = None
         if row.summary is not None:
@@ -250,7 +250,8 @@ class Record:
             solution = replace(solution, findings=solution.findings + self.noticed)
         edited = stored.edited
         verdicts = [
-            _verdict_state(item, stored, edited, passes) for item in _last_of_each(self.verdicts)
+            _verdict_state(item, stored, edited, passes)
+            for item in _newest_verdict_of_each_actor(self.verdicts)
         ]
         kinds = None if solution is None else [item.kind for item in solution.findings]
         stations = stored.stations.values()
@@ -364,7 +365,7 @@ def _verdict_state(
     )
 
 
-def _last_of_each(verdicts: Iterable[StoredVerdict]) -> list[StoredVerdict]:
+def _newest_verdict_of_each_actor(verdicts: Iterable[StoredVerdict]) -> list[StoredVerdict]:
     last: dict[str, StoredVerdict] = {}
     for verdict in verdicts:
         last.setdefault(verdict.actor, verdict)

@@ -16,7 +16,7 @@ from app.features.groups.digest import group_inputs_hash
 from app.features.groups.projection_queries import (
     all_dismissals,
     all_groups,
-    all_noticed,
+    all_import_findings,
     all_stations,
     all_unassigned,
     all_verdicts,
@@ -124,7 +124,7 @@ def read_state_snapshot(session: Session) -> StateSnapshot:
     for unassigned in all_unassigned(session):
         place = (unassigned.dataset_id, unassigned.camera, unassigned.frame)
         snapshot.unassigned[place] = extras_from_json(unpack(unassigned.extras))
-    for row in all_noticed(session):
+    for row in all_import_findings(session):
         snapshot.noticed.add((row.group_id, row.station_id, row.view, row.sentence))
     return snapshot
 

@@ -12,7 +12,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import NotFoundError, SharedStationError
 from app.features.groups import view_queries as views
-from app.features.groups.ball_noise import keeping_noise, with_noise
+from app.features.groups.ball_noise import add_noise_of_actor, keep_view_noise
 from app.features.groups.edit import (
     STATION_EDITS,
     CompositeEdit,
@@ -21,7 +21,7 @@ from app.features.groups.edit import (
     SetPicture,
     need_view,
 )
-from app.features.groups.edit_codec import require_few_points_in_all, step_to_json
+from app.features.groups.edit_codec import edit_and_inverse_to_json, require_point_limits_of_edits
 from app.features.groups.queries import StoredGroup, group_of_view
 from app.features.groups.revision_queries import next_revision, save_revision
 from app.features.groups.state import (
@@ -34,7 +34,7 @@ from app.features.groups.state import (
     require_content,
     require_unchanged,
 )
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.view_paint import PaintUpdater
 from app.features.independent_annotations import submission_queries as submissions
 from app.features.independent_annotations.queries import annotation_of_copy
 from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
@@ -100,7 +100,7 @@ class GroupChange:
 
 
 @dataclass(frozen=True)
-class _Outcome:
+class _AppliedChange:
     """A change with all that is saved of it; ``painted`` is its group as it is afterwards."""
 
     change: GroupChange
@@ -125,7 +125,7 @@ class EditOptions(TypedDict):
     if_match: str
     actor: str
     then: NotRequired[Then]
-    paint: NotRequired[PaintFollower | None]
+    paint: NotRequired[PaintUpdater | None]
     solve: NotRequired[Solve]
 
 
@@ -178,7 +178,9 @@ def submit(
         InputError, NotFoundError: The edit does not fit the group.
         StorageError: Nothing was saved.
     """
-    return take_step(store, lambda _session: group_id, _plan_edits(lambda _stored: [edit]), **how)
+    return submit_change(
+        store, lambda _session: group_id, _plan_edits(lambda _stored: [edit]), **how
+    )
 
 
 def submit_all(
@@ -188,7 +190,9 @@ def submit_all(
     **how: Unpack[EditOptions],
 ) -> GroupState:
     """``submit`` for several edits of a group, which are one edit: undo takes them back together."""
-    return take_step(store, lambda _session: group_id, _plan_edits(lambda _stored: edits), **how)
+    return submit_change(
+        store, lambda _session: group_id, _plan_edits(lambda _stored: edits), **how
+    )
 
 
 def submit_view(
@@ -205,14 +209,14 @@ def submit_view(
     def find(session: Session) -> int:
         return group_of_view(session, view_id)
 
-    return take_step(store, find, _plan_edits(edits), **how)
+    return submit_change(store, find, _plan_edits(edits), **how)
 
 
 def preview(
     store: Store,
     group_id: int,
     edits_of: Callable[[Group], Sequence[Edit]],
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
     solve: Solver = solve,
 ) -> tuple[Group, Solution]:
     """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
@@ -227,15 +231,15 @@ def preview(
         stored = need_group(session, group_id)
         group = stored.group
         edits = edits_of(group)
-        require_few_points_in_all(group, edits)
+        require_point_limits_of_edits(group, edits)
         for edit in edits:
             if isinstance(edit, SetPicture):
-                refuse_shared(stored, edit)
+                refuse_edit_of_shared_station(stored, edit)
         for edit in edits:
-            group = keeping_noise(group, edit).apply(group)
+            group = keep_view_noise(group, edit).apply(group)
         known = known_calibrations(session, [group], stored.policy)
     if paint is not None:
-        group = paint.follow(group, stored.policy.calibration, known)
+        group = paint.update_paint(group, stored.policy.calibration, known)
     return group, solve(group, stored.policy, known)
 
 
@@ -255,13 +259,13 @@ def load_solved_of_view(store: Store, view_id: int) -> GroupState:
     return load_solved(store, group_id)
 
 
-def solved(store: Store, group_id: int) -> GroupState:
+def solve_and_keep(store: Store, group_id: int) -> GroupState:
     """A group as it is now, its solution computed and kept if that was still to do."""
     record, solution = read_solved(store, group_id)
     return record.state(solution)
 
 
-def solved_in(session: Session, group_id: int) -> GroupState:
+def solved_state(session: Session, group_id: int) -> GroupState:
     """A group as a session sees it, its solution computed if that was still to do; saves nothing."""
     record = read_record(session, group_id)
     solution = read_solutions(session, [record.solution_key]).get(group_id)
@@ -289,7 +293,7 @@ def read_solved(
     return record, solution
 
 
-def refuse_shared(stored: StoredGroup, edit: Edit) -> None:
+def refuse_edit_of_shared_station(stored: StoredGroup, edit: Edit) -> None:
     """Refuse an edit that belongs to the station when many views share that."""
     if not isinstance(edit, STATION_EDITS):
         return
@@ -299,7 +303,7 @@ def refuse_shared(stored: StoredGroup, edit: Edit) -> None:
         raise SharedStationError(edit.view, stored.stations[edit.view].id, station.key, what)
 
 
-def take_step(
+def submit_change(
     store: Store,
     find: Find,
     plan: Plan,
@@ -307,7 +311,7 @@ def take_step(
     if_match: str,
     actor: str,
     then: Then = Session.respond,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
     solve: Solve = solve_encoded,
 ) -> GroupState:
     """Save a step of a group (an edit, an undo, a redo) and answer with the group as it is then.
@@ -335,31 +339,33 @@ def take_step(
             known = known_calibrations(session, [change.group], before.stored.policy)
         painted = change.group
         if paint is not None:
-            painted = paint.follow(painted, before.stored.policy.calibration, known)
-        outcome = _outcome(before, change, painted, solve(painted, before.stored.policy, known))
+            painted = paint.update_paint(painted, before.stored.policy.calibration, known)
+        outcome = _apply_change(
+            before, change, painted, solve(painted, before.stored.policy, known)
+        )
         state = outcome.after.state(outcome.solution)
         with store.write() as session:
             judge = require_unchanged(session, state.id, if_match, what)
             require_open(session, state.dataset_id, state.id)
             if judge == before.stored.policy.hash:
-                _save(session, outcome, actor)
+                _save_change(session, outcome, actor)
                 then(session, state)
                 return state
         # Another policy judges the dataset by now, so another solution belongs to the edit.
 
 
-def _outcome(
+def _apply_change(
     before: Record, change: GroupChange, painted: Group, result: tuple[Solution, EncodedSolution]
-) -> _Outcome:
+) -> _AppliedChange:
     at = now()
     stored = next_revision(before.stored, change.group, at)
     if painted is not change.group:
         stored = next_revision(stored, painted, at)
     after = replace(before, stored=stored, stacks=before.stacks.then(change.kind))
-    return _Outcome(change, painted, before, after, *result)
+    return _AppliedChange(change, painted, before, after, *result)
 
 
-def _save(session: Session, outcome: _Outcome, actor: str) -> None:
+def _save_change(session: Session, outcome: _AppliedChange, actor: str) -> None:
     change, after = outcome.change, outcome.after
     stored = after.stored
     save_revision(session, outcome.before.stored, stored)
@@ -367,7 +373,7 @@ def _save(session: Session, outcome: _Outcome, actor: str) -> None:
     entries = [Entry(change.kind, actor, stored.changed, change.body, *where)]
     if outcome.painted is not change.group:
         insert_readings(session, stored.dataset_id, outcome.painted.paint.values())
-        entries.append(Entry(PAINT, actor, stored.changed, _read_beside(outcome), *where))
+        entries.append(Entry(PAINT, actor, stored.changed, _paint_entry_body(outcome), *where))
     append(session, entries)
     insert_solutions(session, [(after.solution_key, outcome.encoded)])
     if after.dismissals.last:
@@ -377,33 +383,33 @@ def _save(session: Session, outcome: _Outcome, actor: str) -> None:
     update_row(session, stored, after.newest_verdict, noticed, outcome.encoded.summary)
 
 
-def _read_beside(outcome: _Outcome) -> Json:
+def _paint_entry_body(outcome: _AppliedChange) -> Json:
     """Body of the entry that says what was read of the paint with a change."""
     before = outcome.change.group
     edit = SetPaint(outcome.painted.paint)
-    body = step_to_json(edit, edit.inverse(before))
+    body = edit_and_inverse_to_json(edit, edit.inverse(before))
     return {FOLLOWS: outcome.change.kind, **body}
 
 
-def checked_edit(stored: StoredGroup, edits: Sequence[Edit], actor: str) -> Edit:
+def combine_edits(stored: StoredGroup, edits: Sequence[Edit], actor: str) -> Edit:
     """Some edits of a group as the one edit that is saved, with the noise of who makes them.
 
     Raises:
         SharedStationError: One of them belongs to a static camera.
         TooManyPointsError: They draw too many points.
     """
-    made = [with_noise(stored.factors, stored.group, edit, actor) for edit in edits]
+    made = [add_noise_of_actor(stored.factors, stored.group, edit, actor) for edit in edits]
     for edit in made:
-        refuse_shared(stored, edit)
-    require_few_points_in_all(stored.group, made)
+        refuse_edit_of_shared_station(stored, edit)
+    require_point_limits_of_edits(stored.group, made)
     return made[0] if len(made) == 1 else CompositeEdit(tuple(made))
 
 
 def _plan_edits(edits_of: Callable[[StoredGroup], Sequence[Edit]]) -> Plan:
     def plan(_session: Session, record: Record, actor: str) -> GroupChange:
         group = record.stored.group
-        edit = checked_edit(record.stored, edits_of(record.stored), actor)
-        body = step_to_json(edit, edit.inverse(group))
+        edit = combine_edits(record.stored, edits_of(record.stored), actor)
+        body = edit_and_inverse_to_json(edit, edit.inverse(group))
         return GroupChange("edit", body, edit.apply(group))
 
     return plan

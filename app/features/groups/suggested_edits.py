@@ -58,7 +58,9 @@ class Guide:
     reads: bool = False
 
 
-def offers(group: Group, fix: Fix | None, point: ImagePoint | None = None) -> tuple[Offer, ...]:
+def offers_of_fix(
+    group: Group, fix: Fix | None, point: ImagePoint | None = None
+) -> tuple[Offer, ...]:
     """The edits that carry out a fix: none when only a person can, several to choose from.
 
     Args:
@@ -70,7 +72,7 @@ def offers(group: Group, fix: Fix | None, point: ImagePoint | None = None) -> tu
     if fix is None or view is None:
         return ()
     action = _ACTIONS[fix.action]
-    found = ((one, action.edit(view, one, point)) for one in _choices(view, fix))
+    found = ((one, action.edit(view, one, point)) for one in _fixes_to_choose(view, fix))
     return tuple(
         Offer(_button_text(action.label, one), edit, _button_text(action.caption, one))
         for one, edit in found
@@ -78,7 +80,7 @@ def offers(group: Group, fix: Fix | None, point: ImagePoint | None = None) -> tu
     )
 
 
-def guide(fix: Fix | None, point: ImagePoint | None = None) -> Guide | None:
+def guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> Guide | None:
     """Where a fix leads a person; None where an edit carries it out.
 
     Args:
@@ -95,35 +97,35 @@ def guide(fix: Fix | None, point: ImagePoint | None = None) -> Guide | None:
 def offers_of_finding(group: Group, finding: Finding) -> tuple[Offer, ...]:
     """The edits that mend what a finding says: those of its fix, or its ball's box fitted."""
     if finding.kind == "ball_size":
-        return _fitted(group, finding)
-    return offers(group, finding.fix)
+        return _fitted_box_offers(group, finding)
+    return offers_of_fix(group, finding.fix)
 
 
 def guide_of_finding(finding: Finding) -> Guide | None:
     """Where a finding leads a person; None where it offers edits, or nothing."""
     if finding.kind == "visible_not_annotated":
-        return guide(Fix("draw_marking", finding.view, finding.marking))
-    return guide(finding.fix)
+        return guide_of_fix(Fix("draw_marking", finding.view, finding.marking))
+    return guide_of_fix(finding.fix)
 
 
 def edit_of_fix(group: Group, fix: Fix, point: ImagePoint | None = None) -> Edit | None:
     """The one edit that carries out a fix; None when only a person can, or has to choose."""
-    found = offers(group, fix, point)
+    found = offers_of_fix(group, fix, point)
     return found[0].edit if len(found) == 1 else None
 
 
-def rank(fix: Fix) -> int:
+def rank_of_fix(fix: Fix) -> int:
     """Grows with what a fix takes away: mending what is wrong comes before leaving it out."""
     return _ACTIONS[fix.action].rank
 
 
-def sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
+def condition_sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
     """The condition under which the group passes, to be read after "would pass if"."""
     letter = view_letter([view.key for view in group.views].index(fix.view or ""))
     return _button_text(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 
 
-def ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
+def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
     """The edit that puts a view's ball somewhere else, as large as it is."""
     if ball.box is None:
         return SetBall(view, replace(ball, point=point))
@@ -132,7 +134,7 @@ def ball_at(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
     return SetBall(view, replace(ball, box=moved))
 
 
-def _fitted(group: Group, finding: Finding) -> tuple[Offer, ...]:
+def _fitted_box_offers(group: Group, finding: Finding) -> tuple[Offer, ...]:
     """A box as large as the ball looks at its distance; the number is how many times as large it is now."""
     view = None if finding.view is None else group.view(finding.view)
     ball = None if view is None else view.ball
@@ -147,7 +149,7 @@ def _button_text(text: str, fix: Fix, **more: str | float) -> str:
     return text.format(marking=fix.marking, to=fix.to, number=number, **more)
 
 
-def _choices(view: View, fix: Fix) -> list[Fix]:
+def _fixes_to_choose(view: View, fix: Fix) -> list[Fix]:
     """The fix, or one for each ball of which one has to be picked."""
     if fix.action != "pick_ball" or fix.index is not None:
         return [fix]
@@ -159,16 +161,16 @@ def _no_edit(_view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
     return None
 
 
-def _include(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _include_view_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     return IncludeView(view.key, fix.action == "include_view")
 
 
-def _pick_ball(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _pick_ball_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     there = fix.index is not None and fix.index < len(view.balls)
     return SetBall(view.key, view.balls[fix.index or 0]) if there else None
 
 
-def _swap_sides(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _swap_sides_edit(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
     """Every marking under the name that it has when the pitch turns by 180 degrees."""
     lines = view.station.lines
     changes: dict[str, tuple[ImagePoint, ...] | None] = dict.fromkeys(lines)
@@ -181,12 +183,12 @@ def _swap_sides(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None
     return SetLines(view.key, changes, not_visible=unseen) if changes else None
 
 
-def _free_picture(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _estimate_picture_edit(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
     """Its own lines say what was done to the picture; that of a static camera belongs to no view."""
     return None if view.station.shared else SetPicture(view.key, OPEN)
 
 
-def _relabel(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _relabel_marking_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     lines = view.station.lines
     if fix.to is None or fix.marking is None or fix.marking not in lines:
         return None
@@ -194,27 +196,27 @@ def _relabel(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     return SetLines(view.key, {fix.marking: None, fix.to: merged})
 
 
-def _drop_marking(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _delete_marking_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     if fix.marking is None or fix.marking not in view.station.lines:
         return None
     return SetLines(view.key, {fix.marking: None})
 
 
-def _hide_marking(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+def _mark_not_visible_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     if fix.marking is None or fix.marking in view.station.lines:
         return None
     return SetLines(view.key, {fix.marking: None}, not_visible=(fix.marking,))
 
 
-def _move_point(view: View, fix: Fix, point: ImagePoint | None) -> Edit | None:
-    return None if point is None else _with_point(view, fix, (point,))
+def _move_point_edit(view: View, fix: Fix, point: ImagePoint | None) -> Edit | None:
+    return None if point is None else _replace_point_edit(view, fix, (point,))
 
 
-def _drop_point(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
-    return _with_point(view, fix, ())
+def _delete_point_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
+    return _replace_point_edit(view, fix, ())
 
 
-def _with_point(view: View, fix: Fix, instead: tuple[ImagePoint, ...]) -> Edit | None:
+def _replace_point_edit(view: View, fix: Fix, instead: tuple[ImagePoint, ...]) -> Edit | None:
     points = tuple(view.station.lines.get(fix.marking or "", ()))
     if fix.marking is None or fix.index is None or not fix.index < len(points):
         return None
@@ -223,7 +225,7 @@ def _with_point(view: View, fix: Fix, instead: tuple[ImagePoint, ...]) -> Edit |
 
 
 @dataclass(frozen=True)
-class _Action:
+class _FixAction:
     """What an action of fixes means.
 
     Attributes:
@@ -241,67 +243,72 @@ class _Action:
 
 
 _ACTIONS = {
-    "relabel": _Action(
+    "relabel": _FixAction(
         0,
         "{marking} in {letter} was relabelled as {to}",
         "Relabel as {to}",
         "{marking} → {to}",
-        _relabel,
+        _relabel_marking_edit,
     ),
-    "swap_sides": _Action(
+    "swap_sides": _FixAction(
         0,
         "left and right were swapped in {letter}",
         "Swap left and right",
         "Left and right swapped?",
-        _swap_sides,
+        _swap_sides_edit,
     ),
-    "pick_ball": _Action(
-        0, "ball {number} was the one in play in {letter}", "Keep ball {number}", edit=_pick_ball
+    "pick_ball": _FixAction(
+        0,
+        "ball {number} was the one in play in {letter}",
+        "Keep ball {number}",
+        edit=_pick_ball_edit,
     ),
-    "free_picture": _Action(
+    "free_picture": _FixAction(
         1,
         "the picture of {letter} was stretched or cropped",
         "Use this geometry",
-        edit=_free_picture,
+        edit=_estimate_picture_edit,
     ),
-    "move_point": _Action(
+    "move_point": _FixAction(
         1,
         "point {number} of {marking} in {letter} moved {px:.1f} px",
         "Move the point",
         "point {number} of {marking}",
-        _move_point,
+        _move_point_edit,
     ),
-    "look_ball": _Action(
+    "look_ball": _FixAction(
         1,
         "the ball of {letter} was really {px:.1f} px away, on the ray of the other view",
         "Show the place",
         "is the ball here?",
     ),
-    "hide_marking": _Action(
+    "hide_marking": _FixAction(
         2,
         "{marking} in {letter}, which is {px:.0f} px long there, was marked as not visible",
         "Mark as not visible",
         "{marking}: not visible?",
-        _hide_marking,
+        _mark_not_visible_edit,
     ),
-    "draw_marking": _Action(2, label="Draw it"),
-    READ_PAINT: _Action(1, label="Read its paint"),
-    "include_view": _Action(2, "{letter} was included again", "Include it again", edit=_include),
-    "drop_point": _Action(
+    "draw_marking": _FixAction(2, label="Draw it"),
+    READ_PAINT: _FixAction(1, label="Read its paint"),
+    "include_view": _FixAction(
+        2, "{letter} was included again", "Include it again", edit=_include_view_edit
+    ),
+    "drop_point": _FixAction(
         3,
         "point {number} of {marking} in {letter} was deleted",
         "Delete the point",
         "point {number} of {marking}",
-        _drop_point,
+        _delete_point_edit,
     ),
-    "drop_marking": _Action(
+    "drop_marking": _FixAction(
         4,
         "{marking} in {letter} was deleted",
         "Delete the line",
         "{marking}: fits no line",
-        _drop_marking,
+        _delete_marking_edit,
     ),
-    "exclude_view": _Action(5, "{letter} was left out", "Leave it out", edit=_include),
+    "exclude_view": _FixAction(5, "{letter} was left out", "Leave it out", edit=_include_view_edit),
 }
 _GUIDES = frozenset(name for name, action in _ACTIONS.items() if action.edit is _no_edit)
 """Actions that no edit carries out."""
@@ -327,7 +334,9 @@ class Influence:
     largest_px_without: float | None
 
 
-def influences(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> list[Influence]:
+def marking_influences(
+    station: Station, pitch: Pitch, policy: CalibrationPolicy
+) -> list[Influence]:
     """The influence of each annotated marking, by refitting without it.
 
     Args:
@@ -346,13 +355,15 @@ def influences(station: Station, pitch: Pitch, policy: CalibrationPolicy) -> lis
         used = lines_without(station.lines, {marking, *doubted})
         rest = calibrate_station(replace(station, lines=used), pitch, trusting).camera
         jac, error = (
-            (None, None) if rest is None else _seen_by(rest, marking, station, pitch, policy)
+            (None, None)
+            if rest is None
+            else _jac_and_distance_without(rest, marking, station, pitch, policy)
         )
         found.append(Influence(marking, whole.jac, jac, largest.get(marking), error))
     return found
 
 
-def _seen_by(
+def _jac_and_distance_without(
     camera: Camera, marking: str, station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> tuple[tuple[float, ...], float | None]:
     """JaC of the other markings, and the largest distance of this one."""

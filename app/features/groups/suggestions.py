@@ -12,12 +12,12 @@ from app.features.groups.edit import Edit, SetLines
 from app.features.groups.suggested_edits import (
     Guide,
     Offer,
-    ball_at,
+    condition_sentence,
     edit_of_fix,
-    guide,
-    offers,
-    rank,
-    sentence,
+    guide_of_fix,
+    move_ball_edit,
+    offers_of_fix,
+    rank_of_fix,
 )
 from app.geometry.arrays import FloatArray
 from app.soccer.finding import Fix
@@ -112,14 +112,14 @@ def find_suggestions(group: Group, policy: Policy, solution: Solution) -> list[S
         return []
     known = {view.calibration_key: view.calibration for view in solution.views}
     found = []
-    for candidate in _distinct(group, solution, failing)[:MOST_TRIALS]:
-        suggestion = _tried(group, policy, solution, failing, candidate, known)
+    for candidate in _distinct_candidates(group, solution, failing)[:MOST_TRIALS]:
+        suggestion = _try_candidate(group, policy, solution, failing, candidate, known)
         if suggestion is not None:
-            found.append((not suggestion.passes, rank(candidate.fix), suggestion))
+            found.append((not suggestion.passes, rank_of_fix(candidate.fix), suggestion))
     return [suggestion for *_, suggestion in sorted(found, key=lambda item: item[:2])]
 
 
-def _tried(
+def _try_candidate(
     group: Group,
     policy: Policy,
     solution: Solution,
@@ -133,7 +133,7 @@ def _tried(
         return None
     then = solve(edit.apply(group), policy, known)
     gate = next(gate for gate in then.gates if gate.name == failing.name)
-    if not then.passes and not _is_nearer(failing, gate, solution, then, candidate.fix.view):
+    if not then.passes and not _is_improvement(failing, gate, solution, then, candidate.fix.view):
         return None
     return Suggestion(
         gate=failing.name,
@@ -141,14 +141,16 @@ def _tried(
         sentence=candidate.sentence,
         fix=candidate.fix,
         point=candidate.point,
-        offers=offers(group, candidate.fix, candidate.point),
-        guide=guide(candidate.fix, candidate.point),
+        offers=offers_of_fix(group, candidate.fix, candidate.point),
+        guide=guide_of_fix(candidate.fix, candidate.point),
         value=gate.value,
         passes=then.passes,
     )
 
 
-def _is_nearer(before: Gate, after: Gate, now: Solution, then: Solution, view: str | None) -> bool:
+def _is_improvement(
+    before: Gate, after: Gate, now: Solution, then: Solution, view: str | None
+) -> bool:
     """Whether the failing gate passes, or the edited view's JaC rises."""
     if after.passed and not before.passed:
         return True
@@ -160,39 +162,44 @@ def _is_nearer(before: Gate, after: Gate, now: Solution, then: Solution, view: s
     return new.calibration.jac[0] > old.calibration.jac[0]
 
 
-def _distinct(group: Group, solution: Solution, failing: Gate) -> list[_Candidate]:
+def _distinct_candidates(group: Group, solution: Solution, failing: Gate) -> list[_Candidate]:
     """All ideas once, the gentlest first."""
     ideas: dict[Fix, _Candidate] = {}
-    for candidate in (*_of_findings(group, solution), *_of_gate(group, solution, failing)):
+    for candidate in (
+        *_candidates_of_findings(group, solution),
+        *_candidates_of_gate(group, solution, failing),
+    ):
         ideas.setdefault(candidate.fix, candidate)
-    return sorted(ideas.values(), key=lambda candidate: rank(candidate.fix))
+    return sorted(ideas.values(), key=lambda candidate: rank_of_fix(candidate.fix))
 
 
-def _of_findings(group: Group, solution: Solution) -> Iterator[_Candidate]:
+def _candidates_of_findings(group: Group, solution: Solution) -> Iterator[_Candidate]:
     for finding in solution.findings:
         fix = finding.fix
         view = None if fix is None or fix.view is None else group.view(fix.view)
         if fix is not None and view is not None:
-            yield _Candidate(sentence(group, fix), fix)
+            yield _Candidate(condition_sentence(group, fix), fix)
 
 
-def _of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Candidate]:
+def _candidates_of_gate(group: Group, solution: Solution, failing: Gate) -> Iterator[_Candidate]:
     for view in group.views:
         solved = solution.view(view.key)
         if solved is None:
             continue
         if not view.included:
             fix = Fix("include_view", view.key)
-            yield _Candidate(sentence(group, fix), fix)
+            yield _Candidate(condition_sentence(group, fix), fix)
         elif solved.failed == "jac":
-            yield from _of_undrawn(group, view, solved)
-            yield from _of_lines(group, view, solved)
+            yield from _candidates_of_undrawn_markings(group, view, solved)
+            yield from _candidates_of_lines(group, view, solved)
     explained = any(finding.kind in BETTER_CAUSES for finding in solution.findings)
     if failing.name == "reprojection" and not explained:
-        yield from _of_balls(group, solution)
+        yield from _candidates_of_balls(group, solution)
 
 
-def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Candidate]:
+def _candidates_of_undrawn_markings(
+    group: Group, view: View, solved: ViewSolution
+) -> Iterator[_Candidate]:
     """Draw what the camera sees and nobody has drawn: all of it, the longest first; stubs that
     nobody can see are said not to be visible, for two clicks anywhere would do as well."""
     # What stands there under a wrong name is relabelled, not drawn again.
@@ -211,7 +218,7 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Can
     for fit in undrawn:
         if fit.length_px < shortest:
             hide = Fix("hide_marking", view.key, fit.marking)
-            yield _Candidate(sentence(group, hide, max(fit.length_px, 1.0)), hide)
+            yield _Candidate(condition_sentence(group, hide, max(fit.length_px, 1.0)), hide)
     if not undrawn or undrawn[0].length_px < shortest or camera is None:
         return
     letter = view_letter(group.views.index(view))
@@ -220,7 +227,7 @@ def _of_undrawn(group: Group, view: View, solved: ViewSolution) -> Iterator[_Can
     advice = f"{' and '.join(names)} {verb} drawn in {letter}"
     fitted = group.pitch.with_goal(solved.calibration.goal)
     seen = project_markings(camera, fitted, view.size)
-    drawn = {fit.marking: _clicks_on(seen[fit.marking]) for fit in undrawn}
+    drawn = {fit.marking: _clicks_along(seen[fit.marking]) for fit in undrawn}
     fix = Fix("draw_marking", view.key, undrawn[0].marking)
     yield _Candidate(advice, fix, trial=SetLines(view.key, drawn))
 
@@ -229,14 +236,16 @@ def _is_undrawn(fit: MarkingFit) -> bool:
     return fit.outcome == "fp" and not fit.distances_px
 
 
-def _clicks_on(polyline: FloatArray) -> tuple[ImagePoint, ...]:
+def _clicks_along(polyline: FloatArray) -> tuple[ImagePoint, ...]:
     return tuple(map(ImagePoint._make, polyline[:: len(polyline) // _CLICKS + 1].tolist()))
 
 
-def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Candidate]:
+def _candidates_of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Candidate]:
     """Move or drop the worst point, or drop the marking, for each marking that does not count."""
-    off = [fit for fit in solved.calibration.markings if fit.outcome != "tp" and _largest(fit)]
-    for fit in sorted(off, key=_largest, reverse=True)[:MARKINGS_PER_VIEW]:
+    off = [
+        fit for fit in solved.calibration.markings if fit.outcome != "tp" and _largest_distance(fit)
+    ]
+    for fit in sorted(off, key=_largest_distance, reverse=True)[:MARKINGS_PER_VIEW]:
         index = max(range(len(fit.distances_px)), key=fit.distances_px.__getitem__)
         for action in ("move_point", "drop_point", "drop_marking"):
             if action == "drop_point" and len(fit.distances_px) <= MIN_POINTS_LEFT:
@@ -248,10 +257,10 @@ def _of_lines(group: Group, view: View, solved: ViewSolution) -> Iterator[_Candi
             if action == "move_point" and fit.distances_px[index] > slip:
                 continue
             point = fit.nearest[index] if action == "move_point" else None
-            yield _Candidate(sentence(group, fix, fit.distances_px[index]), fix, point)
+            yield _Candidate(condition_sentence(group, fix, fit.distances_px[index]), fix, point)
 
 
-def _of_balls(group: Group, solution: Solution) -> Iterator[_Candidate]:
+def _candidates_of_balls(group: Group, solution: Solution) -> Iterator[_Candidate]:
     """Look for the ball where the other view's ray passes, in either view of a pair.
 
     Nobody moves it there by a key: a ball that is put onto a ray meets it, right or wrong.
@@ -259,18 +268,18 @@ def _of_balls(group: Group, solution: Solution) -> Iterator[_Candidate]:
     for pair in solution.pairs:
         for moved, other in ((pair.a, pair.b), (pair.b, pair.a)):
             view = group.view(moved)
-            point = _beside_ray(group, solution, moved, other)
+            point = _ball_beside_ray(group, solution, moved, other)
             if view is None or point is None or view.ball is None or view.ball.center is None:
                 continue
             apart = math.dist(point, view.ball.center)
             if apart > MAX_BALL_SLIP_PERCENT / 100 * view.size.diagonal:
                 continue
             fix = Fix("look_ball", moved, to=other)
-            trial = ball_at(moved, view.ball, point)
-            yield _Candidate(sentence(group, fix, apart), fix, point, trial)
+            trial = move_ball_edit(moved, view.ball, point)
+            yield _Candidate(condition_sentence(group, fix, apart), fix, point, trial)
 
 
-def _beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:
+def _ball_beside_ray(group: Group, solution: Solution, moved: str, other: str) -> ImagePoint | None:
     """The place nearest to a view's ball where a ball on the other view's ray would be seen."""
     views = [group.view(key) for key in (moved, other)]
     solved = [solution.view(key) for key in (moved, other)]
@@ -291,5 +300,5 @@ def _beside_ray(group: Group, solution: Solution, moved: str, other: str) -> Ima
     return ImagePoint(float(nearest[0]), float(nearest[1]))
 
 
-def _largest(fit: MarkingFit) -> float:
+def _largest_distance(fit: MarkingFit) -> float:
     return max(fit.distances_px, default=0.0)

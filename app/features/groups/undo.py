@@ -9,23 +9,23 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.state import GroupState, Record
-from app.features.groups.submit import EditOptions, GroupChange, Plan, take_step
-from app.features.groups.undo_stacks import next_step
+from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
+from app.features.groups.undo_stacks import undo_entry_body
 
 
 def undo(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
     """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
-    return take_step(store, lambda _session: group_id, _plan_step("undo"), **how)
+    return submit_change(store, lambda _session: group_id, _plan_step("undo"), **how)
 
 
 def redo(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return take_step(store, lambda _session: group_id, _plan_step("redo"), **how)
+    return submit_change(store, lambda _session: group_id, _plan_step("redo"), **how)
 
 
 def _plan_step(kind: str) -> Plan:
     def plan(session: Session, record: Record, _actor: str) -> GroupChange:
-        body = next_step(session, record.stacks, kind, "in this group")
+        body = undo_entry_body(session, record.stacks, kind, "in this group")
         try:
             group = edit_from_json(body["edit"]).apply(record.stored.group)
         except NotFoundError as error:

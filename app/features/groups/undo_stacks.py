@@ -20,8 +20,8 @@ from app.db.log import (
 from app.db.session import Session
 from app.errors import ConflictError
 from app.features.groups.codecs import (
-    group_head_to_json,
-    logged_camera,
+    camera_of_log_entry,
+    group_without_views_to_json,
     station_from_json,
     view_from_json,
 )
@@ -69,7 +69,7 @@ class UndoStacks:
         return UndoStacks((*self.done, self.undone[-1]), self.undone[:-1])
 
 
-def next_step(session: Session, stacks: UndoStacks, kind: str, where: str) -> Json:
+def undo_entry_body(session: Session, stacks: UndoStacks, kind: str, where: str) -> Json:
     """Body of the entry that an undo or a redo writes: the edit that it makes, and back.
 
     Args:
@@ -96,7 +96,7 @@ def read_stacks(session: Session, group_ids: Sequence[int]) -> Mapping[int, Undo
     steps: dict[int, list[tuple[str, int]]] = {number: [] for number in group_ids}
     for row in group_steps(session, group_ids, GROUP_KINDS):
         steps[row.group_id].append((GROUP_KINDS[row.kind], row.id))
-    return {number: _stacks_of(taken) for number, taken in steps.items()}
+    return {number: _stacks_after(taken) for number, taken in steps.items()}
 
 
 def _read_newest(session: Session, group_id: int) -> UndoStacks:
@@ -105,7 +105,7 @@ def _read_newest(session: Session, group_id: int) -> UndoStacks:
     while True:
         rows = newest_steps(session, group_id, GROUP_KINDS, most)
         steps = [(GROUP_KINDS[row.kind], row.id) for row in reversed(rows)]
-        stacks = _stacks_of(steps) if len(rows) < most else _stacks_of_newest(steps)
+        stacks = _stacks_after(steps) if len(rows) < most else _stacks_of_newest(steps)
         if stacks is not None:
             return stacks
         most *= _FURTHER
@@ -119,7 +119,7 @@ def _stacks_of_newest(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
     """
     first = next((at for at, (kind, _) in enumerate(steps) if kind == "edit"), len(steps))
     try:
-        stacks = _stacks_of(steps[first:])
+        stacks = _stacks_after(steps[first:])
     except IndexError:
         return None
     return stacks if len(stacks.done) > 1 else None
@@ -128,10 +128,10 @@ def _stacks_of_newest(steps: Sequence[tuple[str, int]]) -> UndoStacks | None:
 def read_station_stacks(session: Session, station_id: int) -> UndoStacks:
     """The stacks of a shared station."""
     rows = station_steps(session, station_id, STATION_KINDS)
-    return _stacks_of((STATION_KINDS[row.kind], row.id) for row in rows)
+    return _stacks_after((STATION_KINDS[row.kind], row.id) for row in rows)
 
 
-def _stacks_of(steps: Iterable[tuple[str, int]]) -> UndoStacks:
+def _stacks_after(steps: Iterable[tuple[str, int]]) -> UndoStacks:
     """The stacks after all steps (kind, id of the entry): ``UndoStacks.then`` of each, in one go."""
     done: list[int] = []
     undone: list[int] = []
@@ -184,7 +184,7 @@ def base_digest(group: Group) -> str:
         ]
         for view in group.views
     ]
-    return digest([group_head_to_json(group), views])
+    return digest([group_without_views_to_json(group), views])
 
 
 def pitch_size(pitch: Pitch) -> str:
@@ -193,7 +193,7 @@ def pitch_size(pitch: Pitch) -> str:
 
 
 @dataclass
-class _Walk:
+class _LogWalk:
     """One group's log on the way from its first entry to its last."""
 
     snapshot: StateSnapshot
@@ -203,18 +203,18 @@ class _Walk:
     stations: dict[str, list[str]] = field(default_factory=dict)
     pitches: list[str] = field(default_factory=list)
 
-    def take(self, entry: LogEntry, by_key: Mapping[str, Station]) -> None:
+    def add_entry(self, entry: LogEntry, by_key: Mapping[str, Station]) -> None:
         assert entry.group_id is not None
         if entry.kind == "camera":
-            self._camera(entry)
+            self._add_camera(entry)
         apply_entry(self.snapshot, entry)
         if entry.kind == "import":
-            self.base = logged_group(entry.body["base"] or entry.body["group"], by_key)
+            self.base = group_of_log_entry(entry.body["base"] or entry.body["group"], by_key)
         if self.base is not None:
             self.bases[base_digest(self.base)] = None
-        self._note(self.snapshot.group(entry.group_id))
+        self._note_states(self.snapshot.group(entry.group_id))
 
-    def _camera(self, entry: LogEntry) -> None:
+    def _add_camera(self, entry: LogEntry) -> None:
         """A camera that came on its own is what the dataset brought, unless lines were edited."""
         assert entry.group_id is not None and entry.station_id is not None
         record = self.snapshot.stations[entry.station_id]
@@ -224,18 +224,18 @@ class _Walk:
         for item in (item for item in items if item.station_id == entry.station_id):
             view = self.base.view(item.view.key)
             if view is not None:
-                station = view.station.with_given(*logged_camera(entry.body))
+                station = view.station.with_given(*camera_of_log_entry(entry.body))
                 self.base = self.base.with_view(replace(view, station=station))
 
-    def _note(self, group: Group) -> None:
-        _add(self.pitches, pitch_size(group.pitch))
+    def _note_states(self, group: Group) -> None:
+        _append_if_new(self.pitches, pitch_size(group.pitch))
         for view in group.views:
-            _add(self.views.setdefault(view.key, []), view_digest(view))
+            _append_if_new(self.views.setdefault(view.key, []), view_digest(view))
             if not view.station.shared:
-                _add(self.stations.setdefault(view.key, []), station_digest(view.station))
+                _append_if_new(self.stations.setdefault(view.key, []), station_digest(view.station))
 
 
-def _add(states: list[str], state: str) -> None:
+def _append_if_new(states: list[str], state: str) -> None:
     if not states or states[-1] != state:
         states.append(state)
 
@@ -252,20 +252,22 @@ class RevisionChains:
         found = list(groups)
         touched = groups_with_past(self._session, [item.id for item in found])
         return {
-            item.id: self._walked(item) if item.id in touched else _untouched(item)
+            item.id: self._chain_from_log(item)
+            if item.id in touched
+            else _chain_of_unedited_group(item)
             for item in found
         }
 
-    def _walked(self, stored: StoredGroup) -> RevisionChain:
+    def _chain_from_log(self, stored: StoredGroup) -> RevisionChain:
         snapshot = StateSnapshot()
         for number, item in self._shared.items():
             snapshot.stations[number] = StationRecord(
                 self._dataset_id, item.station, item.revision, item.source_digest
             )
         by_key = {item.station.key: item.station for item in self._shared.values()}
-        walk = _Walk(snapshot)
+        walk = _LogWalk(snapshot)
         for entry in group_entries(self._session, stored.id, verdicts=False):
-            walk.take(entry, by_key)
+            walk.add_entry(entry, by_key)
         assert walk.base is not None
         return RevisionChain(
             base=walk.base,
@@ -276,7 +278,7 @@ class RevisionChains:
         )
 
 
-def _untouched(stored: StoredGroup) -> RevisionChain:
+def _chain_of_unedited_group(stored: StoredGroup) -> RevisionChain:
     group = stored.group
     return RevisionChain(
         base=group,
@@ -303,15 +305,15 @@ def station_revision_chain(session: Session, stored: StoredStation) -> StationRe
             base = station_from_json(entry.body["base"] or entry.body["station"])
         elif entry.kind == "camera" and unedited:
             base = station
-        _add(states, station_digest(station))
+        _append_if_new(states, station_digest(station))
     return StationRevisionChain(base, tuple(states) or (stored.digest,))
 
 
-def logged_group(value: Mapping[str, Any], shared: Mapping[str, Station]) -> Group:
+def group_of_log_entry(value: Mapping[str, Any], shared: Mapping[str, Station]) -> Group:
     """A group from JSON in which a shared station is its key."""
     return Group(
         key=value["key"],
-        views=tuple(_logged_view(view, shared) for view in value["views"]),
+        views=tuple(_view_of_log_entry(view, shared) for view in value["views"]),
         match=value["match"],
         pitch=Pitch(*value["pitch"]),
         split=value["split"],
@@ -319,6 +321,6 @@ def logged_group(value: Mapping[str, Any], shared: Mapping[str, Station]) -> Gro
     )
 
 
-def _logged_view(value: Mapping[str, Any], shared: Mapping[str, Station]) -> View:
+def _view_of_log_entry(value: Mapping[str, Any], shared: Mapping[str, Station]) -> View:
     station = value["station"]
     return view_from_json(value, shared[station] if isinstance(station, str) else None)

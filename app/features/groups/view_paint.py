@@ -14,7 +14,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError, ReviewError
 from app.features.groups.edit import LineChanges, SetLines
-from app.features.groups.edit_codec import require_few_points_in_all
+from app.features.groups.edit_codec import require_point_limits_of_edits
 from app.features.groups.pictures import PaintTask, read_view_paint
 from app.features.groups.queries import StoredGroup, group_of_view, read_groups
 from app.features.pitches.queries import groups_of_match
@@ -50,7 +50,7 @@ NO_FRAME_HINT = "The report of the import gives the reason. Correct the files an
 
 
 @dataclass(frozen=True)
-class PaintQuestion:
+class ViewPaintRequest:
     """A view as its lines are now, and the camera that they make.
 
     Attributes:
@@ -66,7 +66,7 @@ class PaintQuestion:
     known: tuple[Camera, ...] = ()
     drawn: Lines = field(default_factory=dict)
 
-    def ask_paint(self, frames: Frames) -> PoolTask:
+    def request_paint(self, frames: Frames) -> PoolTask:
         """Have the paint read near the camera; the result is a ``ViewPaint``."""
         station = self.view.station
         return frames.ask_of(
@@ -74,7 +74,7 @@ class PaintQuestion:
             station.size, self.start, self.group.pitch, self.policy, self.view.extras.places,
         )  # fmt: skip
 
-    def ask_proposal(self, frames: Frames) -> PoolTask:
+    def request_proposal(self, frames: Frames) -> PoolTask:
         """Have lines proposed; the result is a ``ViewProposal``."""
         station = self.view.station
         return frames.ask_of(
@@ -83,7 +83,7 @@ class PaintQuestion:
         )  # fmt: skip
 
 
-def paint_question(store: Store, view_id: int, lines: LineChanges) -> PaintQuestion:
+def make_paint_request(store: Store, view_id: int, lines: LineChanges) -> ViewPaintRequest:
     """What to ask about a view whose lines are changed like this, unsaved.
 
     Raises:
@@ -91,10 +91,10 @@ def paint_question(store: Store, view_id: int, lines: LineChanges) -> PaintQuest
         InputError: The lines say something impossible.
     """
     with store.read() as session:
-        return _question(session, view_id, lines)
+        return _make_request(session, view_id, lines)
 
 
-def proposal_question(store: Store, view_id: int, lines: LineChanges) -> PaintQuestion:
+def make_proposal_request(store: Store, view_id: int, lines: LineChanges) -> ViewPaintRequest:
     """What to ask about a view whose lines are changed like this, with what its match knows.
 
     What is drawn stays also where it determines a camera already: whoever asks may not know yet.
@@ -104,30 +104,30 @@ def proposal_question(store: Store, view_id: int, lines: LineChanges) -> PaintQu
         InputError: The lines say something impossible.
     """
     with store.read() as session:
-        question = _question(session, view_id, lines)
-        known = known_cameras(session, _find(session, view_id)[0])
+        question = _make_request(session, view_id, lines)
+        known = nearby_cameras_of_match(session, _find_group_and_view(session, view_id)[0])
     return replace(question, known=known, drawn=question.view.station.lines)
 
 
-def _question(session: Session, view_id: int, lines: LineChanges) -> PaintQuestion:
-    stored, view = _find(session, view_id)
+def _make_request(session: Session, view_id: int, lines: LineChanges) -> ViewPaintRequest:
+    stored, view = _find_group_and_view(session, view_id)
     edit = SetLines(view.key, lines)
-    require_few_points_in_all(stored.group, [edit])
+    require_point_limits_of_edits(stored.group, [edit])
     group, policy = edit.apply(stored.group), stored.policy
     known = known_calibrations(session, [group], policy)
     changed = next(item for item in group.views if item.key == view.key)
     # What the lines alone make: what was read of the paint before has no part in what is read.
     start = known.get(clicks_key(group, changed, policy.calibration))
-    return PaintQuestion(
+    return ViewPaintRequest(
         group,
         changed,
-        _media(changed),
+        _require_media(changed),
         policy.calibration,
         start=start or calibrate_clicks(group, changed, policy.calibration),
     )
 
 
-def _find(session: Session, view_id: int) -> tuple[StoredGroup, View]:
+def _find_group_and_view(session: Session, view_id: int) -> tuple[StoredGroup, View]:
     group_id = group_of_view(session, view_id)
     stored = read_groups(session, [group_id])[group_id]
     key = next(key for key, number in stored.view_ids.items() if number == view_id)
@@ -136,13 +136,13 @@ def _find(session: Session, view_id: int) -> tuple[StoredGroup, View]:
     return stored, view
 
 
-def _media(view: View) -> Media:
+def _require_media(view: View) -> Media:
     if view.media is None:
         raise NotFoundError(f"view {view.key}: this view has no readable frame", hint=NO_FRAME_HINT)
     return view.media
 
 
-def known_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
+def nearby_cameras_of_match(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
     """Cameras of the main views of the groups of the match that are nearest by their number.
 
     Those that their lines leave open say nothing of a stand, and lenses of another kind nothing
@@ -160,10 +160,10 @@ def known_cameras(session: Session, stored: StoredGroup) -> tuple[Camera, ...]:
             item = known.get(view_key(group, view, policy))
             if item is not None and item.camera is not None and not item.unobservable:
                 found.append((item.camera, view.size))
-    return tuple(camera for camera, size in found if _is_plain(camera, size))
+    return tuple(camera for camera, size in found if _has_plain_lens(camera, size))
 
 
-def _is_plain(camera: Camera, size: ImageSize) -> bool:
+def _has_plain_lens(camera: Camera, size: ImageSize) -> bool:
     """Whether a camera has the lens that the search knows: its centre in the middle, square pixels
     and a radial term."""
     off = np.subtract(camera.principal_point, principal_point(size))
@@ -179,13 +179,13 @@ SECONDS = 5.0
 """Longer nobody waits for a frame; it is then read when paint is read again."""
 
 
-class PaintFollower:
+class PaintUpdater:
     """Reads the paint of an edited group again, in the processes that make pictures."""
 
     def __init__(self, frames: Frames):
         self._frames = frames
 
-    def follow(
+    def update_paint(
         self, group: Group, policy: CalibrationPolicy, known: Mapping[str, Calibration]
     ) -> Group:
         """The group with its paint read for the lines that it has now; itself where it was.
@@ -195,13 +195,13 @@ class PaintFollower:
             policy: Of its dataset, for calibrations.
             known: Calibrations by key.
         """
-        tasks = list(_stale(group, policy, known))
+        tasks = list(_outdated_tasks(group, policy, known))
         if not tasks:
             return group
-        read = dict(self._read(tasks))
+        read = dict(self._read_pictures(tasks))
         return replace(group, paint={**group.paint, **read}) if read else group
 
-    def _read(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
+    def _read_pictures(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
         """By view what was read of those whose picture could be read in time."""
         release_admission()
         end = monotonic() + SECONDS
@@ -223,7 +223,7 @@ class PaintFollower:
                 yield task.view.key, reading
 
 
-class WithoutPictures(PaintFollower):
+class WithoutPictures(PaintUpdater):
     """Where no picture can be read: ``missed`` says that one would have been.
 
     A camera of clicks alone would be another answer than the one that is asked for.
@@ -232,12 +232,12 @@ class WithoutPictures(PaintFollower):
     def __init__(self) -> None:
         self.missed = False
 
-    def _read(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
+    def _read_pictures(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
         self.missed = True
         return iter(())
 
 
-def _stale(
+def _outdated_tasks(
     group: Group, policy: CalibrationPolicy, known: Mapping[str, Calibration]
 ) -> Iterator[PaintTask]:
     """Views whose paint was read for other clicks than they have, or, with that of others, not yet."""

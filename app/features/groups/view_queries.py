@@ -27,7 +27,7 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 
 
-class _Framed:
+class _FrameRow:
     """A row with the place of a frame."""
 
     media_path: str | None
@@ -43,7 +43,7 @@ class _Framed:
 
 
 @dataclass(frozen=True)
-class StoredView(_Framed):
+class StoredView(_FrameRow):
     """A view with its annotated size in pixels, its frame, and its balls as they are stored.
 
     Attributes:
@@ -98,11 +98,11 @@ def dataset_views(
         where.append(ViewModel.id.in_(ids))
     if without_ball:
         where.append(ViewModel.balls == "[]")
-    return _views(session, *where)
+    return _read_views(session, *where)
 
 
 @dataclass(frozen=True)
-class ViewFileFields(_Framed):
+class ViewFileFields(_FrameRow):
     """What names the files of a view in an export."""
 
     group_id: int
@@ -120,7 +120,7 @@ class ViewFileFields(_Framed):
     media_frame: int | None
 
 
-def named_views(session: Session, group_ids: Sequence[int]) -> list[ViewFileFields]:
+def view_file_fields(session: Session, group_ids: Sequence[int]) -> list[ViewFileFields]:
     """The views of a few hundred groups in the order of their dataset."""
     view, group, station = ViewModel, GroupModel, StationModel
     statement = (
@@ -148,12 +148,12 @@ def frame_files(session: Session, dataset_id: int) -> list[str]:
 
 def group_views(session: Session, group_id: int) -> list[StoredView]:
     """The views of a group in their order."""
-    return _views(session, ViewModel.group_id == group_id)
+    return _read_views(session, ViewModel.group_id == group_id)
 
 
 def find_view(session: Session, view_id: int) -> StoredView | None:
     """One view by its id."""
-    return next(iter(_views(session, ViewModel.id == view_id)), None)
+    return next(iter(_read_views(session, ViewModel.id == view_id)), None)
 
 
 def group_dataset(session: Session, group_id: int) -> int | None:
@@ -176,7 +176,7 @@ def present_ids(
     return found
 
 
-def _views(session: Session, *where: ColumnElement[bool]) -> list[StoredView]:
+def _read_views(session: Session, *where: ColumnElement[bool]) -> list[StoredView]:
     view, group, station = ViewModel, GroupModel, StationModel
     statement = (
         select(
@@ -222,14 +222,14 @@ def stored_station(row: Any) -> StoredStation:
         key=row.key,
         size=ImageSize(row.width, row.height),
         shared=row.shared,
-        lines=_lines(row.lines),
+        lines=_lines_from_text(row.lines),
         given=None if row.given is None else _camera(row.given),
         calibration=row.calibration,
         flipped=row.flipped,
-        given_covariance=None if row.given is None else _covariance(row.given),
-        picture=None if row.picture is None else _picture(row.picture),
-        proposed=() if row.proposed is None else _proposed(row.proposed),
-        not_visible=_not_visible(row.lines),
+        given_covariance=None if row.given is None else _covariance_from_text(row.given),
+        picture=None if row.picture is None else _picture_from_text(row.picture),
+        proposed=() if row.proposed is None else _proposed_from_text(row.proposed),
+        not_visible=_not_visible_from_text(row.lines),
     )
     return StoredStation(
         row.id, row.dataset_id, row.revision, station, row.digest, row.source_digest
@@ -268,13 +268,13 @@ def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]
 
 
 @lru_cache(maxsize=1024)
-def _lines(text: str) -> Lines:
+def _lines_from_text(text: str) -> Lines:
     with as_written():
         return codecs.lines_from_json(parse(text))
 
 
 @lru_cache(maxsize=1024)
-def _not_visible(text: str) -> tuple[str, ...]:
+def _not_visible_from_text(text: str) -> tuple[str, ...]:
     with as_written():
         return codecs.not_visible_from_json(parse(text))
 
@@ -286,18 +286,18 @@ def _camera(text: str) -> Camera:
 
 
 @lru_cache(maxsize=1024)
-def _covariance(text: str) -> tuple[float, ...] | None:
+def _covariance_from_text(text: str) -> tuple[float, ...] | None:
     with as_written():
         return codecs.covariance_from_json(parse(text).get("covariance"))
 
 
 @lru_cache(maxsize=256)
-def _proposed(text: str) -> tuple[str, ...]:
+def _proposed_from_text(text: str) -> tuple[str, ...]:
     with as_written():
         return tuple(map(str, parse(text)))
 
 
 @lru_cache(maxsize=256)
-def _picture(text: str) -> PictureGeometry | None:
+def _picture_from_text(text: str) -> PictureGeometry | None:
     with as_written():
         return codecs.picture_from_json(parse(text))

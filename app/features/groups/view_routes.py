@@ -91,9 +91,9 @@ def patch_lines(
     def edit(key: str) -> Edit:
         return SetLines(key, *values)
 
-    apart = partial(services.large.run, solve_encoded)
+    apart = partial(services.large.solve, solve_encoded)
     solve = apart if is_large(request.scope) else solve_encoded
-    return _submit(services, view, edit, if_match, actor, solve)
+    return _submit_view_edit(services, view, edit, if_match, actor, solve)
 
 
 @router.patch(
@@ -114,7 +114,7 @@ def patch_ball(
 ) -> GroupState:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
     value = None if ball is None else ball.ball()
-    return _submit(services, view, lambda key: SetBall(key, value), if_match, actor)
+    return _submit_view_edit(services, view, lambda key: SetBall(key, value), if_match, actor)
 
 
 @router.patch(
@@ -139,10 +139,10 @@ def patch_view(
             return SetPicture(key, None if picture is None else picture.picture())
         return IncludeView(key, change.included, change.reason, change.note)
 
-    return _submit(services, view, edit, if_match, actor)
+    return _submit_view_edit(services, view, edit, if_match, actor)
 
 
-def _submit(
+def _submit_view_edit(
     services: Services,
     view: int,
     edit_of: Callable[[str], Edit],
@@ -185,11 +185,11 @@ async def get_image(
     """The frame of a view, or one just before or after it, scaled down when a width is given."""
     found = await to_thread.run_sync(find_view, services.store, view)
     if offset:
-        around = await _neighbours(request, services.frames, found)
+        around = await _read_neighbour_frames(request, services.frames, found)
         if around is None:
             return Response(status_code=CLIENT_GONE)
-        found = replace(found, media=_so_far_away(found, around, offset))
-    picture = await _picture(request, services.frames, found, clamp_width(width))
+        found = replace(found, media=_frame_at_offset(found, around, offset))
+    picture = await _read_picture(request, services.frames, found, clamp_width(width))
     if picture is None:
         return Response(status_code=CLIENT_GONE)
     etag = f'"{picture.digest}"'
@@ -217,13 +217,15 @@ async def get_neighbours(
     datasets are numbered by action.
     """
     found = await to_thread.run_sync(find_view, services.store, view)
-    around = await _neighbours(request, services.frames, found)
+    around = await _read_neighbour_frames(request, services.frames, found)
     if around is None:
         return Response(status_code=CLIENT_GONE)
     return NeighbourList.of(view, sorted(around), NO_NEIGHBOURS)
 
 
-async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict[int, Media] | None:
+async def _read_neighbour_frames(
+    request: Request, frames: Frames, view: FoundView
+) -> dict[int, Media] | None:
     """Where the frames before and after a view's lie, by how many frames later.
 
     None where nobody waits for it any more.
@@ -246,7 +248,7 @@ async def _neighbours(request: Request, frames: Frames, view: FoundView) -> dict
     return found
 
 
-def _so_far_away(view: FoundView, around: dict[int, Media], offset: int) -> Media:
+def _frame_at_offset(view: FoundView, around: dict[int, Media], offset: int) -> Media:
     """The frame so many frames later."""
     if not around:
         raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
@@ -255,7 +257,7 @@ def _so_far_away(view: FoundView, around: dict[int, Media], offset: int) -> Medi
     return around[offset]
 
 
-async def _picture(
+async def _read_picture(
     request: Request, frames: Frames, view: FoundView, width: int | None
 ) -> SentPicture | None:
     """The frame, or None where nobody waits for it any more.

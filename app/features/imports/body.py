@@ -12,7 +12,7 @@ from app.db.json_columns import Json
 from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.features.findings.queries import add_group_findings, group_findings, groups_with_finding
-from app.features.groups.codecs import group_head_to_json, view_to_json
+from app.features.groups.codecs import group_without_views_to_json, view_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KIND
 from app.features.groups.revision_queries import save_group
@@ -24,7 +24,7 @@ from app.soccer.annotation import Lines
 from app.soccer.group import Group, View
 
 
-def places_of(stored: StoredGroup) -> dict[str, tuple[int, int]]:
+def row_ids_of_views(stored: StoredGroup) -> dict[str, tuple[int, int]]:
     """Ids of each view and its station, by the view's key."""
     return {key: (stored.view_ids[key], stored.stations[key].id) for key in stored.view_ids}
 
@@ -43,25 +43,25 @@ def import_body(
     return {
         "source": source,
         "source_hash": digest,
-        "group": _logged(group),
-        "base": None if base is None or base == group else _logged(base),
+        "group": _group_to_log(group),
+        "base": None if base is None or base == group else _group_to_log(base),
         "ids": {key: list(pair) for key, pair in places.items()},
     }
 
 
-def _logged(group: Group) -> Json:
+def _group_to_log(group: Group) -> Json:
     """A group in which a shared station is its key: the log has it in an entry of its own."""
     views = [
         view_to_json(view, view.station.key if view.station.shared else None)
         for view in group.views
     ]
-    return {**group_head_to_json(group), "views": views}
+    return {**group_without_views_to_json(group), "views": views}
 
 
 GONE = "this group is no longer in the imported files; it is kept until a person rejects it"
 
 
-def of_read_matches(
+def missing_of_read_matches(
     session: Session, dataset_id: int, seen: Collection[str], missing: Collection[int]
 ) -> list[int]:
     """Those of the missing groups whose match came all the same: they are truly gone.
@@ -81,7 +81,7 @@ def of_read_matches(
     return [group.id for group in groups if group.id in missing and group.match in matches]
 
 
-def note_gone(
+def save_gone_findings(
     session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
 ) -> int:
     """Save a finding for each group that has none of the kind yet; returns how many."""
@@ -92,7 +92,7 @@ def note_gone(
     for number, item in stored.items():
         base = chains[number].base
         save_group(session, item, item.group, at=at, source=base)
-        body = _body(item, base, source, group_findings(session, number))
+        body = _gone_entry_body(item, base, source, group_findings(session, number))
         entries.append(Entry("import", actor, at, body, dataset_id, number))
     if entries:
         append(session, entries)
@@ -101,13 +101,13 @@ def note_gone(
     return len(entries)
 
 
-def _body(
+def _gone_entry_body(
     stored: StoredGroup,
     base: Group,
     source: str,
     noticed: Iterable[tuple[str | None, str]],
 ) -> dict[str, Json]:
-    body = import_body(stored.group, base, source, stored.source_hash, places_of(stored))
+    body = import_body(stored.group, base, source, stored.source_hash, row_ids_of_views(stored))
     body["kept"] = [[view, sentence] for view, sentence in [*noticed, (None, GONE)]]
     return body
 
@@ -132,18 +132,18 @@ class GroupLimits:
         self._told: set[str] = set()
         """Static cameras whose markings are told already: every group brings them again."""
 
-    def held(self, group: Group) -> Group | None:
+    def limit_group(self, group: Group) -> Group | None:
         """The group with no more points than its views may have; None where it has too many views."""
         count = len(group.views)
         if count > MAX_VIEWS:
             problem = f"has {count:,} views, a group may have {MAX_VIEWS}; it is left out"
             self._report.note(self._source, group.key, None, problem)
             return None
-        return replace(group, views=tuple(self._thinned(group, view) for view in group.views))
+        return replace(group, views=tuple(self._thin_view(group, view) for view in group.views))
 
-    def _thinned(self, group: Group, view: View) -> View:
+    def _thin_view(self, group: Group, view: View) -> View:
         station = view.station
-        dense = list(_too_dense(station.lines))
+        dense = list(_densest_markings(station.lines))
         if not dense:
             return view
         if station.key not in self._told:
@@ -158,7 +158,7 @@ class GroupLimits:
     def _report_left_out(self, group: Group, view: View, marking: str) -> None:
         station = view.station
         what = f"camera {station.key}" if station.shared else f"view {view.key}"
-        count, total = len(station.lines[marking]), points_of(station.lines)
+        count, total = len(station.lines[marking]), count_points(station.lines)
         problem = (
             f"has {count:,} of {total:,} points, and a view may have {MAX_POINTS:,}; "
             "this marking is left out"
@@ -166,14 +166,14 @@ class GroupLimits:
         self._report.note(self._source, group.key, f"{what}, {marking}", problem)
 
 
-def points_of(lines: Lines) -> int:
+def count_points(lines: Lines) -> int:
     """How many points lines have in all."""
     return sum(map(len, lines.values()))
 
 
-def _too_dense(lines: Lines) -> Iterator[str]:
+def _densest_markings(lines: Lines) -> Iterator[str]:
     """The densest markings, as many as have to go until the others may stay."""
-    total = points_of(lines)
+    total = count_points(lines)
     for marking in sorted(lines, key=lambda name: len(lines[name]), reverse=True):
         if total <= MAX_POINTS:
             return

@@ -12,7 +12,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
 from app.features.groups.codecs import camera_to_json, covariance_to_json
-from app.features.groups.revision_queries import bump_groups, refresh_inputs_hashes
+from app.features.groups.revision_queries import bump_group_revisions, refresh_inputs_hashes
 from app.features.groups.view_queries import (
     dataset_views,
     groups_of_station,
@@ -87,13 +87,15 @@ def ingest_cameras(
     """
     report, found = IngestReport(), get_dataset_head(store, dataset)
     with store.read() as session:
-        places = _places(session, found.id)
+        places = _stations_by_name(session, found.id)
     known: list[tuple[NamedStation, GivenCamera]] = []
     for name in sorted(cameras):
-        fitting = _fitting(places, name)
+        fitting = _stations_of_name(places, name)
         matches = {place.match for place in fitting}
         if not fitting:
-            report.problems.append(f'camera "{name}": no view has this name{_examples(places)}')
+            report.problems.append(
+                f'camera "{name}": no view has this name{_example_names(places)}'
+            )
             continue
         if len(matches) > 1:
             report.problems.append(
@@ -110,11 +112,11 @@ def ingest_cameras(
                 f"{size.width}x{size.height}; that of the file counts"
             )
         made_for = stated or size
-        report.problems.extend(_of_other_size(name, cameras[name], fitting, made_for))
+        report.problems.extend(_size_warnings(name, cameras[name], fitting, made_for))
         record = {COVARIANCE: (covariances or {}).get(name)}
         for place in fitting:
             covariance = covariance_from_json(record, cameras[name], made_for or place.size)
-            camera = _sized(cameras[name], made_for, place.size)
+            camera = _scaled_camera(cameras[name], made_for, place.size)
             known.append((place, GivenCamera(camera, covariance)))
     for start in range(0, len(known), BATCH):
         with ingest_session(store, keep=not dry_run) as session:
@@ -123,7 +125,7 @@ def ingest_cameras(
     return report
 
 
-def _places(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
+def _stations_by_name(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
     places: dict[str, list[NamedStation]] = {}
     for row in dataset_views(session, dataset_id):
         stem = str(PurePosixPath(row.key).with_suffix(""))
@@ -143,7 +145,7 @@ def _places(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
     return places
 
 
-def _fitting(places: Mapping[str, list[NamedStation]], name: str) -> list[NamedStation]:
+def _stations_of_name(places: Mapping[str, list[NamedStation]], name: str) -> list[NamedStation]:
     """What a name means; folders before it do not matter where no match could be one of them."""
     parts = name.split("/")
     for start in range(len(parts)):
@@ -153,19 +155,19 @@ def _fitting(places: Mapping[str, list[NamedStation]], name: str) -> list[NamedS
     return []
 
 
-def _examples(places: Mapping[str, list[NamedStation]]) -> str:
+def _example_names(places: Mapping[str, list[NamedStation]]) -> str:
     names = [f'"{name}"' for name in sorted(places) if "/" not in name]
     more = " and more" if len(names) > EXAMPLES else ""
     return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
 
 
-def _sized(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camera:
+def _scaled_camera(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camera:
     if made_for is None or made_for == size:
         return camera
     return camera.scaled(size.width / made_for.width, size.height / made_for.height)
 
 
-def _of_other_size(
+def _size_warnings(
     name: str, camera: Camera, fitting: Sequence[NamedStation], made_for: ImageSize | None
 ) -> Iterator[str]:
     """What to say of a camera whose principal point is the middle of another size than was said."""
@@ -212,7 +214,7 @@ def attach_cameras(
             body["covariance"] = covariance_to_json(given.covariance)
         entries.append(Entry("camera", actor, at, body, dataset_id, place.group, place.station))
         if place.group is not None:
-            bump_groups(session, [place.group], at)
+            bump_group_revisions(session, [place.group], at)
         touched.update(groups_of_station(session, place.station))
         report.changed += 1
     append(session, entries)

@@ -21,7 +21,7 @@ from app.features.datasets.service import DatasetHead, licence_text, read_datase
 from app.features.exports.queries import newest_entry_time
 from app.features.findings.queries import dismissals_to_merge
 from app.features.groups.codecs import (
-    group_head_to_json,
+    group_without_views_to_json,
     policy_to_json,
     station_to_json,
     view_to_json,
@@ -66,8 +66,8 @@ def export_edits(
     with store.read() as session, output as root:
         found = read_dataset_head(session, dataset)
         counts = {
-            "stations": _write_lines(root / STATIONS, _stations(session, found.id)),
-            "groups": _write_lines(root / GROUPS, _groups(session, found, progress)),
+            "stations": _write_lines(root / STATIONS, _exported_stations(session, found.id)),
+            "groups": _write_lines(root / GROUPS, _exported_groups(session, found, progress)),
             "spare": _write_lines(root / SPARE, _unassigned_values(session, found.id)),
         }
         head = {
@@ -77,7 +77,7 @@ def export_edits(
             "policy": policy_to_json(found.policy),
         }
         (root / HEAD).write_text(json_text(head, indent=1, ascii_=True) + "\n", encoding="utf-8")
-        write_manifest(root, _manifest(session, found, counts), progress)
+        write_manifest(root, _make_manifest(session, found, counts), progress)
     return counts
 
 
@@ -91,7 +91,7 @@ def group_to_merge(group: Group) -> dict[str, Json]:
         views.append(value)
     # Where a match puts its cameras follows from its lines, how noisy balls are from the balls, and
     # paint is read in pictures, there as here.
-    return {**group_head_to_json(replace(group, positions={}, paint={})), "views": views}
+    return {**group_without_views_to_json(replace(group, positions={}, paint={})), "views": views}
 
 
 def _write_lines(path: Path, items: Iterator[Json]) -> int:
@@ -103,7 +103,7 @@ def _write_lines(path: Path, items: Iterator[Json]) -> int:
     return count
 
 
-def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
+def _exported_stations(session: Session, dataset_id: int) -> Iterator[Json]:
     for stored in shared_stations(session, dataset_id):
         chain = station_revision_chain(session, stored)
         station, base = station_to_json(stored.station), station_to_json(chain.base)
@@ -112,11 +112,11 @@ def _stations(session: Session, dataset_id: int) -> Iterator[Json]:
             "station": station,
             "base": None if base == station else base,
             "states": list(chain.states),
-            "log": _log(station_entries(session, stored.id)),
+            "log": _edit_entries_to_json(station_entries(session, stored.id)),
         }
 
 
-def _groups(
+def _exported_groups(
     session: Session, dataset: DatasetHead, progress: ReportProgress | None
 ) -> Iterator[Json]:
     chains = RevisionChains(session, dataset.id)
@@ -126,16 +126,18 @@ def _groups(
         known, verdicts = chains.of(stored.values()), group_verdicts(session, stored)
         checked = dismissals_to_merge(session, stored)
         for item in stored.values():
-            exported = _group(session, item, known[item.id], verdicts.get(item.id, []))
+            exported = _exported_group(session, item, known[item.id], verdicts.get(item.id, []))
             # Earlier releases know no such key: it is there where it says something.
             yield exported | ({"dismissals": checked[item.id]} if item.id in checked else {})
         if progress is not None:
             progress(start + len(stored), len(ids))
 
 
-def _group(session: Session, stored: StoredGroup, chain: RevisionChain, verdicts: Json) -> Json:
+def _exported_group(
+    session: Session, stored: StoredGroup, chain: RevisionChain, verdicts: Json
+) -> Json:
     group, base = group_to_merge(stored.group), group_to_merge(chain.base)
-    walked = len(chain.bases) > 1 or base != group or _has_past(chain)
+    walked = len(chain.bases) > 1 or base != group or _has_several_states(chain)
     return {
         "group": group,
         "base": None if base == group else base,
@@ -143,17 +145,17 @@ def _group(session: Session, stored: StoredGroup, chain: RevisionChain, verdicts
         "views": {key: list(states) for key, states in chain.views.items()},
         "stations": {key: list(states) for key, states in chain.stations.items()},
         "pitches": list(chain.pitches),
-        "log": _log(group_entries(session, stored.id)) if walked else [],
+        "log": _edit_entries_to_json(group_entries(session, stored.id)) if walked else [],
         "verdicts": verdicts,
     }
 
 
-def _has_past(chain: RevisionChain) -> bool:
+def _has_several_states(chain: RevisionChain) -> bool:
     states = [*chain.views.values(), *chain.stations.values()]
     return any(len(item) > 1 for item in states)
 
 
-def _log(logged: Iterable[LogEntry]) -> list[Json]:
+def _edit_entries_to_json(logged: Iterable[LogEntry]) -> list[Json]:
     """Who edited what and when; carried edits of a third installation too."""
     entries: list[Json] = []
     for entry in logged:
@@ -170,7 +172,7 @@ def _unassigned_values(session: Session, dataset_id: int) -> Iterator[Json]:
         yield {"camera": row.camera, "frame": row.frame, "extras": unpack(row.extras)}
 
 
-def _manifest(session: Session, dataset: DatasetHead, counts: Mapping[str, int]) -> Manifest:
+def _make_manifest(session: Session, dataset: DatasetHead, counts: Mapping[str, int]) -> Manifest:
     matches = {group.match for group in known_groups(session, dataset.id)}
     return Manifest(
         dataset=dataset.name,

@@ -15,7 +15,7 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.imports.upload_parts import PartWriter as PartWriter
-from app.features.imports.upload_parts import begin_in_parts as begin_in_parts
+from app.features.imports.upload_parts import begin_upload_in_parts as begin_upload_in_parts
 from app.features.imports.upload_queries import Upload as Upload
 from app.features.imports.upload_queries import UploadWriter as UploadWriter
 from app.features.imports.upload_queries import (
@@ -23,7 +23,7 @@ from app.features.imports.upload_queries import (
     get_upload,
     list_uploads,
     require_size,
-    require_unread,
+    require_unused_by_datasets,
 )
 from app.features.imports.upload_quota import quota_of as quota_of
 from app.features.imports.upload_quota import used_bytes as used_bytes
@@ -119,16 +119,16 @@ def list_folder(settings: Settings, path: str = "") -> FolderListing:
         return FolderListing("", None, tuple(roots), False)
     found = resolve_folder(settings, path)
     if isinstance(found, StoredPath):
-        return _list_stored(found)
+        return _list_store_folder(found)
     if not found.is_dir():
         return FolderListing(path, guess_format(found), (), False)
-    items = list(islice(_items(found, path.rstrip("/")), MAX_ITEMS + 1))
+    items = list(islice(_folder_items(found, path.rstrip("/")), MAX_ITEMS + 1))
     items.sort(key=lambda item: (not item.folder, item.name))
     more = len(items) > MAX_ITEMS
     return FolderListing(path, guess_format(found), tuple(items[:MAX_ITEMS]), more)
 
 
-def _list_stored(found: StoredPath) -> FolderListing:
+def _list_store_folder(found: StoredPath) -> FolderListing:
     """What is in a folder of a store; one request, so that the format is guessed of this level."""
     if not found.is_dir():
         return FolderListing(str(found), guess_format_of_names([found.name]), (), False)
@@ -137,24 +137,24 @@ def _list_stored(found: StoredPath) -> FolderListing:
     items = [FolderItem(f"{at}/{name}", name, True) for name in folders]
     names = [stored.key.rpartition("/")[2] for stored in objects]
     items += [FolderItem(f"{at}/{name}", name, False) for name in names]
-    items = [item for item in items if not item.name.startswith(".") and _is_name(item.name)]
+    items = [item for item in items if not item.name.startswith(".") and _is_valid_name(item.name)]
     items.sort(key=lambda item: (not item.folder, item.name))
     shown, more = tuple(items[:MAX_ITEMS]), len(items) > MAX_ITEMS
     return FolderListing(at, guess_format_of_names(names), shown, more)
 
 
-def _items(folder: Path, path: str) -> Iterator[FolderItem]:
+def _folder_items(folder: Path, path: str) -> Iterator[FolderItem]:
     with os.scandir(folder) as entries:
         for entry in entries:
             hidden = entry.name.startswith(".")
             # A link may lead out; what it leads to is reached by its own name, if it may be.
-            if hidden or entry.is_symlink() or not _is_name(entry.name):
+            if hidden or entry.is_symlink() or not _is_valid_name(entry.name):
                 continue
             if entry.is_dir() or entry.is_file():
                 yield FolderItem(f"{path}/{entry.name}", entry.name, entry.is_dir())
 
 
-def _is_name(name: str) -> bool:
+def _is_valid_name(name: str) -> bool:
     try:
         return bool(require_safe_path(name))
     except InputError:
@@ -213,7 +213,7 @@ def own_uploads(settings: Settings, visibility: Visibility) -> list[Upload]:
     ]
 
 
-def delete_sent(store: Store, upload_id: str, mine: Callable[[str], bool]) -> None:
+def delete_own_upload(store: Store, upload_id: str, mine: Callable[[str], bool]) -> None:
     """Delete an upload, or no longer be among those who sent it while others have sent it, too.
 
     What goes is a file, which no transaction holds. Under a key, that it is to go is written down
@@ -232,7 +232,7 @@ def delete_sent(store: Store, upload_id: str, mine: Callable[[str], bool]) -> No
     if not has_key():
         delete_upload(store.settings, upload_id, mine)
         return
-    begun = _interrupted_deletion(store) or _begin(store, upload_id)
+    begun = _interrupted_deletion(store) or _begin_deletion(store, upload_id)
     with suppress(NotFoundError):
         # One that was sent once more meanwhile is another.
         if get_upload(store.settings, begun["upload"]).created == begun["created"]:
@@ -247,9 +247,9 @@ def _interrupted_deletion(store: Store) -> Json | None:
         return read_progress(session)
 
 
-def _begin(store: Store, upload_id: str) -> Json:
+def _begin_deletion(store: Store, upload_id: str) -> Json:
     upload = get_upload(store.settings, upload_id)
-    require_unread(upload)
+    require_unused_by_datasets(upload)
     begun = {"upload": upload.id, "created": upload.created}
     with store.write() as session:
         save_progress(session, begun)

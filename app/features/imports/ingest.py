@@ -22,18 +22,18 @@ from app.features.findings.queries import (
 from app.features.groups.digest import source_hash
 from app.features.groups.edit import SetPaint, SetPositions
 from app.features.groups.insert_queries import NewRows
-from app.features.groups.pictures import outdated_where_people_moved
+from app.features.groups.pictures import mark_outdated_where_people_moved
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.reimport import KIND, KeptEdit, SharedStations, follow_group
+from app.features.groups.reimport import KIND, KeptEdit, SharedStations, update_group_from_dataset
 from app.features.groups.revision_queries import save_group
 from app.features.imports.body import (
     GONE,
     MAX_VIEWS,
     GroupLimits,
     import_body,
-    note_gone,
-    of_read_matches,
-    places_of,
+    missing_of_read_matches,
+    row_ids_of_views,
+    save_gone_findings,
 )
 from app.features.imports.queries import known_groups, newest_imports
 from app.features.independent_annotations.queries import is_copy
@@ -118,7 +118,7 @@ def ingest(
     """
     report, seen, done = IngestReport(), set[str](), 0
     limits = GroupLimits(source, Report() if limit_report is None else limit_report)
-    sound, stations = _storable(groups, seen, report, limits), set[str]()
+    sound, stations = _storable_groups(groups, seen, report, limits), set[str]()
     while batch := list(islice(sound, BATCH)):
         with ingest_session(store, keep=not dry_run) as session:
             identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
@@ -129,12 +129,12 @@ def ingest(
             progress(done)
     if done:
         with store.read() as session:
-            missing = _note_missing(session, origin, seen, report)
-            gone = of_read_matches(session, origin.dataset_id, seen, missing)
+            missing = _find_missing_groups(session, origin, seen, report)
+            gone = missing_of_read_matches(session, origin.dataset_id, seen, missing)
         for start in range(0, 0 if dry_run else len(gone), BATCH):
             with store.write() as session:
                 ids = gone[start : start + BATCH]
-                report.findings += note_gone(
+                report.findings += save_gone_findings(
                     session, origin.dataset_id, ids, source=origin.source, actor=actor
                 )
     return report
@@ -167,7 +167,7 @@ def _ensure_dataset(session: Session, dataset: str, actor: str, policy: Policy) 
     return insert_dataset(session, dataset, policy, actor) if row is None else int(row.id)
 
 
-def _note_missing(
+def _find_missing_groups(
     session: Session, origin: Origin, seen: Collection[str], report: IngestReport
 ) -> set[int]:
     """Count the groups that the same source brought last and that did not come this time."""
@@ -188,7 +188,7 @@ def _note_missing(
     return missing
 
 
-def _storable(
+def _storable_groups(
     groups: Iterable[Group], seen: set[str], report: IngestReport, limits: GroupLimits
 ) -> Iterator[Group]:
     """Groups that can be stored, their media by absolute path."""
@@ -201,13 +201,13 @@ def _storable(
         else:
             # One that is left out is not missing: the source brought it.
             seen.add(group.key)
-            held = limits.held(group)
+            held = limits.limit_group(group)
             if held is not None:
                 report.without_picture += all(view.media is None for view in held.views)
-                yield replace(held, views=tuple(map(_absolute, held.views)))
+                yield replace(held, views=tuple(map(_with_absolute_media_path, held.views)))
 
 
-def _absolute(view: View) -> View:
+def _with_absolute_media_path(view: View) -> View:
     if view.media is None or is_address(view.media.path):
         return view
     path = Path(view.media.path).absolute()
@@ -240,7 +240,7 @@ def ingest_batch(
         session, origin.dataset_id, origin.source, origin.actor, lines_left=origin.lines_left
     )
     for group in batch:
-        shared.follow(view.station for view in group.views)
+        shared.insert_or_update(view.station for view in group.views)
     report.changed += len(set(shared.changed) - stations)
     report.findings += len(set(shared.kept) - stations)
     stations.update(shared.changed)
@@ -256,11 +256,11 @@ def ingest_batch(
             report.unchanged += 1
         else:
             _update_group(session, origin, known[group.key].id, group, digest, shared.ids, report)
-    insert_fresh(session, origin, fresh, shared.ids)
+    insert_new_groups(session, origin, fresh, shared.ids)
     report.new += len(fresh)
 
 
-def insert_fresh(
+def insert_new_groups(
     session: Session, origin: Origin, fresh: Sequence[tuple[Group, str]], shared: dict[str, int]
 ) -> list[int]:
     """Insert groups that a dataset has not yet, with their source hashes; returns their ids.
@@ -298,7 +298,7 @@ def _update_group(
     report: IngestReport,
 ) -> None:
     stored, at = read_groups(session, [group_id])[group_id], now()
-    followed = follow_group(stored, incoming)
+    followed = update_group_from_dataset(stored, incoming)
     if (count := len(followed.group.views)) > MAX_VIEWS:
         report.problems.append(
             f"group {incoming.key} would have {count} views with those that people edited, a group "
@@ -312,7 +312,7 @@ def _update_group(
         shared_here = SetPositions(stored.group.positions).apply(followed.group)
         followed = replace(followed, group=shared_here)
     # What was read of a picture says of which, and is read again where that is another.
-    paint = outdated_where_people_moved(stored.group, followed.group)
+    paint = mark_outdated_where_people_moved(stored.group, followed.group)
     followed = replace(followed, group=SetPaint(paint).apply(followed.group))
     insert_readings(session, origin.dataset_id, followed.group.paint.values())
     save_group(
@@ -320,7 +320,9 @@ def _update_group(
     )
     after = read_groups(session, [group_id])[group_id]
     kept = save_findings(session, after, followed.kept)
-    body = import_body(followed.group, followed.base, origin.source, digest, places_of(after))
+    body = import_body(
+        followed.group, followed.base, origin.source, digest, row_ids_of_views(after)
+    )
     body["kept"] = [[item.view, item.sentence] for item in kept]
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, group_id)])
     refresh_queue(session, [group_id])

@@ -79,7 +79,7 @@ class ImportRequest:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ImportOutcome:
     """The result of an import.
 
     Attributes:
@@ -147,7 +147,7 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
             source,
             actor=actor,
             dry_run=request.dry_run,
-            progress=_step(progress, sentence),
+            progress=_group_progress(progress, sentence),
             stop=progress.check,
             policy=None if request.policy is None else POLICIES[request.policy],
         )
@@ -156,10 +156,10 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
     if found is not None:
         jobs.set_dataset(progress.job_id, int(found.id))
     if outcome.nothing is not None:
-        raise FailedWithReportError(*outcome.nothing, _result(outcome, request))
+        raise FailedWithReportError(*outcome.nothing, _import_result(outcome, request))
     if request.dry_run or not outcome.fresh:
-        return _result(outcome, request)
-    return _result(outcome, request, **_following(jobs, store, request, actor))
+        return _import_result(outcome, request)
+    return _import_result(outcome, request, **_request_following_jobs(jobs, store, request, actor))
 
 
 def import_in_worker(
@@ -172,7 +172,7 @@ def import_in_worker(
     progress: ReportProgress,
     stop: Callable[[], None],
     policy: Policy | None = None,
-) -> Outcome:
+) -> ImportOutcome:
     """``import_source`` in a worker process, within the limits of the settings.
 
     The process reads the files and writes the database in the short transactions of an import.
@@ -185,14 +185,14 @@ def import_in_worker(
         TooLargeError: It went beyond the limits, or made the process crash.
     """
     limits = WorkerLimits(store.settings.import_memory, store.settings.import_seconds, SILENCE)
-    given = import_here, dataset, source, actor, dry_run, policy
+    given = import_in_this_process, dataset, source, actor, dry_run, policy
     try:
         return run_in_worker(store, "imports", *given, limits=limits, progress=progress, stop=stop)
     except WorkerEnded as error:
         raise TooLargeError(f"{source.label} {error}", hint=LIMITS_HINT) from error
 
 
-def import_here(
+def import_in_this_process(
     store: Store,
     dataset: str,
     source: Source,
@@ -200,7 +200,7 @@ def import_here(
     dry_run: bool,
     policy: Policy | None,
     progress: ReportProgress,
-) -> Outcome:
+) -> ImportOutcome:
     """The import itself, in this process."""
     settings = store.settings
     imported = import_source(
@@ -208,10 +208,10 @@ def import_here(
     )
     result = imported.result
     nothing = None if imported.imported_anything else imported.nothing_read_error()
-    return Outcome(imported.values(), bool(result.new + result.changed), nothing)
+    return ImportOutcome(imported.values(), bool(result.new + result.changed), nothing)
 
 
-def _following(
+def _request_following_jobs(
     jobs: Jobs, store: Store, request: ImportRequest, actor: str
 ) -> dict[str, int | None]:
     """Ids of the jobs that compute what is new.
@@ -230,11 +230,11 @@ def _following(
         paint = PAINT.request(jobs, store, found.id, None, actor=actor).id
     rig = None
     if request.format in ("issia", "issia-3d"):
-        rig = _adjustment(jobs, store, found.id, actor)
+        rig = _request_rig_adjustment(jobs, store, found.id, actor)
     return {"solve_job": solve.id, "paint_job": paint, "rig_job": rig}
 
 
-def _adjustment(jobs: Jobs, store: Store, dataset_id: int, actor: str) -> int | None:
+def _request_rig_adjustment(jobs: Jobs, store: Store, dataset_id: int, actor: str) -> int | None:
     """Id of the job that proposes how the static cameras fit each other; None where few frames, or one
     camera, can tell nothing of it, and where they were adjusted already."""
     with store.read() as session:
@@ -247,7 +247,7 @@ def _adjustment(jobs: Jobs, store: Store, dataset_id: int, actor: str) -> int | 
         return None
 
 
-def _step(progress: JobProgress, sentence: str) -> ReportProgress:
+def _group_progress(progress: JobProgress, sentence: str) -> ReportProgress:
     def step(done: int, _total: int | None = None, phase: str = "") -> None:
         more = f" {phase}" if phase else ""
         progress(done, None, f"{sentence}{more} {plural(done, 'group')} so far.")
@@ -255,8 +255,8 @@ def _step(progress: JobProgress, sentence: str) -> ReportProgress:
     return step
 
 
-def _result(
-    outcome: Outcome,
+def _import_result(
+    outcome: ImportOutcome,
     request: ImportRequest,
     *,
     solve_job: int | None = None,
@@ -292,7 +292,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         raise InputError(
             f'"{request.format}" cannot be imported; {", ".join(FORMATS)} can', pointer="/format"
         )
-    path, name = _place(settings, request.source)
+    path, name = _place_of_source(settings, request.source)
     options = dict(request.options)
     size = options.pop("size", None)
     offset = options.pop("frame_offset", 8)
@@ -302,8 +302,8 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
         request.format,
         path,
         size=None if size is None else ImageSize(*size),
-        lines=None if request.lines is None else _place(settings, request.lines)[0],
-        frames=None if request.frames is None else _place(settings, request.frames)[0],
+        lines=None if request.lines is None else _place_of_source(settings, request.lines)[0],
+        frames=None if request.frames is None else _place_of_source(settings, request.frames)[0],
         calibration=options.get("calibration"),
         frame_offset=offset,
         flipped=frozenset(options.get("flipped", ())),
@@ -316,7 +316,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
     return source
 
 
-def _place(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:
+def _place_of_source(settings: Settings, source: Mapping[str, str]) -> tuple[Root, str]:
     if "upload" in source:
         upload = get_upload(settings, source["upload"])
         return upload_path(settings, upload.id), upload.name

@@ -33,8 +33,8 @@ from app.features.imports.merge_group import (
     CONFLICT,
     FOLLOW,
     UPSTREAM,
-    Side,
-    decide,
+    UnitHistory,
+    decide_merge,
     merge_dismissals,
     merge_group,
     merge_verdicts,
@@ -46,8 +46,8 @@ from app.features.imports.merge_parse import (
     parse_group,
     parse_station,
     parse_unassigned,
-    read_head,
     read_lines,
+    read_merge_header,
 )
 from app.features.imports.queries import known_groups, shared_stations
 from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
@@ -64,15 +64,15 @@ def merge_stations(
 ) -> None:
     """Bring static cameras up to what another installation made of them."""
     for item in exported:
-        stored = _stored(session, origin.dataset_id, item.station.key)
+        stored = _find_stored_station(session, origin.dataset_id, item.station.key)
         if stored is None or _is_only_in_other(session, stored, item):
             shared = SharedStations(session, origin.dataset_id, origin.source, origin.actor)
-            shared.follow([item.base])
+            shared.insert_or_update([item.base])
             report.changed += len(shared.changed)
             report.findings += len(shared.kept)
-            stored = _stored(session, origin.dataset_id, item.station.key)
+            stored = _find_stored_station(session, origin.dataset_id, item.station.key)
         assert stored is not None
-        report.changed += _merge(session, origin, stored, item, report)
+        report.changed += _merge_station(session, origin, stored, item, report)
 
 
 def _is_only_in_other(session: Session, stored: StoredStation, item: MergeStation) -> bool:
@@ -83,7 +83,7 @@ def _is_only_in_other(session: Session, stored: StoredStation, item: MergeStatio
     return base not in station_revision_chain(session, stored).states
 
 
-def _merge(
+def _merge_station(
     session: Session,
     origin: Origin,
     stored: StoredStation,
@@ -91,17 +91,21 @@ def _merge(
     report: IngestReport,
 ) -> bool:
     chain = station_revision_chain(session, stored)
-    here = Side(stored.digest, stored.source_digest, chain.states)
-    there = Side(station_digest(item.station), station_digest(item.base), item.states)
-    decision = decide(here, there)
+    here = UnitHistory(stored.digest, stored.source_digest, chain.states)
+    there = UnitHistory(station_digest(item.station), station_digest(item.base), item.states)
+    decision = decide_merge(here, there)
     if decision in (FOLLOW, UPSTREAM):
-        _follow(session, origin, stored, item, chain, _sentence(decision, stored))
+        _take_other_station(
+            session, origin, stored, item, chain, _finding_sentence(decision, stored)
+        )
     elif decision == CONFLICT:
-        return _save_conflict(session, origin, stored, chain, _sentence(decision, stored), report)
+        return _save_conflict(
+            session, origin, stored, chain, _finding_sentence(decision, stored), report
+        )
     return decision in (FOLLOW, UPSTREAM)
 
 
-def _sentence(decision: str, stored: StoredStation) -> str | None:
+def _finding_sentence(decision: str, stored: StoredStation) -> str | None:
     key = stored.station.key
     if decision == CONFLICT:
         return (
@@ -116,7 +120,7 @@ def _sentence(decision: str, stored: StoredStation) -> str | None:
     return None
 
 
-def _follow(
+def _take_other_station(
     session: Session,
     origin: Origin,
     stored: StoredStation,
@@ -127,7 +131,7 @@ def _follow(
     station = stored.station.with_annotations_of(item.station)
     save_station(session, stored, station)
     replace_station_finding(session, stored.id, KIND, sentence)
-    _log(session, origin, replace(stored, station=station), chain, sentence, list(item.log))
+    _log_station(session, origin, replace(stored, station=station), chain, sentence, list(item.log))
     groups = groups_of_station(session, stored.id)
     refresh_inputs_hashes(session, groups)
     refresh_queue(session, groups)
@@ -147,13 +151,13 @@ def _save_conflict(
     # A revision of its own, as every entry of the log about a station makes one.
     save_station(session, stored, stored.station)
     replace_station_finding(session, stored.id, KIND, sentence)
-    _log(session, origin, stored, chain, sentence, [])
+    _log_station(session, origin, stored, chain, sentence, [])
     refresh_queue(session, groups_of_station(session, stored.id))
     report.findings += 1
     return True
 
 
-def _log(
+def _log_station(
     session: Session,
     origin: Origin,
     stored: StoredStation,
@@ -173,7 +177,7 @@ def _log(
     append(session, [entry])
 
 
-def _stored(session: Session, dataset_id: int, key: str) -> StoredStation | None:
+def _find_stored_station(session: Session, dataset_id: int, key: str) -> StoredStation | None:
     return next(iter(shared_stations(session, dataset_id, key)), None)
 
 
@@ -182,7 +186,7 @@ T = TypeVar("T")
 
 
 @dataclass
-class _Run:
+class _MergeRun:
     """One import under way."""
 
     store: Store
@@ -238,22 +242,26 @@ def merge_edits(
         if tree is None:
             return result
         try:
-            head = read_head(tree)
-            run = _Run(store, dataset, head, source, actor, not dry_run, result, set())
+            head = read_merge_header(tree)
+            run = _MergeRun(store, dataset, head, source, actor, not dry_run, result, set())
             _merge_tree(run, tree, report, progress)
         except DatasetFormatError as error:
             report.skip(error)
     return result
 
 
-def _merge_tree(run: _Run, tree: FileTree, report: Report, progress: ReportProgress | None) -> None:
-    stations = {item.station.key: item for item in _parsed(tree, STATIONS, report, parse_station)}
+def _merge_tree(
+    run: _MergeRun, tree: FileTree, report: Report, progress: ReportProgress | None
+) -> None:
+    stations = {
+        item.station.key: item for item in _parse_records(tree, STATIONS, report, parse_station)
+    }
     with ingest_session(run.store, keep=run.keep) as session:
         origin = run.origin(session)
         _note_policy(session, run)
         merge_stations(session, origin, stations.values(), run.report)
     known = {key: item.station for key, item in stations.items()}
-    groups = _parsed(tree, GROUPS, report, lambda value: parse_group(value, known))
+    groups = _parse_records(tree, GROUPS, report, lambda value: parse_group(value, known))
     done = 0
     while batch := list(islice(groups, BATCH)):
         with ingest_session(run.store, keep=run.keep) as session:
@@ -262,11 +270,15 @@ def _merge_tree(run: _Run, tree: FileTree, report: Report, progress: ReportProgr
         if progress is not None:
             progress(done)
     if run.keep:
-        frames = (UnassignedFrame(*item) for item in _parsed(tree, SPARE, report, parse_unassigned))
+        frames = (
+            UnassignedFrame(*item) for item in _parse_records(tree, SPARE, report, parse_unassigned)
+        )
         ingest_unassigned(run.store, run.dataset, frames, source=run.source, actor=run.actor)
 
 
-def _parsed(tree: FileTree, name: str, report: Report, parse: Callable[[Json], T]) -> Iterator[T]:
+def _parse_records(
+    tree: FileTree, name: str, report: Report, parse: Callable[[Json], T]
+) -> Iterator[T]:
     for place, value in read_lines(tree, name, report):
         try:
             item = parse(value)
@@ -277,7 +289,7 @@ def _parsed(tree: FileTree, name: str, report: Report, parse: Callable[[Json], T
         yield item
 
 
-def _note_policy(session: Session, run: _Run) -> None:
+def _note_policy(session: Session, run: _MergeRun) -> None:
     row = find_dataset(session, run.dataset)
     if row is not None and row.policy_hash != run.head.policy.hash:
         run.report.problems.append(
@@ -287,7 +299,7 @@ def _note_policy(session: Session, run: _Run) -> None:
 
 def _merge_batch(
     session: Session,
-    run: _Run,
+    run: _MergeRun,
     batch: Sequence[MergeGroup],
     stations: Mapping[str, MergeStation],
 ) -> None:

@@ -14,7 +14,7 @@ from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KeptEdit
 from app.features.groups.revision_queries import save_group
 from app.features.groups.undo_stacks import RevisionChain, pitch_size
-from app.features.imports.body import import_body, places_of
+from app.features.imports.body import import_body, row_ids_of_views
 from app.features.imports.ingest import IngestReport, Origin, save_findings
 from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, group_verdicts
@@ -25,7 +25,7 @@ from app.soccer.group import Group, View
 
 
 @dataclass(frozen=True)
-class Side:
+class UnitHistory:
     """One unit that is edited as a whole, as an installation has it.
 
     Attributes:
@@ -38,7 +38,7 @@ class Side:
     base: str
     past: Sequence[str]
 
-    def goes_through(self, other: Side) -> bool:
+    def contains_history_of(self, other: UnitHistory) -> bool:
         """Whether it went through everything that the other did, in that order."""
         states = iter(self.past)
         return all(state in states for state in other.past)
@@ -47,7 +47,7 @@ class Side:
 FOLLOW, STAY, CONFLICT, UPSTREAM = "follow", "stay", "conflict", "upstream"
 
 
-def decide(here: Side, there: Side) -> str:
+def decide_merge(here: UnitHistory, there: UnitHistory) -> str:
     """What becomes of a unit (a view or a camera) in this installation.
 
     Returns:
@@ -57,9 +57,9 @@ def decide(here: Side, there: Side) -> str:
     """
     if here.now == there.now:
         return STAY
-    if there.goes_through(here):
+    if there.contains_history_of(here):
         return FOLLOW
-    if here.goes_through(there) or there.now == there.base:
+    if here.contains_history_of(there) or there.now == there.base:
         return STAY
     if here.now == here.base:
         return FOLLOW if here.now in there.past else UPSTREAM
@@ -78,10 +78,10 @@ def merge_group(
     report: IngestReport,
 ) -> bool:
     """Bring a group up to what another installation made of it; whether anything changed."""
-    merged, kept = _merged(stored, chain, exported)
-    pitch = decide(*_pitch_sides(stored, chain, exported))
+    merged, kept = _merge_views(stored, chain, exported)
+    pitch = decide_merge(*_pitch_histories(stored, chain, exported))
     kept += _kept_edits(None, pitch, f"pitch of {merged.key}")
-    fresh = _not_noticed(session, stored.id, kept)
+    fresh = _new_findings(session, stored.id, kept)
     if merged == stored.group and pitch not in (FOLLOW, UPSTREAM) and not fresh:
         return False
     at = now()
@@ -89,7 +89,7 @@ def merge_group(
     after = read_groups(session, [stored.id])[stored.id]
     noticed = save_findings(session, after, kept)
     base = chain.base
-    body = import_body(merged, base, origin.source, stored.source_hash, places_of(after))
+    body = import_body(merged, base, origin.source, stored.source_hash, row_ids_of_views(after))
     body["kept"] = [[item.view, item.sentence] for item in noticed]
     body["carried"] = list(exported.log)
     append(session, [Entry("import", origin.actor, at, body, origin.dataset_id, stored.id)])
@@ -100,7 +100,7 @@ def merge_group(
     return True
 
 
-def _merged(
+def _merge_views(
     stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
 ) -> tuple[Group, list[KeptEdit]]:
     group, kept = stored.group, list[KeptEdit]()
@@ -108,15 +108,20 @@ def _merged(
         other, base = exported.group.view(view.key), exported.base.view(view.key)
         if other is None or base is None or other.station.shared != view.station.shared:
             continue
-        ball = decide(_view_side(stored, chain, view), _other_view(exported, other, base))
+        ball = decide_merge(
+            _view_history_here(stored, chain, view), _view_history_there(exported, other, base)
+        )
         if ball in (FOLLOW, UPSTREAM):
             view = replace(
                 view, balls=other.balls, included=other.included, left_out=other.left_out
             )
         kept += _kept_edits(view.key, ball, f"ball of {view.key}")
         if not view.station.shared:
-            here, there = _station_side(stored, chain, view), _other_station(exported, other, base)
-            lines = decide(here, there)
+            here, there = (
+                _station_history_here(stored, chain, view),
+                _station_history_there(exported, other, base),
+            )
+            lines = decide_merge(here, there)
             if lines in (FOLLOW, UPSTREAM):
                 view = replace(view, station=view.station.with_annotations_of(other.station))
             kept += _kept_edits(view.key, lines, f"lines or the camera of {view.key}")
@@ -139,35 +144,35 @@ def _kept_edits(view: str | None, decision: str, what: str) -> list[KeptEdit]:
     return [KeptEdit(view, sentence)]
 
 
-def _pitch_sides(
+def _pitch_histories(
     stored: StoredGroup, chain: RevisionChain, exported: MergeGroup
-) -> tuple[Side, Side]:
-    here = Side(pitch_size(stored.group.pitch), pitch_size(chain.base.pitch), chain.pitches)
+) -> tuple[UnitHistory, UnitHistory]:
+    here = UnitHistory(pitch_size(stored.group.pitch), pitch_size(chain.base.pitch), chain.pitches)
     size, base = pitch_size(exported.group.pitch), pitch_size(exported.base.pitch)
-    return here, Side(size, base, exported.pitches)
+    return here, UnitHistory(size, base, exported.pitches)
 
 
-def _view_side(stored: StoredGroup, chain: RevisionChain, view: View) -> Side:
+def _view_history_here(stored: StoredGroup, chain: RevisionChain, view: View) -> UnitHistory:
     present, base = stored.view_digests[view.key]
-    return Side(present, base, chain.views.get(view.key, (present,)))
+    return UnitHistory(present, base, chain.views.get(view.key, (present,)))
 
 
-def _other_view(exported: MergeGroup, view: View, base: View) -> Side:
+def _view_history_there(exported: MergeGroup, view: View, base: View) -> UnitHistory:
     past = exported.views.get(view.key, ())
-    return Side(view_digest(view), view_digest(base), past)
+    return UnitHistory(view_digest(view), view_digest(base), past)
 
 
-def _station_side(stored: StoredGroup, chain: RevisionChain, view: View) -> Side:
+def _station_history_here(stored: StoredGroup, chain: RevisionChain, view: View) -> UnitHistory:
     own = stored.stations[view.key]
-    return Side(own.digest, own.source_digest, chain.stations.get(view.key, (own.digest,)))
+    return UnitHistory(own.digest, own.source_digest, chain.stations.get(view.key, (own.digest,)))
 
 
-def _other_station(exported: MergeGroup, view: View, base: View) -> Side:
+def _station_history_there(exported: MergeGroup, view: View, base: View) -> UnitHistory:
     past = exported.stations.get(view.key, ())
-    return Side(station_digest(view.station), station_digest(base.station), past)
+    return UnitHistory(station_digest(view.station), station_digest(base.station), past)
 
 
-def _not_noticed(session: Session, group_id: int, kept: list[KeptEdit]) -> list[KeptEdit]:
+def _new_findings(session: Session, group_id: int, kept: list[KeptEdit]) -> list[KeptEdit]:
     """Those of the findings that are not there already."""
     if not kept:
         return []
@@ -186,8 +191,8 @@ def merge_verdicts(
     if not exported:
         return False
     known = group_verdicts(session, [group_id]).get(group_id, [])
-    seen = {_identity(item) for item in known}
-    fresh = [item for item in exported if _identity(item) not in seen]
+    seen = {_verdict_identity(item) for item in known}
+    fresh = [item for item in exported if _verdict_identity(item) not in seen]
     if not fresh:
         return False
     fresh = sorted(fresh, key=lambda item: str(item["at"]))
@@ -229,5 +234,5 @@ def merge_dismissals(
     return True
 
 
-def _identity(verdict: Mapping[str, Any]) -> tuple[Any, ...]:
+def _verdict_identity(verdict: Mapping[str, Any]) -> tuple[Any, ...]:
     return tuple(verdict[name] for name in VERDICT)

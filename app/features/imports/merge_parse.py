@@ -11,8 +11,8 @@ from app.db.json_columns import Json
 from app.errors import DatasetFormatError, InputError, ReviewError
 from app.features.findings.queries import MERGED_COLUMNS
 from app.features.groups.codecs import extras_from_json, policy_from_json, station_from_json
-from app.features.groups.undo_stacks import logged_group, pitch_size
-from app.features.imports.body import MAX_POINTS, MAX_VIEWS, points_of
+from app.features.groups.undo_stacks import group_of_log_entry, pitch_size
+from app.features.imports.body import MAX_POINTS, MAX_VIEWS, count_points
 from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.features.imports.queries import VERDICT
 from app.features.policies.text import CUSTOM, policy_values, policy_with
@@ -68,7 +68,7 @@ class MergeGroup:
     dismissals: tuple[Mapping[str, Any], ...] = ()
 
 
-def read_head(tree: FileTree) -> MergeHeader:
+def read_merge_header(tree: FileTree) -> MergeHeader:
     """What the file says of itself.
 
     Raises:
@@ -84,11 +84,11 @@ def read_head(tree: FileTree) -> MergeHeader:
         problem = f"is {value.get('version')}; this version of Touchline reads {FORMAT_VERSION}"
         raise DatasetFormatError(shown, None, "version", problem)
     try:
-        policy = policy_from_json(_mapping(value["policy"]))
+        policy = policy_from_json(_require_object(value["policy"]))
         # Its values reach the solver: a text in place of a number would break there.
         policy_with(PAPER, policy_values(policy), name=CUSTOM)
-        _text(policy.name)
-        return MergeHeader(_text(value["dataset"]), policy)
+        _require_text(policy.name)
+        return MergeHeader(_require_text(value["dataset"]), policy)
     except InputError as error:
         raise DatasetFormatError(shown, None, "policy", f"is not a policy: {error}") from error
     except _MISSHAPEN as error:
@@ -100,7 +100,7 @@ def read_lines(tree: FileTree, name: str, report: Report) -> Iterator[tuple[str,
     if name not in tree.names():
         return
     with tree.open(name) as file:
-        for number, line in enumerate(_lines(file, tree.shown(name)), 1):
+        for number, line in enumerate(_read_file_lines(file, tree.shown(name)), 1):
             report.read += 1
             try:
                 yield f"line {number}", read_json(line, tree.shown(name), record=f"line {number}")
@@ -108,14 +108,14 @@ def read_lines(tree: FileTree, name: str, report: Report) -> Iterator[tuple[str,
                 report.skip(error)
 
 
-def _lines(file: IO[bytes], shown: str) -> Iterator[bytes]:
-    while line := _line(file, shown):
+def _read_file_lines(file: IO[bytes], shown: str) -> Iterator[bytes]:
+    while line := _read_file_line(file, shown):
         if len(line) > MAX_LINE:
             raise DatasetFormatError(shown, None, None, f"has a line above {MAX_LINE:,} bytes")
         yield line
 
 
-def _line(file: IO[bytes], shown: str) -> bytes:
+def _read_file_line(file: IO[bytes], shown: str) -> bytes:
     try:
         return file.readline(MAX_LINE + 1)
     except BROKEN as error:
@@ -130,13 +130,15 @@ def parse_station(value: Json) -> MergeStation:
         InputError: It is not what Touchline writes.
     """
     try:
-        station = _station(_mapping(value)["station"])
-        base = station if value["base"] is None else _station(value["base"])
+        station = _station_of_record(_require_object(value)["station"])
+        base = station if value["base"] is None else _station_of_record(value["base"])
         if not (station.shared and base.shared and station.key == base.key):
             raise InputError("has a `base` that is another camera, or no static one")
-        return MergeStation(station, base, _states(value["states"]), _log(value["log"]))
+        return MergeStation(
+            station, base, _require_digests(value["states"]), _log_of_record(value["log"])
+        )
     except _MISSHAPEN as error:
-        raise _problem(error) from error
+        raise _record_error(error) from error
 
 
 def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
@@ -146,22 +148,29 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
         InputError: It is not what Touchline writes.
     """
     try:
-        group = _group(_mapping(value)["group"], shared)
-        base = group if value["base"] is None else _group(value["base"], shared)
+        group = _group_of_record(_require_object(value)["group"], shared)
+        base = group if value["base"] is None else _group_of_record(value["base"], shared)
         if group.key != base.key:
             raise InputError("has a `base` that is another group")
         return MergeGroup(
             group=group,
             base=base,
-            views={key: _states(item) for key, item in _mapping(value["views"]).items()},
-            stations={key: _states(item) for key, item in _mapping(value["stations"]).items()},
-            pitches=_pitches(value, group, base),
-            log=_log(value["log"]),
-            verdicts=tuple(map(_verdict, _list(value["verdicts"], MAX_STATES))),
-            dismissals=tuple(map(_dismissal, _list(value.get("dismissals", []), MAX_STATES))),
+            views={
+                key: _require_digests(item) for key, item in _require_object(value["views"]).items()
+            },
+            stations={
+                key: _require_digests(item)
+                for key, item in _require_object(value["stations"]).items()
+            },
+            pitches=_pitch_sizes_of_record(value, group, base),
+            log=_log_of_record(value["log"]),
+            verdicts=tuple(map(_verdict_of_record, _require_list(value["verdicts"], MAX_STATES))),
+            dismissals=tuple(
+                map(_dismissal_of_record, _require_list(value.get("dismissals", []), MAX_STATES))
+            ),
         )
     except _MISSHAPEN as error:
-        raise _problem(error) from error
+        raise _record_error(error) from error
 
 
 def parse_unassigned(value: Json) -> tuple[str, str, Extras]:
@@ -171,56 +180,62 @@ def parse_unassigned(value: Json) -> tuple[str, str, Extras]:
         InputError: It is not what Touchline writes.
     """
     try:
-        extras = _mapping(value)["extras"]
-        return _text(value["camera"]), _text(value["frame"]), _extras(extras)
+        extras = _require_object(value)["extras"]
+        return (
+            _require_text(value["camera"]),
+            _require_text(value["frame"]),
+            _extras_of_record(extras),
+        )
     except _MISSHAPEN as error:
-        raise _problem(error) from error
+        raise _record_error(error) from error
 
 
-def _problem(error: Exception) -> InputError:
+def _record_error(error: Exception) -> InputError:
     if isinstance(error, ReviewError):
         return InputError(error.message)
     what = f"lacks {error}" if isinstance(error, KeyError) else "is not what Touchline writes"
     return InputError(what)
 
 
-def _group(value: Json, shared: Mapping[str, Station]) -> Group:
-    views = _list(_mapping(value)["views"], MAX_VIEWS)
+def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
+    views = _require_list(_require_object(value)["views"], MAX_VIEWS)
     names = {view["station"] for view in views if isinstance(view["station"], str)}
     if names - shared.keys():
         raise InputError(f'names the static camera "{min(names - shared.keys())}", unknown here')
-    group = logged_group({**value, "views": [{**view, "media": None} for view in views]}, shared)
-    keys = [_text(view.key) for view in group.views]
+    group = group_of_log_entry(
+        {**value, "views": [{**view, "media": None} for view in views]}, shared
+    )
+    keys = [_require_text(view.key) for view in group.views]
     if not keys or len(set(keys)) < len(keys):
         raise InputError("has no views, or two views of the same name")
     for text in (group.key, group.match, group.split, group.label):
-        _text(text, empty=text is not group.key)
+        _require_text(text, empty=text is not group.key)
     if not (0 < group.pitch.length < 1000 and 0 < group.pitch.width < 1000):
         raise InputError("has a pitch of an impossible size")
     for view, fields in zip(group.views, views, strict=True):
-        _list(fields["balls"], MAX_BALLS)
-        _extras(fields["extras"])
+        _require_list(fields["balls"], MAX_BALLS)
+        _extras_of_record(fields["extras"])
         if view.included not in (True, False):
             raise InputError("has another value where true or false is expected for a view")
         if view.left_out is not None:
             _check_left_out(view)
-        if not isinstance(fields["station"], str) and _checked(view.station).shared:
+        if not isinstance(fields["station"], str) and _checked_station(view.station).shared:
             raise InputError(f"has the static camera {view.station.key} in a view")
     return group
 
 
 def _check_left_out(view: View) -> None:
     why = view.left_out
-    if view.included or why is None or left_out(_text(why.reason), why.note) != why:
+    if view.included or why is None or left_out(_require_text(why.reason), why.note) != why:
         raise InputError("has a view that was left out for a reason that Touchline does not know")
 
 
-def _station(value: Json) -> Station:
-    return _checked(station_from_json(_mapping(value)))
+def _station_of_record(value: Json) -> Station:
+    return _checked_station(station_from_json(_require_object(value)))
 
 
-def _checked(station: Station) -> Station:
-    _text(station.key)
+def _checked_station(station: Station) -> Station:
+    _require_text(station.key)
     for side in (station.size.width, station.size.height):
         if not isinstance(side, int) or isinstance(side, bool) or not 2 <= side <= MAX_SIDE:
             raise InputError(f"has an image side of {side}")
@@ -230,7 +245,7 @@ def _checked(station: Station) -> Station:
     for marking in station.annotated_lines:
         if canonical_marking(marking) != marking:
             raise InputError(f"has {marking}, which is not a pitch marking")
-    if (count := points_of(station.lines)) > MAX_POINTS:
+    if (count := count_points(station.lines)) > MAX_POINTS:
         raise InputError(
             f"has {count:,} points in the lines of {station.key}, and a view may have {MAX_POINTS:,}"
         )
@@ -244,13 +259,13 @@ def _require_truth_values(what: str, *values: object) -> None:
         raise InputError(f"has {what} with a value in the place of true or false")
 
 
-def _verdict(value: Json) -> Mapping[str, Any]:
-    values = {name: _mapping(value)[name] for name in VERDICT}
+def _verdict_of_record(value: Json) -> Mapping[str, Any]:
+    values = {name: _require_object(value)[name] for name in VERDICT}
     for name in ("actor", "at", "inputs_hash", "policy_hash"):
-        _text(values[name])
+        _require_text(values[name])
     for name in ("reason", "note", "override"):
         if values[name] is not None:
-            _text(values[name], most=MAX_NOTE)
+            _require_text(values[name], most=MAX_NOTE)
     if values["state"] not in STATES or values["fixed"] not in (True, False):
         raise InputError("has a verdict that Touchline does not know")
     if (values["state"] == "rejected") != (values["reason"] in REASONS):
@@ -258,13 +273,13 @@ def _verdict(value: Json) -> Mapping[str, Any]:
     return values
 
 
-def _dismissal(value: Json) -> Mapping[str, Any]:
-    values = {name: _mapping(value)[name] for name in MERGED_COLUMNS}
+def _dismissal_of_record(value: Json) -> Mapping[str, Any]:
+    values = {name: _require_object(value)[name] for name in MERGED_COLUMNS}
     for name in ("actor", "at", "sentence"):
-        _text(values[name], most=MAX_NOTE)
+        _require_text(values[name], most=MAX_NOTE)
     for name in ("view", "marking", "suggested", "note"):
         if values[name] is not None:
-            _text(values[name], most=MAX_NOTE)
+            _require_text(values[name], most=MAX_NOTE)
     number = values["number"]
     if number is not None and (type(number) not in (int, float) or not math.isfinite(number)):
         raise InputError("has a dismissed finding whose `number` is not a number")
@@ -273,38 +288,38 @@ def _dismissal(value: Json) -> Mapping[str, Any]:
     return values
 
 
-def _log(value: Json) -> tuple[Json, ...]:
-    for entry in _list(value, MAX_STATES):
+def _log_of_record(value: Json) -> tuple[Json, ...]:
+    for entry in _require_list(value, MAX_STATES):
         if entry["kind"] not in EDIT_KINDS:
             raise InputError("has a log entry of an unknown kind")
-        _text(entry["actor"])
-        _text(entry["at"])
-        _mapping(entry["edit"])
+        _require_text(entry["actor"])
+        _require_text(entry["at"])
+        _require_object(entry["edit"])
     return tuple(value)
 
 
-def _extras(value: Json) -> Extras:
+def _extras_of_record(value: Json) -> Extras:
     if value is None:
         return Extras()
     for name in ("boxes", "lines"):
-        for item in _list(_mapping(value)[name], MAX_STATES):
-            _mapping(item)
-    _mapping(value["metadata"])
+        for item in _require_list(_require_object(value)[name], MAX_STATES):
+            _require_object(item)
+    _require_object(value["metadata"])
     return extras_from_json(value)
 
 
-def _pitches(value: Json, group: Group, base: Group) -> tuple[str, ...]:
+def _pitch_sizes_of_record(value: Json, group: Group, base: Group) -> tuple[str, ...]:
     """The sizes that a group's pitch had; exports of before do not say more than two of them."""
     if "pitches" in value:
-        return _states(value["pitches"])
+        return _require_digests(value["pitches"])
     return tuple(dict.fromkeys(map(pitch_size, (base.pitch, group.pitch))))
 
 
-def _states(value: Json) -> tuple[str, ...]:
-    return tuple(_text(item) for item in _list(value, MAX_STATES))
+def _require_digests(value: Json) -> tuple[str, ...]:
+    return tuple(_require_text(item) for item in _require_list(value, MAX_STATES))
 
 
-def _kind(value: Json) -> str:
+def _describe_value(value: Json) -> str:
     """What a value is, for a sentence."""
     if isinstance(value, str):
         return f"a text of {len(value)} letters"
@@ -313,21 +328,23 @@ def _kind(value: Json) -> str:
     return "an object" if isinstance(value, dict) else json_text(value)[:40]
 
 
-def _mapping(value: Json) -> dict[str, Json]:
+def _require_object(value: Json) -> dict[str, Json]:
     if not isinstance(value, dict):
-        raise InputError(f"has {_kind(value)} where an object is expected")
+        raise InputError(f"has {_describe_value(value)} where an object is expected")
     return value
 
 
-def _list(value: Json, most: int) -> list[Json]:
+def _require_list(value: Json, most: int) -> list[Json]:
     if not isinstance(value, list) or len(value) > most:
-        raise InputError(f"has {_kind(value)} where a list of at most {most} is expected")
+        raise InputError(f"has {_describe_value(value)} where a list of at most {most} is expected")
     return value
 
 
-def _text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
+def _require_text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
     if value == "" and not empty:
         raise InputError("has an empty text where one is expected that says something")
     if not isinstance(value, str) or len(value) > most:
-        raise InputError(f"has {_kind(value)} where a text of at most {most} letters is expected")
+        raise InputError(
+            f"has {_describe_value(value)} where a text of at most {most} letters is expected"
+        )
     return value

@@ -38,7 +38,7 @@ LONGEST = 20_000
 
 
 @dataclass(frozen=True)
-class _Video:
+class _VideoHeader:
     """A video: its size, how many frames it has, and why it cannot be read."""
 
     header: ImageHeader | None
@@ -74,7 +74,7 @@ class PictureCheck:
     """Keys of the groups that were compared."""
     _stations: set[str] = field(default_factory=set)
     """Static cameras whose lines were looked at: every group brings them again."""
-    _videos: dict[str, _Video] = field(default_factory=dict)
+    _videos: dict[str, _VideoHeader] = field(default_factory=dict)
     _passed: int = 0
 
     def watch(self, groups: Iterable[Group]) -> Iterator[Group]:
@@ -82,7 +82,7 @@ class PictureCheck:
         for group in groups:
             self.groups.add(group.key)
             for view in group.views:
-                self._compare(group, view)
+                self._compare_view(group, view)
             self._passed += 1
             yield group
 
@@ -92,18 +92,18 @@ class PictureCheck:
         if self.shapes:
             found.append(
                 f"{plural(len(self.shapes), 'picture has', 'pictures have')} another shape than "
-                f"the file declares: {_named(self.shapes)}. Annotations on them lie in the wrong "
+                f"the file declares: {_join_places(self.shapes)}. Annotations on them lie in the wrong "
                 "place: correct the size in the file, or replace the picture, and import again."
             )
         if self.outside:
             found.append(
                 f"{plural(len(self.outside), 'view has', 'views have')} annotations outside the "
-                f"picture: {_named(self.outside)}. Check the size that the file declares."
+                f"picture: {_join_places(self.outside)}. Check the size that the file declares."
             )
         if self.beyond:
             found.append(
                 f"{plural(len(self.beyond), 'view has', 'views have')} no frame in the video: "
-                f"{_named(self.beyond)}. Check --frame-offset, and that it is the whole video."
+                f"{_join_places(self.beyond)}. Check --frame-offset, and that it is the whole video."
             )
         return found
 
@@ -117,27 +117,27 @@ class PictureCheck:
                 refresh_queue(session, ids)
         return len(self.found)
 
-    def _compare(self, group: Group, view: View) -> None:
+    def _compare_view(self, group: Group, view: View) -> None:
         place = f"group {group.key}, view {view.key}"
-        header = None if view.media is None else self._header(place, view.media)
+        header = None if view.media is None else self._read_picture_header(place, view.media)
         if header is not None:
             if header.orientation != 1:
                 self.report.counts["pictures turned by EXIF"] += 1
-            difference = _difference(view.size, header)
+            difference = _shape_difference(view.size, header)
             if difference:
-                self.shapes.append(f"{place}{_file(view.media)}: {difference}")
+                self.shapes.append(f"{place}{_file_name(view.media)}: {difference}")
                 self.found.append((group.key, view.key, f"{_SHAPE} ({difference}). {_ADVICE}"))
-        if places := list(self._outside(view)):
+        if places := list(self._annotations_outside(view)):
             more = f" and {len(places) - 1} more" if len(places) > 1 else ""
             self.outside.append(
                 f"{place}: {places[0]}{more}, of {view.size.width} x {view.size.height}"
             )
 
-    def _header(self, place: str, media: Media) -> ImageHeader | None:
+    def _read_picture_header(self, place: str, media: Media) -> ImageHeader | None:
         if media.frame is None:
             return picture_header(media)
         if media.path not in self._videos:
-            self._videos[media.path] = self._video(media)
+            self._videos[media.path] = self._read_video_header(media)
         video = self._videos[media.path]
         if video.problem:
             self.beyond.append(f"{place}: {video.problem}")
@@ -146,33 +146,33 @@ class PictureCheck:
             self.beyond.append(f"{place}: frame {media.frame} of {video.frames:,} ({name})")
         return video.header
 
-    def _video(self, media: Media) -> _Video:
+    def _read_video_header(self, media: Media) -> _VideoHeader:
         """What a video is; its frames are counted here unless that takes too long."""
         header = picture_header(media)
         try:
             if video_length(media) > LONGEST:
-                return _Video(header, None)
-            return _Video(header, self._count(media))
+                return _VideoHeader(header, None)
+            return _VideoHeader(header, self._count_frames(media))
         except (NotFoundError, ImageError, StorageError, TooLargeError) as error:
-            return _Video(header, None, error.message)
+            return _VideoHeader(header, None, error.message)
 
-    def _count(self, media: Media) -> int:
+    def _count_frames(self, media: Media) -> int:
         """How many frames a video has; said while they are counted, which may take minutes."""
         name = PurePosixPath(media.path).name
 
         def tell(frames: int) -> None:
-            self._report(f"Counting the frames of {name}: {frames:,} so far.")
+            self._report_progress(f"Counting the frames of {name}: {frames:,} so far.")
 
         tell(0)
         count = len(video_times(media, self.settings, tell))
-        self._report("Reading the groups.")
+        self._report_progress("Reading the groups.")
         return count
 
-    def _report(self, sentence: str) -> None:
+    def _report_progress(self, sentence: str) -> None:
         if self.progress is not None:
             self.progress(self._passed, None, sentence)
 
-    def _outside(self, view: View) -> Iterator[str]:
+    def _annotations_outside(self, view: View) -> Iterator[str]:
         """Annotations of a view that are outside its picture."""
         size = view.size
         for ball in view.balls:
@@ -197,7 +197,7 @@ def _is_outside(x: float, y: float, size: ImageSize) -> bool:
     return not (-across <= x <= size.width + across and -down <= y <= size.height + down)
 
 
-def _difference(size: ImageSize, header: ImageHeader) -> str:
+def _shape_difference(size: ImageSize, header: ImageHeader) -> str:
     """How the shape of a picture differs from what is declared; empty where it does not."""
     width, height = header.width, header.height
     if abs(width / height / (size.width / size.height) - 1) <= SHAPES_APART:
@@ -210,10 +210,10 @@ def _difference(size: ImageSize, header: ImageHeader) -> str:
     return sentence
 
 
-def _file(media: Media | None) -> str:
+def _file_name(media: Media | None) -> str:
     return "" if media is None else f" ({PurePosixPath(media.member or media.path).name})"
 
 
-def _named(places: list[str]) -> str:
+def _join_places(places: list[str]) -> str:
     more = len(places) - NAMED
     return "; ".join(places[:NAMED]) + (f"; and {more:,} more" if more > 0 else "")

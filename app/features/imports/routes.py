@@ -16,10 +16,10 @@ from app.errors import InputError, OverloadedError
 from app.features.imports.folders import (
     FolderListing,
     PartWriter,
-    begin_in_parts,
     begin_part,
     begin_upload,
-    delete_sent,
+    begin_upload_in_parts,
+    delete_own_upload,
     find_upload,
     finish_upload,
     list_folder,
@@ -171,8 +171,8 @@ async def upload_file(
     """
     settings = services.settings
     if size is None:
-        begin = partial(begin_upload, settings, name, _declared(request), actor)
-        upload = await _receive(request, services, begin, finish_upload)
+        begin = partial(begin_upload, settings, name, _content_length(request), actor)
+        upload = await _receive_upload(request, services, begin, finish_upload)
     else:
         if not mark:
             raise InputError(
@@ -180,7 +180,9 @@ async def upload_file(
                 hint="Send its modification time or digest as mark.",
                 pointer="/mark",
             )
-        upload = await _on_disk(partial(begin_in_parts, settings, name, size, mark, by=actor))
+        upload = await _run_in_disk_thread(
+            partial(begin_upload_in_parts, settings, name, size, mark, by=actor)
+        )
     response.headers["Location"] = f"/api/v1/uploads/{upload.id}"
     return UploadDocument.model_validate(upload)
 
@@ -201,12 +203,12 @@ async def send_part(
     What is here already may be sent again. A part that was cut off stays as far as it came: ask how far
     that is. When `bytes` is `size`, the file is whole.
     """
-    begin = partial(begin_part, services.settings, upload, offset, _declared(request))
-    found = await _receive(request, services, begin, PartWriter.finish, PART_CHUNK)
+    begin = partial(begin_part, services.settings, upload, offset, _content_length(request))
+    found = await _receive_upload(request, services, begin, PartWriter.finish, PART_CHUNK)
     return UploadDocument.model_validate(found)
 
 
-async def _receive(
+async def _receive_upload(
     request: Request,
     services: Services,
     begin: Callable[[], Writer],
@@ -214,8 +216,8 @@ async def _receive(
     at_once: int = CHUNK,
 ) -> Upload:
     """Write what comes, off the event loop; of what does not come whole, what its writer leaves there."""
-    writer = await _on_disk(begin)
-    writing = asyncio.ensure_future(_write(request, writer, at_once))
+    writer = await _run_in_disk_thread(begin)
+    writing = asyncio.ensure_future(_write_body(request, writer, at_once))
     try:
         while not writing.done():
             await asyncio.wait({writing}, timeout=LOOK_SECONDS)
@@ -224,47 +226,47 @@ async def _receive(
                     "the server is shutting down", hint="Send the file again in a moment."
                 )
         writing.result()
-        return await _on_disk(finish, writer)
+        return await _run_in_disk_thread(finish, writer)
     except BaseException as error:
         with CancelScope(shield=True):
             writing.cancel()
             await asyncio.wait({writing})
-            await _on_disk(writer.abort)
+            await _run_in_disk_thread(writer.abort)
         if isinstance(error, ClientDisconnect):
             raise InputError("the upload was cut off") from None
         raise
 
 
-def _declared(request: Request) -> int:
+def _content_length(request: Request) -> int:
     """How many bytes a request says that it has; 0: it says nothing that can be read."""
     declared = request.headers.get("content-length", "")
     known = declared.isascii() and declared.isdigit() and len(declared) < 19
     return int(declared) if known else 0
 
 
-async def _write(request: Request, writer: UploadWriter | PartWriter, at_once: int) -> None:
+async def _write_body(request: Request, writer: UploadWriter | PartWriter, at_once: int) -> None:
     waiting = bytearray()
 
-    async def put() -> None:
+    async def flush_part() -> None:
         if waiting:
             part = bytes(waiting)
             # Before the wait: what a thread writes is not sent a second time when the request ends.
             waiting.clear()
-            await _finished(_on_disk(writer.write, part))
+            await _finish_despite_cancel(_run_in_disk_thread(writer.write, part))
 
     try:
         async for chunk in request.stream():
             waiting += chunk
             if len(waiting) >= at_once:
-                await put()
+                await flush_part()
     except (ClientDisconnect, asyncio.CancelledError):
         # Of a part that is cut off, what has come is kept.
-        await put()
+        await flush_part()
         raise
-    await put()
+    await flush_part()
 
 
-async def _finished(work: Coroutine[Any, Any, T]) -> T:
+async def _finish_despite_cancel(work: Coroutine[Any, Any, T]) -> T:
     """What some work comes to; cancelled, it is waited for all the same, since its thread goes on."""
     task = asyncio.ensure_future(work)
     try:
@@ -274,7 +276,7 @@ async def _finished(work: Coroutine[Any, Any, T]) -> T:
         raise
 
 
-async def _on_disk(work: Callable[..., T], *arguments: Any) -> T:
+async def _run_in_disk_thread(work: Callable[..., T], *arguments: Any) -> T:
     """Work on files, in one of ``DISK_THREADS``."""
     try:
         threads = _THREADS.get()
@@ -323,4 +325,4 @@ def delete_one(upload: UploadId, services: AppServices, visibility: Sees) -> Non
 
     Where others have sent the same file, it stays with them; an admin deletes it for all.
     """
-    delete_sent(services.store, upload, partial(visibility.sees, None))
+    delete_own_upload(services.store, upload, partial(visibility.sees, None))

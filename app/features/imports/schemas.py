@@ -28,7 +28,7 @@ class ImportPlace(BaseModel):
     folder: Annotated[str, Field(min_length=1, max_length=4000)] | None = None
 
     @model_validator(mode="after")
-    def _one(self) -> ImportPlace:
+    def _check_one_place(self) -> ImportPlace:
         if (self.upload is None) == (self.folder is None):
             raise ValueError("name an upload or a folder, and not both")
         return self

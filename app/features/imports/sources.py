@@ -208,7 +208,7 @@ class Imported:
         source = self.source
         problems = [problem.message for problem in self.report.problems] + self.result.problems
         name = source.shown(str(source.path))
-        if (unannotated := self._unannotated()) is not None:
+        if (unannotated := self._unannotated_problem()) is not None:
             problem, hint = unannotated
             return f"nothing could be imported: {name} {problem}", hint
         sentence = f"nothing could be imported from {name} as {source.format}"
@@ -226,7 +226,7 @@ class Imported:
             "asks for (docs/formats.md)."
         )
 
-    def _unannotated(self) -> tuple[str, str] | None:
+    def _unannotated_problem(self) -> tuple[str, str] | None:
         """What a source is that nothing was read of, where it has no annotations; what to do."""
         if self.imported_anything:
             return None
@@ -236,9 +236,9 @@ class Imported:
             return "holds pictures and no annotations", FRAMES_HINT
         return None
 
-    def _skipped(self) -> list[DatasetFormatError]:
+    def _skipped_problems(self) -> list[DatasetFormatError]:
         """What was left out, and why: of what has no annotations that alone."""
-        unannotated = self._unannotated()
+        unannotated = self._unannotated_problem()
         if unannotated is None:
             return self.report.problems
         return [DatasetFormatError(str(self.source.path), None, None, unannotated[0])]
@@ -268,7 +268,7 @@ class Imported:
                     "field": problem.field,
                     "problem": shown(problem.problem),
                 }
-                for problem in self._skipped()
+                for problem in self._skipped_problems()
             ],
             "more_skipped": self.report.dropped,
             "remarks": [*map(shown, self.report.remarks), *self.result.problems],
@@ -338,8 +338,8 @@ def import_source(
             dry_run=dry_run,
         )
         return Imported(source, report, result)
-    folder = _static(source, report, limits) if source.format in STATIC else None
-    groups = _groups(source, settings, report, limits) if folder is None else folder.groups()
+    folder = _open_static_folder(source, report, limits) if source.format in STATIC else None
+    groups = _read_groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
         groups = read_frame_list(source.frames, settings, report, limits).with_listed_frames(
             iter(groups)
@@ -379,7 +379,9 @@ def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
     return ImageSize(header.width, header.height)
 
 
-def _groups(source: Source, settings: Settings, report: Report, limits: Limits) -> Iterator[Group]:
+def _read_groups(
+    source: Source, settings: Settings, report: Report, limits: Limits
+) -> Iterator[Group]:
     path, calibration = source.path, source.calibration or "given"
     match source.format:
         case "soccernet-v3":
@@ -406,7 +408,7 @@ def _groups(source: Source, settings: Settings, report: Report, limits: Limits) 
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
 
 
-def _static(source: Source, report: Report, limits: Limits) -> IssiaFolder:
+def _open_static_folder(source: Source, report: Report, limits: Limits) -> IssiaFolder:
     options = IssiaOptions(
         frame_offset=source.frame_offset,
         flipped=source.flipped,

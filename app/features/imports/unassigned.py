@@ -13,7 +13,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import read_dataset_head
 from app.features.groups.codecs import extras_from_json
-from app.features.groups.queries import known_unassigned, put_unassigned, unassigned_rows
+from app.features.groups.queries import unassigned_extras, unassigned_rows, upsert_unassigned
 from app.features.imports.ingest import IngestReport, ensure_dataset
 from app.formats.issia import FramePersons
 from app.soccer.annotation import Extras
@@ -69,7 +69,7 @@ def _save_batch(
     actor: str,
     report: IngestReport,
 ) -> None:
-    known = known_unassigned(session, dataset_id, {item.frame for item in batch})
+    known = unassigned_extras(session, dataset_id, {item.frame for item in batch})
     fresh = {}
     for item in batch:
         place, body = (item.camera, item.frame), pack(item.extras.values())
@@ -79,10 +79,10 @@ def _save_batch(
             report.changed += place in known
             report.new += place not in known
             fresh[place] = body
-    _write(session, dataset_id, fresh, source, actor)
+    _write_unassigned(session, dataset_id, fresh, source, actor)
 
 
-def _write(
+def _write_unassigned(
     session: Session,
     dataset_id: int,
     fresh: dict[tuple[str, str], bytes],
@@ -91,7 +91,7 @@ def _write(
 ) -> None:
     if not fresh:
         return
-    put_unassigned(session, dataset_id, fresh)
+    upsert_unassigned(session, dataset_id, fresh)
     frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
     body = {"source": source, "frames": frames}
     append(session, [Entry("spare", actor, now(), body, dataset_id)])

@@ -26,19 +26,21 @@ from app.features.imports.upload_queries import (
     content_path,
     get_upload,
     is_full_disk,
+    lock_upload_records,
     make_folder,
     read_upload,
     require_size,
     safe_name,
     write_record,
-    writing,
 )
-from app.features.imports.upload_quota import quota_of, require_room, used_bytes
+from app.features.imports.upload_quota import quota_of, require_quota, used_bytes
 
 Guess = Callable[[Path], str | None]
 
 
-def begin_in_parts(settings: Settings, name: str, size: int, mark: str, *, by: str) -> Upload:
+def begin_upload_in_parts(
+    settings: Settings, name: str, size: int, mark: str, *, by: str
+) -> Upload:
     """An upload that comes in parts: as far as it came where the same was begun before, else of no bytes.
 
     Args:
@@ -59,20 +61,20 @@ def begin_in_parts(settings: Settings, name: str, size: int, mark: str, *, by: s
         raise InputError(f"{name} is empty")
     said = canonical([by, name, size, mark]).encode()
     folder = settings.uploads / hashlib.sha256(said).hexdigest()[:32]
-    with writing(settings):
+    with lock_upload_records(settings):
         upload = read_upload(folder)
         begun = Upload(folder.name, name, 0, now(), by=(by,), size=size)
         if upload is None and (quota := quota_of(settings)) is not None:
-            require_room(settings, size, quota, used_bytes(settings, by, but=folder))
+            require_quota(settings, size, quota, used_bytes(settings, by, but=folder))
         with _storage_errors(upload or begun):
             if upload is None or upload.bytes < size:
                 _require_disk(settings, upload or begun)
             if upload is None:
-                _make(folder, begun)
+                _make_upload_folder(folder, begun)
     return upload or begun
 
 
-def _make(folder: Path, upload: Upload) -> None:
+def _make_upload_folder(folder: Path, upload: Upload) -> None:
     make_folder(folder.parent)
     (folder / CONTENT).mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
@@ -111,7 +113,7 @@ class PartWriter:
         self, settings: Settings, upload_id: str, offset: int, guess: Guess = lambda path: None
     ):
         self._settings, self._id, self._next, self._guess = settings, upload_id, offset, guess
-        self._require(get_upload(settings, upload_id))
+        self._require_next_byte(get_upload(settings, upload_id))
 
     def write(self, chunk: bytes) -> None:
         """Put some bytes on the disk.
@@ -121,9 +123,9 @@ class PartWriter:
             NotFoundError, ConflictError: The upload was deleted or shortened meanwhile.
             StorageError: The disk refuses; what was acknowledged stays.
         """
-        with writing(self._settings):
+        with lock_upload_records(self._settings):
             upload = get_upload(self._settings, self._id)
-            self._require(upload)
+            self._require_next_byte(upload)
             fresh = chunk[upload.bytes - self._next :]
             grown = replace(upload, bytes=upload.bytes + len(fresh))
             if grown.bytes > upload.whole_size:
@@ -135,7 +137,7 @@ class PartWriter:
             if fresh:
                 path = content_path(self._settings, upload)
                 with _storage_errors(upload):
-                    _append(path, upload.bytes, fresh)
+                    _append_chunk(path, upload.bytes, fresh)
                     if grown.bytes == upload.whole_size:
                         grown = replace(grown, format=self._guess(path))
                     write_record(path.parent.parent, grown)
@@ -148,7 +150,7 @@ class PartWriter:
     def abort(self) -> None:
         """What was written stays."""
 
-    def _require(self, upload: Upload) -> None:
+    def _require_next_byte(self, upload: Upload) -> None:
         if self._next > upload.bytes:
             raise ConflictError(
                 f"{upload.bytes:,} bytes of {upload.name} were received, and these begin at {self._next:,}",
@@ -156,7 +158,7 @@ class PartWriter:
             )
 
 
-def _append(path: Path, offset: int, chunk: bytes) -> None:
+def _append_chunk(path: Path, offset: int, chunk: bytes) -> None:
     with path.open("r+b") as file:
         try:
             file.seek(offset)

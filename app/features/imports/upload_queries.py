@@ -27,7 +27,7 @@ from app.db.locks import require_lock
 from app.db.session import now
 from app.durable import replace_file, sync
 from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
-from app.features.imports.upload_quota import quota_of, require_room, used_bytes
+from app.features.imports.upload_quota import quota_of, require_quota, used_bytes
 from app.finite import json_text
 
 _ID = re.compile(r"[0-9a-f]{32}")
@@ -73,7 +73,7 @@ class Upload:
 
 
 @contextmanager
-def writing(settings: Settings) -> Iterator[None]:
+def lock_upload_records(settings: Settings) -> Iterator[None]:
     """Held from reading a record until what follows from it is written, among all processes.
 
     Raises:
@@ -141,7 +141,7 @@ def list_uploads(settings: Settings) -> list[Upload]:
 
 def keep_upload(settings: Settings, upload_id: str) -> None:
     """Let an upload never expire: a dataset reads frames from it."""
-    with writing(settings):
+    with lock_upload_records(settings):
         upload = get_upload(settings, upload_id)
         if not upload.kept:
             with _storage_errors():
@@ -162,12 +162,12 @@ def delete_upload(
         NotFoundError: There is none of that id.
         InputError: A dataset reads frames from it.
     """
-    with writing(settings):
+    with lock_upload_records(settings):
         upload = get_upload(settings, upload_id)
-        require_unread(upload)
+        require_unused_by_datasets(upload)
         others = tuple(actor for actor in upload.by if not mine(actor))
         if not others:
-            _remove(settings.uploads / upload_id)
+            _remove_folder(settings.uploads / upload_id)
             with _storage_errors():
                 sync(settings.uploads)
             return
@@ -175,7 +175,7 @@ def delete_upload(
             write_record(settings.uploads / upload_id, replace(upload, by=others))
 
 
-def require_unread(upload: Upload) -> None:
+def require_unused_by_datasets(upload: Upload) -> None:
     """Raise InputError while a dataset reads frames from an upload."""
     if upload.kept:
         raise InputError("a dataset reads its frames from this upload, so it cannot be deleted")
@@ -186,15 +186,15 @@ def expire_uploads(settings: Settings) -> int:
     limit = datetime.now(UTC) - timedelta(days=settings.upload_days)
     gone = 0
     for folder in [path for path in settings.uploads.glob("*") if _ID.fullmatch(path.name)]:
-        if _is_over(folder, limit):
-            with writing(settings):
-                if _is_over(folder, limit):
-                    _remove(folder)
+        if _is_expired(folder, limit):
+            with lock_upload_records(settings):
+                if _is_expired(folder, limit):
+                    _remove_folder(folder)
                     gone += 1
     return gone
 
 
-def _is_over(folder: Path, limit: datetime) -> bool:
+def _is_expired(folder: Path, limit: datetime) -> bool:
     """Whether nobody needs a folder that has been there since before some moment."""
     upload = read_upload(folder)
     try:
@@ -308,26 +308,26 @@ class UploadWriter:
         self._reserved = 0
         self.bytes = 0
         if self._quota is None:
-            self._open()
+            self._open_content()
         else:
             self._reserve(declared, self._quota)
 
     def _reserve(self, size: int, quota: int) -> None:
         """Reserve so many bytes of the sender's quota, or some more where nobody says how many come."""
         by = self._by or ""
-        with writing(self._settings):
+        with lock_upload_records(self._settings):
             used = used_bytes(self._settings, by, but=self._folder)
-            require_room(self._settings, size, quota, used)
+            require_quota(self._settings, size, quota, used)
             more = 0 if size > self.bytes else _STEP
             self._reserved = min(size + more, quota - used)
             if not self._folder.exists():
-                self._open()
+                self._open_content()
             # Without an id it is none that is listed; ``finish`` writes the one that counts.
             draft = Upload("", self._name, self._reserved, now(), by=(by,))
             with _storage_errors():
                 write_record(self._folder, draft)
 
-    def _open(self) -> None:
+    def _open_content(self) -> None:
         with _storage_errors():
             settings = self._settings
             make_folder(settings.uploads)
@@ -368,7 +368,7 @@ class UploadWriter:
             self._file.close()
         upload = Upload(self._digest.id, self._name, self.bytes, now())
         by = self._by
-        shared = _shared(self._settings, upload.id, by)
+        shared = _add_sender(self._settings, upload.id, by)
         if shared is not None:
             self.abort()
             return shared
@@ -390,12 +390,12 @@ class UploadWriter:
             else:
                 sync(place.parent)
                 return upload
-            shared = _shared(self._settings, upload.id, *upload.by)
+            shared = _add_sender(self._settings, upload.id, *upload.by)
             if shared is not None:
                 self.abort()
                 return shared
             # What lies there has no record, so nobody can have been told of it.
-            _remove(place)
+            _remove_folder(place)
         raise StorageError(
             "the upload could not be stored",
             hint="Wait, then send it again with the same Idempotency-Key.",
@@ -417,9 +417,9 @@ def require_size(settings: Settings, size: int) -> None:
         )
 
 
-def _shared(settings: Settings, upload_id: str, by: str | None = None) -> Upload | None:
+def _add_sender(settings: Settings, upload_id: str, by: str | None = None) -> Upload | None:
     """An upload that somebody has sent again, which is theirs as well; None where it is not there."""
-    with writing(settings):
+    with lock_upload_records(settings):
         upload = read_upload(settings.uploads / upload_id)
         if upload is None or by is None or by in upload.by:
             return upload
@@ -434,7 +434,7 @@ def write_record(folder: Path, upload: Upload) -> None:
     replace_file(folder / _RECORD, json_text(asdict(upload), ascii_=True).encode())
 
 
-def _remove(folder: Path) -> None:
+def _remove_folder(folder: Path) -> None:
     """Delete an upload: it is gone at once, and what is left of it is half-sent."""
     aside = folder.with_name(f"{uuid.uuid4().hex}{PART}")
     with suppress(FileNotFoundError):

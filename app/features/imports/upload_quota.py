@@ -38,7 +38,7 @@ def used_bytes(settings: Settings, actor: str, but: Path | None = None) -> int:
     )
 
 
-def require_room(settings: Settings, size: int, quota: int, used: int) -> None:
+def require_quota(settings: Settings, size: int, quota: int, used: int) -> None:
     """Raise TooLargeError where so many more bytes of a person are not allowed."""
     if used + size <= quota:
         return

@@ -21,12 +21,12 @@ from app.features.groups.edit import (
     SetStationLines,
     StationEdit,
 )
-from app.features.groups.edit_codec import step_to_json
+from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.state import GroupState, need_group
-from app.features.groups.submit import current_etag, solved_in, submit
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.submit import current_etag, solved_state, submit
+from app.features.groups.view_paint import PaintUpdater
 from app.features.groups.view_queries import groups_of_station, save_station
 from app.features.independent_annotations.copying import aligned
 from app.features.independent_annotations.queries import (
@@ -51,7 +51,7 @@ def adopt_annotation(
     annotation_id: int,
     *,
     actor: str,
-    paint: PaintFollower | None = None,
+    paint: PaintUpdater | None = None,
     also: Callable[[Session], None] | None = None,
 ) -> GroupState:
     """Take a person's annotation and verdict over into the original, in one transaction.
@@ -87,7 +87,7 @@ def adopt_annotation(
         if also is not None:
             also(session)
         refresh_queue(session, [original.id])
-        after.append(solved_in(session, original.id))
+        after.append(solved_state(session, original.id))
         session.respond(after[-1])
 
     if edit.edits:
@@ -176,7 +176,7 @@ def _adopt_stations(
         if own.calibration != station.calibration:
             edits.append(SetStationCalibration(own.calibration))
         for edit in edits:
-            body = step_to_json(edit, edit.inverse(station))
+            body = edit_and_inverse_to_json(edit, edit.inverse(station))
             station = edit.apply(station)
             where = {"dataset_id": original.dataset_id, "station_id": held.id}
             append(session, [Entry("station_edit", person, now(), body, **where)])

@@ -17,7 +17,7 @@ from app.features.groups.edit import SetPaint
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.reimport import SharedStations
-from app.features.imports.ingest import Origin, insert_fresh
+from app.features.imports.ingest import Origin, insert_new_groups
 from app.features.imports.queries import newest_imports, shared_stations
 from app.features.independent_annotations.gold_queries import BARE, IMPORTED, gold_start
 from app.features.independent_annotations.queries import CopiesOf, find_copies
@@ -60,9 +60,9 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
         group = _nameless(group, order.name)
     insert_readings(session, dataset_id, group.paint.values())
     shared = SharedStations(session, dataset_id, SOURCE, order.person)
-    shared.follow(view.station for view in group.views if view.station.key not in own)
+    shared.insert_or_update(view.station for view in group.views if view.station.key not in own)
     origin = Origin(dataset_id, SOURCE, order.person)
-    (copy_id,) = insert_fresh(session, origin, [(group, source_hash(group))], shared.ids)
+    (copy_id,) = insert_new_groups(session, origin, [(group, source_hash(group))], shared.ids)
     return copy_id
 
 

@@ -21,7 +21,7 @@ from app.features.agreement.queries import AGREED, DECIDED, states_of
 from app.features.datasets.service import dataset_id
 from app.features.groups.codecs import group_to_json
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.submit import solved
+from app.features.groups.submit import solve_and_keep
 from app.features.independent_annotations.gold import KIND, TruthSource, check_start
 from app.features.independent_annotations.gold_queries import fresh_gold, mark_gold
 from app.features.independent_annotations.queries import (
@@ -258,7 +258,7 @@ def begin_next(
     with store.write() as session:
         annotation = _next(session, terms, person_of(person), chance or SystemRandom())
     if annotation is not None:
-        solved(store, annotation.copy_id)
+        solve_and_keep(store, annotation.copy_id)
     return annotation
 
 

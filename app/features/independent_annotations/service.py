@@ -13,7 +13,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import need_dataset
 from app.features.groups.queries import read_groups
 from app.features.groups.state import need_group
-from app.features.groups.submit import solved
+from app.features.groups.submit import solve_and_keep
 from app.features.independent_annotations.copying import (
     CopyRequest,
     copy_group,
@@ -127,7 +127,7 @@ def begin_annotation(store: Store, group_id: int, *, person: str) -> DisclosedAn
         annotation = begin(session, group_id, person=person_of(person))
         begun = show(session, annotation)
         session.respond(begun)
-    solved(store, annotation.copy_id)
+    solve_and_keep(store, annotation.copy_id)
     return begun
 
 

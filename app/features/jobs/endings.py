@@ -9,7 +9,7 @@ from app.formats.export_formats import missing_for_use
 from app.plural import counted, plural
 
 
-def ending(kind: str, result: Json) -> str | None:
+def ending_sentence(kind: str, result: Json) -> str | None:
     """The sentence of a job that is done; None where its result says nothing that is known here."""
     tell = _ENDINGS.get(kind)
     try:
@@ -19,8 +19,8 @@ def ending(kind: str, result: Json) -> str | None:
         return None
 
 
-def _solved(result: Json) -> str:
-    pitches = _estimated(result)
+def _solving_sentence(result: Json) -> str:
+    pitches = _pitch_estimate_sentence(result)
     if not result["solved"] and not result["failed"]:
         return pitches or "Nothing was left to solve."
     passed, rest = result["passed"], result["solved"] - result["passed"]
@@ -34,7 +34,7 @@ def _solved(result: Json) -> str:
     )
 
 
-def _estimated(result: Json) -> str:
+def _pitch_estimate_sentence(result: Json) -> str:
     """What solving found of pitches, "" where it estimated none; results of older servers say nothing."""
     if not result.get("estimated"):
         return ""
@@ -48,7 +48,7 @@ def _estimated(result: Json) -> str:
     return f"The pitch of {matches} was estimated: {found}."
 
 
-def _imported(result: Json) -> str:
+def _import_sentence(result: Json) -> str:
     counts = {name: result.get(name, 0) for name in ("new", "changed", "unchanged")}
     would = " (dry run: nothing was changed)" if result.get("dry_run") else ""
     counted_groups = ", ".join(f"{count:,} {name}" for name, count in counts.items())
@@ -57,54 +57,54 @@ def _imported(result: Json) -> str:
     return f"{plural(sum(counts.values()), 'group')} read: {counted_groups}{more}{would}."
 
 
-def _exported(result: Json) -> str:
+def _export_sentence(result: Json) -> str:
     counts = result["counts"]
     written = ", ".join(counted(count, name) for name, count in counts.items())
     missing = missing_for_use(result.get("format", ""), counts)
     return f"Written: {written}." + ("" if missing is None else f" {missing}.")
 
 
-def _frozen(result: Json) -> str:
+def _version_sentence(result: Json) -> str:
     return f"Version {result['name']} holds {plural(result['counts']['groups'], 'group')}."
 
 
-def _verified(result: Json) -> str:
+def _verification_sentence(result: Json) -> str:
     return str(result["sentence"])
 
 
-def _evaluated(result: Json) -> str:
+def _evaluation_sentence(result: Json) -> str:
     return f"Evaluation {result['name']} is ready."
 
 
-def _accepted(result: Json) -> str:
+def _acceptance_sentence(result: Json) -> str:
     refused = sum(result["refused"].values())
     more = f"; {plural(refused, 'view')} refused" if refused else ""
     groups = plural(result["groups"], "group")
     return f"{plural(result['changed'], 'view')} of {groups} have a ball from predictions{more}."
 
 
-def _practice(result: Json) -> str:
+def _practice_sentence(result: Json) -> str:
     groups = plural(result["groups"], "practice group")
     return f"{groups} made." if result["made"] else f"The {groups} were there already."
 
 
-def _rig(result: Json) -> str:
+def _rig_adjustment_sentence(result: Json) -> str:
     cameras = plural(len(result["cameras"]), "camera")
     if result["accepted"] is None:
         return f"An adjustment of {cameras} is proposed."
     return f"The adjustment of {cameras} was accepted ({result['accepted']})."
 
 
-def _positions(result: Json) -> str:
+def _shared_positions_sentence(result: Json) -> str:
     shared, matches = result["shared"], plural(result["matches"], "match", "matches")
     return f"{plural(shared, 'picture')} of {matches} share the position of their camera."
 
 
-def _painted(result: Json) -> str:
+def _paint_reading_sentence(result: Json) -> str:
     return f"The paint of {plural(result['read'], 'picture')} was read."
 
 
-def _proposed(result: Json) -> str:
+def _line_proposals_sentence(result: Json) -> str:
     looked = result["proposed"] + result["unsure"] + result["nothing"]
     return (
         f"{plural(looked, 'view')} looked at: {result['proposed']:,} proposed, "
@@ -112,19 +112,19 @@ def _proposed(result: Json) -> str:
     )
 
 
-def _pictures(result: Json) -> str:
+def _picture_estimates_sentence(result: Json) -> str:
     items = result["items"]
     proposed = sum(item["proposed"] is not None for item in items)
     matches = plural(len(items), "match", "matches")
     return f"{matches} estimated, {proposed:,} with a proposal."
 
 
-def _indexed(result: Json) -> str:
+def _recording_index_sentence(result: Json) -> str:
     shots, frames = plural(result["shots"], "shot"), plural(result["frames"], "frame")
     return f"{result['name']} has {frames} in {shots}."
 
 
-def _taken(result: Json) -> str:
+def _instants_sentence(result: Json) -> str:
     there = f"; {result['unchanged']:,} were there before" if result["unchanged"] else ""
     changed, views, outside = (
         result.get(name, 0) for name in ("changed", "linked_views", "outside")
@@ -136,7 +136,7 @@ def _taken(result: Json) -> str:
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
-def _ball(result: Json) -> str:
+def _ball_search_sentence(result: Json) -> str:
     there = f"; {result['unchanged']:,} were up to date" if result["unchanged"] else ""
     count = len(result["without"])
     without = f"; {count:,} {'has' if count == 1 else 'have'} no track" if count else ""
@@ -144,13 +144,13 @@ def _ball(result: Json) -> str:
     return f"The ball was tracked over {stretches}{there}{without}."
 
 
-def _tracked(result: Json) -> str:
+def _camera_tracking_sentence(result: Json) -> str:
     counts = ", ".join(f"{result[name]:,} {name}" for name in ("tracked", "bridged", "lost"))
     given = f"; {plural(result['groups'], 'group')} got another camera" if result["groups"] else ""
     return f"{plural(result['frames'], 'frame')} of {result['name']}: {counts}{given}."
 
 
-def _linked(result: Json) -> str:
+def _link_sentence(result: Json) -> str:
     live, replay = result["rays"]
     seen = f"{live:,} live rays, {replay:,} of the replay"
     left = f", {result['left_out']:,} left out" if result["left_out"] else ""
@@ -159,23 +159,23 @@ def _linked(result: Json) -> str:
 
 
 _ENDINGS: Mapping[str, Callable[[Json], str]] = {
-    "solve": _solved,
-    "import": _imported,
-    "export": _exported,
-    "freeze": _frozen,
-    "verify": _verified,
-    "evaluate": _evaluated,
-    "bulk": _accepted,
-    "practice": _practice,
-    "rig": _rig,
-    "positions": _positions,
-    "paint": _painted,
-    "proposals": _proposed,
-    "pictures": _pictures,
-    "recording": _indexed,
-    "instants": _taken,
-    "ball": _ball,
-    "track": _tracked,
-    "link": _linked,
+    "solve": _solving_sentence,
+    "import": _import_sentence,
+    "export": _export_sentence,
+    "freeze": _version_sentence,
+    "verify": _verification_sentence,
+    "evaluate": _evaluation_sentence,
+    "bulk": _acceptance_sentence,
+    "practice": _practice_sentence,
+    "rig": _rig_adjustment_sentence,
+    "positions": _shared_positions_sentence,
+    "paint": _paint_reading_sentence,
+    "proposals": _line_proposals_sentence,
+    "pictures": _picture_estimates_sentence,
+    "recording": _recording_index_sentence,
+    "instants": _instants_sentence,
+    "ball": _ball_search_sentence,
+    "track": _camera_tracking_sentence,
+    "link": _link_sentence,
 }
 """By the kind of the job."""

@@ -92,7 +92,7 @@ def insert_job(session: Session, job: NewJob) -> int:
         "done": 0,
         "sentence": "",
         "tries": 0,
-        "request": _text(job.request),
+        "request": _json_column(job.request),
         "created": now(),
     }
     session.execute(insert(JobModel), [values])
@@ -105,14 +105,14 @@ def update_job(session: Session, job_id: int, *, begun: int = 0, **values: Any) 
         values["tries"] = JobModel.tries + begun
     for name in ("result", "problem"):
         if name in values:
-            values[name] = _text(values[name])
+            values[name] = _json_column(values[name])
     session.execute(update(JobModel).where(JobModel.id == job_id).values(values))
 
 
 def read_job(session: Session, job_id: int) -> Job | None:
     """A job by its id."""
     row = session.execute(_SELECT.where(JobModel.id == job_id)).one_or_none()
-    return None if row is None else _job(row)
+    return None if row is None else _job_from_row(row)
 
 
 def read_jobs(
@@ -148,7 +148,7 @@ def read_jobs(
         statement = statement.where(JobModel.state.in_(states))
     if before is not None:
         statement = statement.where(JobModel.id < before)
-    return [_job(row) for row in session.execute(statement)]
+    return [_job_from_row(row) for row in session.execute(statement)]
 
 
 def job_ids(session: Session, dataset_id: int, kind: str) -> list[int]:
@@ -157,7 +157,7 @@ def job_ids(session: Session, dataset_id: int, kind: str) -> list[int]:
     return list(session.scalars(select(JobModel.id).where(*mine).order_by(JobModel.id)))
 
 
-def jobs_of(
+def job_ids_of_dataset(
     session: Session, dataset_id: int, kinds: Sequence[str], states: Sequence[str]
 ) -> list[int]:
     """Ids of a dataset's jobs in some states, of some kinds or, without any, of all."""
@@ -211,11 +211,11 @@ def forget_jobs(session: Session, days: int) -> int:
     return len(session.scalars(gone).all())
 
 
-def _text(value: Json) -> str | None:
+def _json_column(value: Json) -> str | None:
     return None if value is None else canonical(finite(value))
 
 
-def _job(row: Any) -> Job:
+def _job_from_row(row: Any) -> Job:
     values = dict(row._mapping)
     for name in ("request", "result", "problem"):
         values[name] = None if values[name] is None else parse(values[name])

@@ -80,11 +80,11 @@ class JobRecords:
                 visibility=visibility,
             )
 
-    def under_way(self, dataset_id: int | None, visibility: Visibility) -> list[Job]:
+    def open_jobs(self, dataset_id: int | None, visibility: Visibility) -> list[Job]:
         """Jobs that somebody sees and that wait or run, the oldest first."""
         return self.find(dataset_id=dataset_id, states=OPEN, visibility=visibility)[::-1]
 
-    def every(self, *, dataset_id: int, kind: str) -> list[int]:
+    def all_ids(self, *, dataset_id: int, kind: str) -> list[int]:
         """Ids of all jobs of a kind in a dataset, however many there are."""
         with self._store.read() as session:
             return job_ids(session, dataset_id, kind)
@@ -101,7 +101,7 @@ class JobRecords:
                 raise ConflictError(f"job {job_id} is not over yet", hint="Cancel it first.")
             delete_job(session, job_id)
 
-    def _tick(self, run: JobRun, ended: threading.Event) -> None:
+    def _save_progress_until_ended(self, run: JobRun, ended: threading.Event) -> None:
         """Keep the record in step with the progress, off the work's own thread: the work may hold
         the write lock when it tells how far it is."""
         shown = run.progress.place
@@ -109,9 +109,9 @@ class JobRecords:
             if run.progress.place != shown:
                 shown = run.progress.place
                 with suppress(StorageError):
-                    self._save(run.job.id, **run.columns)
+                    self._save_columns(run.job.id, **run.columns)
 
-    def _save(self, job_id: int, **values: Any) -> None:
+    def _save_columns(self, job_id: int, **values: Any) -> None:
         with self._store.write() as session:
             update_job(session, job_id, **values)
             job = read_job(session, job_id)

@@ -18,7 +18,7 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
 from app.features.datasets.queries import has_more_groups
-from app.features.jobs.endings import ending
+from app.features.jobs.endings import ending_sentence
 from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job
 from app.progress import ReportProgress
 from app.worker_process import EndReason, WorkerEnded
@@ -107,7 +107,7 @@ class JobProgress:
         """The job's dataset; 0, which none is, where it has none."""
         return self.job.dataset_id or 0
 
-    def require_wanted(self) -> None:
+    def require_not_cancelled(self) -> None:
         """Raise ``JobCancelled`` where somebody cancelled it; a server that stops did not."""
         if self.cancelled.is_set():
             raise JobCancelled
@@ -147,10 +147,10 @@ class JobRun:
         """Do the work; how it ended, as columns. None where the server stops and the next one
         decides."""
         try:
-            self.progress.require_wanted()
+            self.progress.require_not_cancelled()
             with structlog.contextvars.bound_contextvars(job=self.job.id):
                 result = self.work(self.progress)
-            sentence = ending(self.job.kind, result)
+            sentence = ending_sentence(self.job.kind, result)
             return {
                 "state": DONE,
                 "result": result,
@@ -161,18 +161,18 @@ class JobRun:
                 return None
             return {"state": CANCELLED, "sentence": "Cancelled."}
         except FailedWithReportError as error:
-            return {**_failure(error.message, error.hint), "result": error.result}
+            return {**_failure_columns(error.message, error.hint), "result": error.result}
         except ReviewError as error:
-            return _failure(error.message, error.hint, error.pointer)
+            return _failure_columns(error.message, error.hint, error.pointer)
         except Exception:
             log.exception("job failed", job=self.job.id, kind=self.job.kind)
-            return _failure(
+            return _failure_columns(
                 "something went wrong inside the server",
                 f"The server's log names job {self.job.id}.",
             )
 
 
-def _failure(detail: str, hint: str | None, pointer: str | None = None) -> dict[str, Any]:
+def _failure_columns(detail: str, hint: str | None, pointer: str | None = None) -> dict[str, Any]:
     problem = {"detail": detail, "hint": hint, "pointer": pointer}
     return {"state": FAILED, "sentence": detail, "problem": problem}
 
@@ -195,7 +195,7 @@ class RunQueue:
         taken = {run.job.dataset_id for run in self.running} - {None}
         return [run for run in self.waiting if run.job.dataset_id not in taken]
 
-    def ready_beside(self, kinds: Collection[str]) -> list[JobRun]:
+    def ready_beside_running(self, kinds: Collection[str]) -> list[JobRun]:
         """Those of some kinds that are ready, and of whose dataset nothing was asked for before."""
         first: dict[int | None, int] = {}
         for run in self.waiting:
@@ -258,7 +258,7 @@ def run_job_in_worker(
         ReviewError: As the work raised it.
     """
     report = report or progress
-    if dataset_id is not None and _is_small(store, dataset_id):
+    if dataset_id is not None and _is_small_dataset(store, dataset_id):
         return run_here(store, work, *arguments, progress=report, answer=answer)
     stop = with_grace(progress.check)
     try:
@@ -284,6 +284,6 @@ def left_to_next_server(progress: JobProgress) -> Iterator[None]:
         raise
 
 
-def _is_small(store: Store, dataset_id: int) -> bool:
+def _is_small_dataset(store: Store, dataset_id: int) -> bool:
     with store.read() as session:
         return not has_more_groups(session, dataset_id, SMALL)

@@ -109,21 +109,21 @@ class Jobs(JobRecords):
 
     def start(self) -> None:
         """Take up what an earlier server left behind, or say that it is lost; then lead."""
-        self._recover()
+        self._take_over_open_jobs()
         for begin in self._beginners:
             begin()
 
-    def _recover(self) -> None:
+    def _take_over_open_jobs(self) -> None:
         with self._store.write() as session:
             for kind, keep in KEPT.items():
                 trim_jobs(session, kind, keep)
             left = read_jobs(session, states=OPEN, limit=10_000)[::-1]
             for job in left:
-                update_job(session, job.id, **self._recovered(job))
+                update_job(session, job.id, **self._recovered_columns(job))
         with self._changed:
-            resumed = [self._run(job) for job in left if self._is_resumed(job)]
+            resumed = [self._make_resumed_run(job) for job in left if self._is_resumed(job)]
             self._queue = self._queue.joined_by(*resumed)
-            self._wake()
+            self._start_workers()
 
     def submit(
         self,
@@ -156,10 +156,10 @@ class Jobs(JobRecords):
         new = NewJob(kind, title, actor, dataset_id, request)
         with ExitStack() as entry, self._store.write() as session:
             # Others that enter wait for the write lock, so that none of them is counted twice.
-            enter = entry.enter_context(self._entry())
-            known = self._waiting_for(session, new) if once else None
+            enter = entry.enter_context(self._hold_start_until_recorded())
+            known = self._find_waiting_job(session, new) if once else None
             if not once:
-                self._require_room(session, actor)
+                self._require_queue_room(session, actor)
             job = need_job(session, insert_job(session, new) if known is None else known)
             if known is None:
                 note_job(session, actor, job.id, kind, title, dataset_id)
@@ -195,7 +195,7 @@ class Jobs(JobRecords):
                 running.progress.cancelled.set()
         if run is not None:
             sentence = "Cancelled before it began."
-            return self._finish(run, by, state=CANCELLED, sentence=sentence) or self.get(job_id)
+            return self._record_end(run, by, state=CANCELLED, sentence=sentence) or self.get(job_id)
         if by is None:
             return self.get(job_id)
         with self._store.write() as session:
@@ -203,7 +203,7 @@ class Jobs(JobRecords):
 
     def set_dataset(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
-        self._save(job_id, dataset_id=dataset_id)
+        self._save_columns(job_id, dataset_id=dataset_id)
         running = self._queue.running_of(job_id)
         if running is not None:
             running.progress.job = replace(running.job, dataset_id=dataset_id)
@@ -289,9 +289,9 @@ class Jobs(JobRecords):
         if any(worker.is_alive() for worker in self._workers):
             for run in self._queue.running:
                 log.warning("a job did not end in time", job=run.job.id)
-                self._forgive_start(run)
+                self._uncount_start(run)
 
-    def _waiting_for(self, session: Session, new: NewJob) -> int | None:
+    def _find_waiting_job(self, session: Session, new: NewJob) -> int | None:
         """Id of the waiting job of a kind and dataset; one without a dataset is its maker's."""
         place = (new.kind, new.dataset_id)
         for run in self._queue.waiting:
@@ -301,8 +301,8 @@ class Jobs(JobRecords):
                 return run.job.id
         return None
 
-    def _require_room(self, session: Session, actor: str) -> None:
-        waiting = self._who_waits(session)
+    def _require_queue_room(self, session: Session, actor: str) -> None:
+        waiting = self._actors_of_waiting_jobs(session)
         own = waiting.count(actor)
         if len(waiting) >= self._capacity:
             raise OverloadedError(
@@ -314,12 +314,12 @@ class Jobs(JobRecords):
                 hint="Send it again when some of them are done.",
             )
 
-    def _who_waits(self, _session: Session) -> list[str]:
+    def _actors_of_waiting_jobs(self, _session: Session) -> list[str]:
         """Who asked for each job that waits."""
         return [run.job.actor for run in self._queue.waiting]
 
     @contextmanager
-    def _entry(self) -> Iterator[Callable[[JobRun], None]]:
+    def _hold_start_until_recorded(self) -> Iterator[Callable[[JobRun], None]]:
         """Lets a job in while its record is written; none begins before that is kept.
 
         What is let in is out again where the record could not be written.
@@ -343,9 +343,9 @@ class Jobs(JobRecords):
         finally:
             with self._changed:
                 self._entering -= 1
-                self._wake()
+                self._start_workers()
 
-    def _recovered(self, job: Job) -> dict[str, Any]:
+    def _recovered_columns(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
         if self._is_resumed(job):
             return {"state": WAITING, "started": None, "sentence": "Started again."}
@@ -358,24 +358,27 @@ class Jobs(JobRecords):
     def _is_resumed(self, job: Job) -> bool:
         return job.kind in self._resumers and job.tries < MOST_TRIES
 
-    def _run(self, job: Job) -> JobRun:
+    def _make_resumed_run(self, job: Job) -> JobRun:
         return JobRun(self._resumers[job.kind], JobProgress(job, self._closing))
 
-    def _wake(self) -> None:
+    def _start_workers(self) -> None:
         if not self._workers and self._queue.waiting:
-            for ready in (lambda: self._queue.ready, lambda: self._queue.ready_beside(BESIDE)):
+            for ready in (
+                lambda: self._queue.ready,
+                lambda: self._queue.ready_beside_running(BESIDE),
+            ):
                 # Daemons: a job that does not come to its next step must not hold the process.
                 worker = threading.Thread(
-                    target=self._work, args=(ready,), name="jobs", daemon=True
+                    target=self._run_ready_jobs, args=(ready,), name="jobs", daemon=True
                 )
                 self._workers.append(worker)
                 worker.start()
         self._changed.notify_all()
 
-    def _work(self, ready: Callable[[], list[JobRun]]) -> None:
-        while (run := self._next(ready)) is not None:
+    def _run_ready_jobs(self, ready: Callable[[], list[JobRun]]) -> None:
+        while (run := self._wait_for_next_run(ready)) is not None:
             try:
-                self._execute(run)
+                self._execute_run(run)
             except Exception:
                 log.exception("the record of a job could not be written", job=run.job.id)
             finally:
@@ -385,7 +388,7 @@ class Jobs(JobRecords):
                     self._changed.notify_all()
                 run.over.set()
 
-    def _next(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
+    def _wait_for_next_run(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
         """The next job to run, of those that may; None when the server stops."""
         with self._changed:
             self._changed.wait_for(
@@ -402,12 +405,14 @@ class Jobs(JobRecords):
         """Its place among those that may run: the smallest is the next."""
         return run.job.kind not in PROMPT, self._turns.get(run.job.actor, 0), run.job.id
 
-    def _execute(self, run: JobRun) -> None:
-        if not self._begin(run):
+    def _execute_run(self, run: JobRun) -> None:
+        if not self._record_start(run):
             return
         run.counted = True
         ended = threading.Event()
-        ticker = threading.Thread(target=self._tick, args=(run, ended), daemon=True)
+        ticker = threading.Thread(
+            target=self._save_progress_until_ended, args=(run, ended), daemon=True
+        )
         ticker.start()
         try:
             values = run.outcome()
@@ -415,24 +420,24 @@ class Jobs(JobRecords):
             ended.set()
             ticker.join()
         if values is not None:
-            self._finish(run, **values)
+            self._record_end(run, **values)
         else:
-            self._forgive_start(run)
+            self._uncount_start(run)
 
-    def _begin(self, run: JobRun) -> bool:
+    def _record_start(self, run: JobRun) -> bool:
         """Write that a job is begun; False where it shall not be."""
-        self._save(run.job.id, state=RUNNING, started=now(), begun=1)
+        self._save_columns(run.job.id, state=RUNNING, started=now(), begun=1)
         return True
 
-    def _forgive_start(self, run: JobRun) -> None:
+    def _uncount_start(self, run: JobRun) -> None:
         """Let a server that stops in good order count for no death: it is none of this job's doing."""
         with self._changed:
             counted, run.counted = run.counted, False
         if counted:
             with suppress(StorageError):
-                self._save(run.job.id, begun=-1)
+                self._save_columns(run.job.id, begun=-1)
 
-    def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
+    def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
         """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written."""
         place, job = run.columns, None
         # Where the disk is full for a moment, the record waits for it.

@@ -28,7 +28,7 @@ from app.features.jobs.queries import (
     Job,
     NewJob,
     is_asked_to_end,
-    jobs_of,
+    job_ids_of_dataset,
     read_job,
     read_jobs,
     trim_jobs,
@@ -55,16 +55,16 @@ class SharedProgress(JobProgress):
         super().__init__(job, closing)
         self._store = store
 
-    def require_wanted(self) -> None:
+    def require_not_cancelled(self) -> None:
         """See ``JobProgress``. In a write transaction the answer stays true to its end."""
-        super().require_wanted()
+        super().require_not_cancelled()
         if self._closing.is_set():
             # Another process may carry it out by now.
             raise JobCancelled
         with self._store.read_one() as session:
             if is_asked_to_end(session, self.job_id):
                 self.cancelled.set()
-        super().require_wanted()
+        super().require_not_cancelled()
 
 
 class SharedJobs(Jobs):
@@ -96,9 +96,9 @@ class SharedJobs(Jobs):
     def start(self) -> None:
         """Carry out jobs from when no other process does."""
         self._alone = False
-        self._store.sharing.subscribe(self._receive)
-        self._attempt()
-        self._leader = threading.Thread(target=self._follow, name="leader", daemon=True)
+        self._store.sharing.subscribe(self._receive_notification)
+        self._lead_or_log_failure()
+        self._leader = threading.Thread(target=self._watch_jobs, name="leader", daemon=True)
         self._leader.start()
 
     def stop(self) -> None:
@@ -123,7 +123,7 @@ class SharedJobs(Jobs):
         with self._store.write() as session:
             if need_job(session, job_id).state in (DONE, FAILED):
                 raise ConflictError(f"job {job_id} is over already")
-            self._ask_to_end(session, [job_id])
+            self._request_end(session, [job_id])
             job = cancelled_by(session, need_job(session, job_id), by)
         self._announce(job)
         return job
@@ -131,11 +131,11 @@ class SharedJobs(Jobs):
     def ids_of(self, dataset_id: int, *kinds: str) -> list[int]:
         """See ``Jobs``; whichever process works on them."""
         with self._store.read_one() as session:
-            return jobs_of(session, dataset_id, kinds, OPEN)
+            return job_ids_of_dataset(session, dataset_id, kinds, OPEN)
 
     def end_with(self, session: Session, ids: Collection[int]) -> None:
         """See ``Jobs``."""
-        self._ask_to_end(session, ids)
+        self._request_end(session, ids)
 
     def end_soon(self, ids: Collection[int]) -> None:
         """See ``Jobs``."""
@@ -165,9 +165,9 @@ class SharedJobs(Jobs):
 
     def _running_of(self, dataset_id: int) -> list[int]:
         with self._store.read_one() as session:
-            return jobs_of(session, dataset_id, (), (RUNNING,))
+            return job_ids_of_dataset(session, dataset_id, (), (RUNNING,))
 
-    def _ask_to_end(self, session: Session, ids: Collection[int]) -> None:
+    def _request_end(self, session: Session, ids: Collection[int]) -> None:
         """End what waits, and let what runs see that it shall end."""
         for number in ids:
             job = read_job(session, number)
@@ -181,7 +181,7 @@ class SharedJobs(Jobs):
 
     def _announce(self, job: Job) -> None:
         super()._announce(job)
-        self._follow_row(job)
+        self._apply_job_row(job)
         try:
             self._store.publish(f"{_WORD} {job.id}")
         except StorageError as error:
@@ -189,7 +189,7 @@ class SharedJobs(Jobs):
                 "other processes were not notified of a job", job=job.id, error=error.message
             )
 
-    def _receive(self, word: str) -> None:
+    def _receive_notification(self, word: str) -> None:
         kind, _, number = word.partition(" ")
         if kind != _WORD:
             return
@@ -197,38 +197,38 @@ class SharedJobs(Jobs):
             job = read_job(session, int(number))
         if job is not None:
             super()._announce(job)
-            self._follow_row(job)
+            self._apply_job_row(job)
 
-    def _follow_row(self, job: Job) -> None:
+    def _apply_job_row(self, job: Job) -> None:
         """Do what the row of a job asks for."""
-        self._follow_ending(job)
+        self._apply_cancellation(job)
         if job.state == WAITING:
             self._look.set()
 
     # Who carries out.
 
-    def _follow(self) -> None:
+    def _watch_jobs(self) -> None:
         while not self._ended.is_set():
             self._look.wait(LOOK_SECONDS)
             self._look.clear()
             if not self._ended.is_set():
-                self._attempt()
+                self._lead_or_log_failure()
 
-    def _attempt(self) -> None:
+    def _lead_or_log_failure(self) -> None:
         try:
-            self._lead()
+            self._lead_and_start_waiting()
         except ReviewError as error:
             log.warning("jobs could not be looked after", error=error.message)
         except Exception:
             log.exception("jobs could not be looked after")
 
-    def _lead(self) -> None:
+    def _lead_and_start_waiting(self) -> None:
         sharing = self._store.sharing
         if self._lost is None:
             if not sharing.claim(CLAIM):
                 return
             try:
-                self._recover()
+                self._take_over_open_jobs()
             except BaseException:
                 sharing.release(CLAIM)
                 raise
@@ -237,11 +237,11 @@ class SharedJobs(Jobs):
             for begin in self._beginners:
                 begin()
         if not sharing.holds(CLAIM):
-            self._lose()
+            self._give_up_leadership()
             return
-        self._join_waiting()
+        self._enqueue_waiting_jobs()
 
-    def _lose(self) -> None:
+    def _give_up_leadership(self) -> None:
         """Let another process go on: the connection that held the claim is gone."""
         log.warning("this process no longer carries out jobs")
         lost, self._lost = self._lost, None
@@ -251,29 +251,31 @@ class SharedJobs(Jobs):
         if lost is not None:
             lost.set()
 
-    def _recover(self) -> None:
+    def _take_over_open_jobs(self) -> None:
         """Settle what a process that died was at; what waits is begun as its turn comes."""
         with self._store.write() as session:
             for kind, keep in KEPT.items():
                 trim_jobs(session, kind, keep)
             for job in read_jobs(session, states=(RUNNING,), limit=MOST):
                 ended = {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
-                update_job(session, job.id, **(ended if job.ending else self._recovered(job)))
+                update_job(
+                    session, job.id, **(ended if job.ending else self._recovered_columns(job))
+                )
 
-    def _join_waiting(self) -> None:
+    def _enqueue_waiting_jobs(self) -> None:
         with self._store.read_one() as session:
             rows = read_jobs(session, states=OPEN, limit=MOST)
         for job in reversed(rows):
-            self._follow_ending(job)
+            self._apply_cancellation(job)
             if job.state == WAITING and all(run.job.id != job.id for run in self._queue.runs):
-                self._join(job)
+                self._enqueue_job(job)
 
-    def _follow_ending(self, job: Job) -> None:
+    def _apply_cancellation(self, job: Job) -> None:
         run = self._queue.running_of(job.id)
         if job.ending and run is not None:
             run.progress.cancelled.set()
 
-    def _join(self, job: Job) -> None:
+    def _enqueue_job(self, job: Job) -> None:
         lost = self._lost
         work = self._makers.get(job.kind)
         if lost is None or work is None:
@@ -281,23 +283,23 @@ class SharedJobs(Jobs):
         run = JobRun(work, SharedProgress(job, lost, self._store))
         with self._changed:
             self._queue = self._queue.joined_by(run)
-            self._wake()
+            self._start_workers()
 
     @contextmanager
-    def _entry(self) -> Iterator[Callable[[JobRun], None]]:
+    def _hold_start_until_recorded(self) -> Iterator[Callable[[JobRun], None]]:
         """Lets a job in by its row alone."""
         if self._alone:
-            with super()._entry() as enter:
+            with super()._hold_start_until_recorded() as enter:
                 yield enter
             return
-        yield self._require_made
+        yield self._require_known_work
         self._look.set()
 
-    def _require_made(self, run: JobRun) -> None:
+    def _require_known_work(self, run: JobRun) -> None:
         if run.job.kind not in self._makers:
             raise RuntimeError(f"no process could make the work of {run.job.kind}")
 
-    def _waiting_for(self, session: Session, new: NewJob) -> int | None:
+    def _find_waiting_job(self, session: Session, new: NewJob) -> int | None:
         """See ``Jobs``."""
         for job in reversed(read_jobs(session, kinds=[new.kind], states=(WAITING,), limit=MOST)):
             mine = new.dataset_id is not None or job.actor == new.actor
@@ -305,11 +307,11 @@ class SharedJobs(Jobs):
                 return job.id
         return None
 
-    def _who_waits(self, session: Session) -> list[str]:
+    def _actors_of_waiting_jobs(self, session: Session) -> list[str]:
         """See ``Jobs``."""
         return [job.actor for job in read_jobs(session, states=(WAITING,), limit=MOST)]
 
-    def _begin(self, run: JobRun) -> bool:
+    def _record_start(self, run: JobRun) -> bool:
         """See ``Jobs``: another process may have ended or begun it."""
         with self._store.write() as session:
             job = read_job(session, run.job.id)
@@ -320,9 +322,9 @@ class SharedJobs(Jobs):
         self._announce(job)
         return True
 
-    def _finish(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
+    def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
         if self._alone or self.is_leader():
-            return super()._finish(run, by, **values)
+            return super()._record_end(run, by, **values)
         # Whoever carries out jobs now begins it again.
         run.over.set()
         return None

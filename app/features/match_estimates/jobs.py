@@ -225,7 +225,7 @@ def _share(call: MatchCall, progress: JobProgress) -> Json:
                 actor=call.job.actor,
                 executor=executor,
                 progress=counting_progress(progress, "matches"),
-                require_wanted=progress.require_wanted,
+                require_wanted=progress.require_not_cancelled,
             )
     finally:
         # What some matches were given before it ended is solved, however it ended.

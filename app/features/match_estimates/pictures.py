@@ -17,7 +17,7 @@ from app.db.store import Store
 from app.errors import GeometryError
 from app.features.datasets.service import need_dataset, read_dataset_head, require_matches
 from app.features.groups.edit import SetPicture
-from app.features.groups.group_edits import give_edits
+from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.match_estimates.queries import MatchPictures, match_pictures
 from app.features.pitches.queries import groups_of_match, match_pitches
@@ -175,7 +175,7 @@ def _give(
             if view is not None
         }
 
-    return give_edits(session, dataset_id, "edit", ids, edits, actor=actor)
+    return edit_groups(session, dataset_id, "edit", ids, edits, actor=actor)
 
 
 def _main_view(group: Group) -> View | None:

@@ -21,7 +21,7 @@ from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.digest import digest
 from app.features.groups.edit import Edit, SetPositions
 from app.features.groups.edit_codec import edit_from_json
-from app.features.groups.group_edits import give_edits
+from app.features.groups.group_edits import edit_groups
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.jobs.queries import Job
 from app.features.match_estimates.queries import (
@@ -240,7 +240,7 @@ def _give(
         }
 
     where = (session, dataset_id, POSITION, ids, of_match)
-    give_edits(*where, actor=actor, body=body, always_logged=ids[0] if ids else None)
+    edit_groups(*where, actor=actor, body=body, always_logged=ids[0] if ids else None)
 
 
 def _read(session: Session, dataset: str | int) -> DatasetPositions:

@@ -29,7 +29,7 @@ def _read(call: MatchCall, progress: JobProgress) -> Json:
             actor=call.job.actor,
             run=call.job.request["run"],
             progress=counting_progress(progress, "groups looked at"),
-            require_wanted=progress.require_wanted,
+            require_wanted=progress.require_not_cancelled,
         )
     finally:
         # What some groups were given before it ended is solved, however it ended.
@@ -65,7 +65,7 @@ def _propose(call: MatchCall, progress: JobProgress) -> Json:
         call.dataset_id,
         call.matches,
         progress=counting_progress(progress, "views looked at"),
-        require_wanted=progress.require_wanted,
+        require_wanted=progress.require_not_cancelled,
     )
     return asdict(run)
 

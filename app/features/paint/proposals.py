@@ -19,8 +19,8 @@ from app.features.groups.codecs import camera_to_json
 from app.features.groups.digest import digest, station_digest
 from app.features.groups.pictures import UNREADABLE, PictureTask, ProposalTask, read_proposal
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.groups.state import read_head
-from app.features.groups.view_paint import known_cameras
+from app.features.groups.state import read_group_head
+from app.features.groups.view_paint import nearby_cameras_of_match
 from app.features.paint.proposal_queries import (
     MatchProposals,
     delete_proposals,
@@ -111,7 +111,7 @@ def get_group_proposals(store: Store, group_id: int) -> list[tuple[str, bool, Pr
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        if read_head(session, group_id) is None:
+        if read_group_head(session, group_id) is None:
             raise NotFoundError.group(group_id)
         return group_proposals(session, group_id)
 
@@ -189,7 +189,7 @@ def _tasks(
         old = read_proposals(session, [view for views in views_by_group.values() for view in views])
         for stored in read_groups(session, list(views_by_group), extras=False).values():
             # The replays of a group look from elsewhere, but its main camera may be known, too.
-            known = known_cameras(session, stored)
+            known = nearby_cameras_of_match(session, stored)
             for key, number in stored.view_ids.items():
                 if number in views_by_group[stored.id]:
                     tasks.append(_task(stored, key, known, dataset, old.get(number)))
@@ -242,5 +242,5 @@ def _result(task: ProposalTask, reads: PictureTask) -> Proposal | None:
         found: Proposal | None = reads.result()
     except (ImageError, TooLargeError):
         # Its process ended over it: to this service that picture is unreadable.
-        return task.without_picture(UNREADABLE)
+        return task.proposal_without_picture(UNREADABLE)
     return found

@@ -9,8 +9,12 @@ from typing import Any
 from anyio import to_thread
 from fastapi import APIRouter, Request, Response
 
-from app.features.groups.schemas import points_of
-from app.features.groups.view_paint import PaintQuestion, paint_question, proposal_question
+from app.features.groups.schemas import points_by_marking
+from app.features.groups.view_paint import (
+    ViewPaintRequest,
+    make_paint_request,
+    make_proposal_request,
+)
 from app.features.groups.view_routes import CLIENT_GONE, with_view_in_error
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument
@@ -95,9 +99,9 @@ async def read_view_paint(
 ) -> PaintDocument | Response:
     """What the frame shows of the markings near a view's camera; saves nothing."""
     question = await to_thread.run_sync(
-        paint_question, services.store, view, points_of(wanted.lines)
+        make_paint_request, services.store, view, points_by_marking(wanted.lines)
     )
-    found = await _answer(request, question, partial(question.ask_paint, services.frames))
+    found = await _answer(request, question, partial(question.request_paint, services.frames))
     return Response(status_code=CLIENT_GONE) if found is None else PaintDocument.of(found)
 
 
@@ -116,13 +120,13 @@ async def propose_lines(
 
     Where the view has lines, those that nobody drew are proposed beside them.
     """
-    lines = {} if wanted is None else points_of(wanted.lines)
-    question = await to_thread.run_sync(proposal_question, services.store, view, lines)
-    found = await _answer(request, question, partial(question.ask_proposal, services.frames))
+    lines = {} if wanted is None else points_by_marking(wanted.lines)
+    question = await to_thread.run_sync(make_proposal_request, services.store, view, lines)
+    found = await _answer(request, question, partial(question.request_proposal, services.frames))
     return Response(status_code=CLIENT_GONE) if found is None else ProposalDocument.of(found)
 
 
-async def _answer(request: Request, question: PaintQuestion, ask: Callable[[], PoolTask]) -> Any:
+async def _answer(request: Request, question: ViewPaintRequest, ask: Callable[[], PoolTask]) -> Any:
     """What was found, or None where nobody waits for it any more."""
     with with_view_in_error(question.view.key):
         return await ask().result_unless_client_gone(request.is_disconnected)

@@ -18,11 +18,11 @@ from app.errors import ConflictError, ImageError, TooLargeError
 from app.features.datasets.queries import group_ids
 from app.features.datasets.service import DatasetHead, need_dataset, require_matches
 from app.features.groups.edit import SetPaint
-from app.features.groups.group_edits import give_edits
+from app.features.groups.group_edits import edit_groups
 from app.features.groups.pictures import (
     PaintTask,
     PictureTask,
-    outdated_beside_others,
+    mark_outdated_beside_other_people,
     read_view_paint,
 )
 from app.features.groups.queries import StoredGroup, read_groups
@@ -241,7 +241,7 @@ def _give(
 
     def edits(some: Mapping[int, StoredGroup]) -> dict[int, SetPaint]:
         fitting = {
-            number: SetPaint(outdated_beside_others(stored.group, wanted[number])).apply(
+            number: SetPaint(mark_outdated_beside_other_people(stored.group, wanted[number])).apply(
                 stored.group
             )
             for number, stored in some.items()
@@ -251,7 +251,7 @@ def _give(
         return {number: SetPaint(group.paint) for number, group in fitting.items()}
 
     always_logged = ids[0] if ids and "takes_back" in body else None
-    give_edits(
+    edit_groups(
         session, dataset_id, PAINT, ids, edits, actor=actor, body=body, always_logged=always_logged
     )
 
@@ -313,7 +313,7 @@ def _result(task: PaintTask, reads: PictureTask) -> PaintReading | None:
         reading: PaintReading | None = reads.result()
     except (ImageError, TooLargeError):
         # Its process ended over it: to this service that picture is unreadable.
-        return task.fitting or task.without_frame
+        return task.reusable_reading or task.reading_without_frame
     return reading
 
 
@@ -340,7 +340,7 @@ def _old(
         some = read_groups(session, ids[start : start + _BATCH])
         for stored in some.values():
             tasks = _group_tasks(stored, dataset.policy.calibration, {})
-            old[stored.group.match] += sum(task.is_old for task in tasks)
+            old[stored.group.match] += sum(task.is_outdated for task in tasks)
     return old
 
 

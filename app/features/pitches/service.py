@@ -20,7 +20,7 @@ from app.features.datasets.service import need_match, read_dataset_head
 from app.features.groups.digest import digest
 from app.features.groups.edit import SetPitch
 from app.features.groups.edit_codec import edit_from_json
-from app.features.groups.group_edits import give_edits
+from app.features.groups.group_edits import edit_groups
 from app.features.groups.state import require_etag
 from app.features.pitches.queries import (
     PITCH,
@@ -259,7 +259,9 @@ def give_pitch(
 ) -> None:
     """Give groups another pitch, each with an entry of the log; one that has it stays as it is."""
     edit = SetPitch(pitch.length, pitch.width)
-    give_edits(session, dataset_id, PITCH, ids, lambda some: dict.fromkeys(some, edit), actor=actor)
+    edit_groups(
+        session, dataset_id, PITCH, ids, lambda some: dict.fromkeys(some, edit), actor=actor
+    )
 
 
 _Shown = tuple[PitchEstimate | None, str | None]

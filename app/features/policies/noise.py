@@ -17,7 +17,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import need_dataset, read_dataset_head, save_policy
-from app.features.groups.ball_noise import give_factors, read_placed
+from app.features.groups.ball_noise import apply_noise_factors, read_last_ball_actors
 from app.features.groups.state import GroupState, read_states
 from app.features.independent_annotations.queries import is_copy
 from app.features.match_estimates.queries import Factor, Factors, factor_of, read_factors
@@ -219,7 +219,7 @@ def accept_noise(session: Session, noise: Noise, state: PolicyState, actor: str)
         policy = policy_with(state.policy, noise.values, name=name)
         apply_policy(session, noise.dataset_id, policy, if_match=state.etag, actor=actor)
     if noise.is_new:
-        give_factors(session, noise.dataset_id, noise.factors, actor)
+        apply_noise_factors(session, noise.dataset_id, noise.factors, actor)
 
 
 def take_noise_back(session: Session, dataset: str | int, *, actor: str) -> int:
@@ -228,7 +228,7 @@ def take_noise_back(session: Session, dataset: str | int, *, actor: str) -> int:
     Raises:
         NotFoundError: There is no such dataset.
     """
-    return give_factors(session, need_dataset(session, dataset), (), actor)
+    return apply_noise_factors(session, need_dataset(session, dataset), (), actor)
 
 
 def _solved(store: Store, dataset_id: int) -> list[int]:
@@ -243,7 +243,7 @@ def _groups(store: Store, chosen: Sequence[int]) -> Iterator[tuple[GroupState, M
         batch = chosen[start : start + CHUNK]
         with store.read() as session:
             states = read_states(session, batch)
-            placed = read_placed(session, batch)
+            placed = read_last_ball_actors(session, batch)
         yield from ((state, placed.get(state.id, {})) for state in states)
 
 

@@ -10,7 +10,11 @@ from app.db.log import newest_entry
 from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.queries import dataset_names
-from app.features.groups.revision_queries import StoredChange, logged_changes, solved_groups
+from app.features.groups.revision_queries import (
+    StoredChange,
+    changes_after_entry,
+    groups_solved_after,
+)
 from app.features.groups.state import read_etags
 from app.features.solutions.queries import newest_solution
 
@@ -104,7 +108,7 @@ def read_changes(session: Session, after: int) -> list[Change]:
     if newest - after > FAR:
         names = dataset_names(session)
         return [Change(newest, key, name, EVERYTHING, None) for key, name in names.items()]
-    return _with_names(session, logged_changes(session, after))
+    return _with_names(session, changes_after_entry(session, after))
 
 
 def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) -> list[Change]:
@@ -112,7 +116,7 @@ def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) 
     skipped = set(known)
     found = [
         StoredChange(None, dataset_id, SOLVED, None, group_id)
-        for dataset_id, group_id in solved_groups(session, after)
+        for dataset_id, group_id in groups_solved_after(session, after)
         if group_id not in skipped
     ]
     return _with_names(session, found)

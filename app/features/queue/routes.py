@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 from app.features.datasets.service import dataset_id
 from app.features.groups import submit
 from app.features.groups.submit import find_view
-from app.features.groups.suggested_edits import influences
+from app.features.groups.suggested_edits import marking_influences
 from app.features.groups.suggestions import find_suggestions
 from app.features.people.visibility_queries import is_blind
 from app.features.queue.fields import FIELDS, ORDERS
@@ -111,5 +111,5 @@ def get_influence(view: Id, store: AppStore) -> Influences:
     found = find_view(store, view)
     state = submit.load(store, found.group_id)
     seen = next(item for item in state.group.views if state.view_ids[item.key] == view)
-    items = influences(seen.station, state.group.pitch, state.policy.calibration)
+    items = marking_influences(seen.station, state.group.pitch, state.policy.calibration)
     return Influences(items=items)

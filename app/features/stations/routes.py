@@ -14,7 +14,7 @@ from app.features.groups.edit import SetStationCalibration, SetStationLines
 from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document
 from app.features.groups.schemas import GroupDocument, LinesEdit, StationEdit
 from app.features.groups.state import GroupState
-from app.features.groups.submit import solved
+from app.features.groups.submit import solve_and_keep
 from app.features.solve.jobs import request_solve
 from app.features.stations.schemas import StationDetail
 from app.features.stations.service import (
@@ -163,7 +163,7 @@ def _change(
         state = change(store, station, if_match=if_match, actor=actor, shown=shown)
     with without_response():
         request_solve(services.jobs, store, state.dataset_id, actor=actor, edited=True)
-    return state.shown or solved(store, shown)
+    return state.shown or solve_and_keep(store, shown)
 
 
 def _shown_group(state: StationState, group: int | None) -> int:

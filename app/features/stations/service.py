@@ -14,7 +14,11 @@ from app.errors import ConflictError, NotFoundError
 from app.features.datasets.queries import dataset_name
 from app.features.groups.digest import group_inputs_hash
 from app.features.groups.edit import SetStationLines, StationEdit, with_station
-from app.features.groups.edit_codec import require_few_points, station_edit_from_json, step_to_json
+from app.features.groups.edit_codec import (
+    edit_and_inverse_to_json,
+    require_point_limits,
+    station_edit_from_json,
+)
 from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.state import (
@@ -24,7 +28,7 @@ from app.features.groups.state import (
     require_etag,
     station_etag,
 )
-from app.features.groups.undo_stacks import next_step, read_station_stacks
+from app.features.groups.undo_stacks import read_station_stacks, undo_entry_body
 from app.features.groups.view_queries import (
     StoredStation,
     groups_of_station,
@@ -260,8 +264,8 @@ def _plan_edit(edit: StationEdit) -> _Plan:
     def plan(_session: Session, state: StationState) -> _Change:
         station = state.station
         if isinstance(edit, SetStationLines):
-            require_few_points(f"camera {station.key}", station.lines, edit.lines)
-        body = step_to_json(edit, edit.inverse(station))
+            require_point_limits(f"camera {station.key}", station.lines, edit.lines)
+        body = edit_and_inverse_to_json(edit, edit.inverse(station))
         return _Change("station_edit", body, edit.apply(station))
 
     return plan
@@ -272,7 +276,7 @@ def _plan_step(kind: str) -> _Plan:
 
     def plan(session: Session, state: StationState) -> _Change:
         stacks = read_station_stacks(session, state.id)
-        body = next_step(session, stacks, kind, "for this camera")
+        body = undo_entry_body(session, stacks, kind, "for this camera")
         station = station_edit_from_json(body["edit"]).apply(state.station)
         return _Change(f"station_{kind}", body, station)
 

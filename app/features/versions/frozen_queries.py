@@ -14,7 +14,7 @@ from app.canonical import canonical, digest_of
 from app.db.json_columns import Json, inflate, look_through, parse
 from app.db.session import Session
 from app.features.groups.codecs import (
-    group_head_to_json,
+    group_without_views_to_json,
     positions_from_json,
     station_from_json,
     station_to_json,
@@ -60,7 +60,7 @@ def freeze_annotations(group: Group) -> FrozenAnnotations:
         value = view_to_json(view, station)
         del value["media"]
         views.append(value)
-    text = canonical({**group_head_to_json(group), "views": views})
+    text = canonical({**group_without_views_to_json(group), "views": views})
     key = SAID + digest_of(text.encode())
     return FrozenAnnotations(key, {**texts, key: text})
 

@@ -59,21 +59,21 @@ class BlockResults:
     def by(facts: Facts, jac: FloatArray, policy: Policy) -> BlockResults:
         """Judge groups."""
         uncertainty = MeanCovariance(facts)
-        judgement = judge(facts, policy, uncertainty, _jac(facts, jac, policy))
+        judgement = judge(facts, policy, uncertainty, _jac_at_threshold(facts, jac, policy))
         found = BlockResults(facts, jac, policy, judgement)
         if policy.max_sigma_m is not None:
-            found.sigma = _sigma(facts, policy, judgement, uncertainty)
+            found.sigma = _mean_sigmas(facts, policy, judgement, uncertainty)
         return found
 
     def complete(self) -> None:
         """Compute what somebody may ask for, so that nobody waits for it."""
         with self.lock:
             if self.sigma is None:
-                self.sigma = _sigma(
+                self.sigma = _mean_sigmas(
                     self.facts, self.policy, self.judgement, MeanCovariance(self.facts)
                 )
             if self.p_value is None:
-                self.p_value = _p_value(self.facts, self.policy, self.judgement)
+                self.p_value = _p_values(self.facts, self.policy, self.judgement)
 
     @property
     def nbytes(self) -> int:
@@ -84,18 +84,18 @@ class BlockResults:
         uncertainty = 0 if self.uncertainty is None else self.uncertainty.nbytes
         return int(rows + uncertainty + sum(array.nbytes for array in arrays))
 
-    def under(self, policy: Policy) -> Judgement:
+    def judge_under(self, policy: Policy) -> Judgement:
         """What another policy makes of the groups."""
-        if _is_stricter(policy) and noise_of(policy) != noise_of(self.policy):
-            jac = _jac(self.facts, self.jac, policy)
+        if _uses_click_noise(policy) and noise_of(policy) != noise_of(self.policy):
+            jac = _jac_at_threshold(self.facts, self.jac, policy)
             return judge(self.facts, policy, self._uncertainty(), jac)
-        return self._under(policy)[0]
+        return self._judge_under(policy)[0]
 
-    def moved(self, policy: Policy) -> BlockResults:
+    def judged_by(self, policy: Policy) -> BlockResults:
         """The groups judged by another policy from now on."""
         if noise_of(policy) != noise_of(self.policy):
             return BlockResults.by(self.facts, self.jac, policy)
-        judgement, new, part = self._under(policy)
+        judgement, new, part = self._judge_under(policy)
         found = BlockResults(self.facts, self.jac, policy, judgement)
         if self.sigma is not None and self.p_value is not None:
             found.sigma, found.p_value = self.sigma.copy(), self.p_value.copy()
@@ -104,15 +104,15 @@ class BlockResults:
                 found.sigma[new], found.p_value[new] = part.sigma, part.p_value
         return found
 
-    def _under(self, policy: Policy) -> tuple[Judgement, BoolArray, BlockResults | None]:
+    def _judge_under(self, policy: Policy) -> tuple[Judgement, BoolArray, BlockResults | None]:
         """The judgement, which groups had to be judged anew, and those by themselves."""
         facts, known = self.facts, self.judgement
-        jac = _jac(facts, self.jac, policy)
+        jac = _jac_at_threshold(facts, self.jac, policy)
         view_failed, pair_failed = failures(facts, jac, policy)
         new = np.zeros(facts.groups, bool)
         new[facts.view_group[np.flatnonzero(view_failed != known.view_failed)]] = True
         new[facts.pair_group[np.flatnonzero(pair_failed != known.pair_failed)]] = True
-        failed = compare_again(known, policy, *self._measured(policy))
+        failed = compare_again(known, policy, *self._sigmas_and_p_values(policy))
         numbers = [getattr(known, name) for name in _NUMBERS]
         part = None
         if new.any():
@@ -130,14 +130,14 @@ class BlockResults:
             part = BlockResults(some, self.jac, policy, found)
         return Judgement(jac, view_failed, pair_failed, failed, *numbers), new, part
 
-    def _measured(self, policy: Policy) -> tuple[FloatArray | None, FloatArray | None]:
+    def _sigmas_and_p_values(self, policy: Policy) -> tuple[FloatArray | None, FloatArray | None]:
         """Sigmas and p-values, where the policy asks for them."""
         with self.lock:
             if policy.max_sigma_m is not None and self.sigma is None:
                 uncertainty = self.uncertainty or MeanCovariance(self.facts)
-                self.sigma = _sigma(self.facts, self.policy, self.judgement, uncertainty)
+                self.sigma = _mean_sigmas(self.facts, self.policy, self.judgement, uncertainty)
             if policy.min_p_value is not None and self.p_value is None:
-                self.p_value = _p_value(self.facts, self.policy, self.judgement)
+                self.p_value = _p_values(self.facts, self.policy, self.judgement)
         return (
             None if policy.max_sigma_m is None else self.sigma,
             None if policy.min_p_value is None else self.p_value,
@@ -155,12 +155,12 @@ def noise_of(policy: Policy) -> tuple[float, float, float]:
     return policy.click_sigma_px, policy.box_sigma_share, policy.given_sigma_px
 
 
-def _is_stricter(policy: Policy) -> bool:
+def _uses_click_noise(policy: Policy) -> bool:
     """Whether it asks for what depends on the noise of clicks."""
     return policy.max_sigma_m is not None or policy.min_p_value is not None
 
 
-def _jac(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArray:
+def _jac_at_threshold(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArray:
     gamma = policy.jac_gamma_percent
     if gamma in GAMMAS_PERCENT:
         known: FloatArray = jac[GAMMAS_PERCENT.index(gamma)]
@@ -168,7 +168,7 @@ def _jac(facts: Facts, jac: FloatArray, policy: Policy) -> FloatArray:
     return view_jac(facts, gamma)
 
 
-def _sigma(
+def _mean_sigmas(
     facts: Facts, policy: Policy, judgement: Judgement, uncertainty: MeanCovariance
 ) -> FloatArray:
     there = np.flatnonzero(~np.isnan(judgement.point[:, 0]))
@@ -180,7 +180,7 @@ def _sigma(
     return sigma
 
 
-def _p_value(facts: Facts, policy: Policy, judgement: Judgement) -> FloatArray:
+def _p_values(facts: Facts, policy: Policy, judgement: Judgement) -> FloatArray:
     return p_values(facts, views_of(facts, judgement.valid), judgement.point, policy)
 
 
@@ -188,14 +188,14 @@ Given = TypeVar("Given")
 Made = TypeVar("Made")
 
 
-def each(work: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
+def map_in_threads(work: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
     """What a function makes of each item, in their order; arrays of some size let others run."""
     given = list(items)
     if len(given) < 2:
         return [work(item) for item in given]
-    return list(_threads().map(work, given))
+    return list(_thread_pool().map(work, given))
 
 
 @cache
-def _threads() -> ThreadPoolExecutor:
+def _thread_pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="yield")

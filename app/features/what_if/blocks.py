@@ -20,8 +20,8 @@ from app.features.groups.revision_queries import (
     changed_groups,
     count_changes,
     count_groups,
-    groups_from,
-    newest_change,
+    groups_after,
+    newest_change_id,
 )
 from app.features.solutions.queries import read_calibrations, solution_facts
 from app.features.what_if.cache import (
@@ -31,7 +31,7 @@ from app.features.what_if.cache import (
     cache_block_list,
     cached_table,
 )
-from app.features.what_if.table import EMPTY, YieldTable, join, table_of
+from app.features.what_if.table import EMPTY, YieldTable, join_tables, table_of
 from app.solving.facts import NOTHING, Facts, group_facts
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 
@@ -44,29 +44,31 @@ def read_tables(session: Session, rows: Sequence[Any]) -> tuple[YieldTable, Yiel
 
     Args:
         session: A read session.
-        rows: As ``groups_from`` returns them in the same session.
+        rows: As ``groups_after`` returns them in the same session.
     """
     solved, others = [], []
     tables = []
     for start in range(0, len(rows), CHUNK):
         chunk = rows[start : start + CHUNK]
-        found = _facts(session, [row.solution_id for row in chunk if row.solution_id is not None])
+        found = _read_facts(
+            session, [row.solution_id for row in chunk if row.solution_id is not None]
+        )
         solved = [row for row in chunk if row.group_id in found]
         others += [row for row in chunk if row.group_id not in found]
         tables.append(table_of(solved, facts_from_bytes([found[row.group_id] for row in solved])))
-    return join([table_of([], NOTHING), *tables]), table_of(others, NOTHING)
+    return join_tables([table_of([], NOTHING), *tables]), table_of(others, NOTHING)
 
 
-def _facts(session: Session, solution_ids: Sequence[int]) -> dict[int, bytes]:
+def _read_facts(session: Session, solution_ids: Sequence[int]) -> dict[int, bytes]:
     """Facts of solutions, by group."""
     rows = solution_facts(session, solution_ids)
     found = {row.group_id: row.facts for row in rows if row.facts is not None}
     bare = [row for row in rows if row.facts is None]
-    found.update((group, facts_to_bytes(facts)) for group, facts in _gathered(session, bare))
+    found.update((group, facts_to_bytes(facts)) for group, facts in _recompute_facts(session, bare))
     return found
 
 
-def _gathered(session: Session, rows: Sequence[Any]) -> Iterator[tuple[int, Facts]]:
+def _recompute_facts(session: Session, rows: Sequence[Any]) -> Iterator[tuple[int, Facts]]:
     """Facts of solutions from before they were kept, where they still fit their group."""
     keys = {row.group_id: json.loads(row.calibrations) for row in rows}
     calibrations = read_calibrations(session, {key for names in keys.values() for key in names})
@@ -116,7 +118,7 @@ class DatasetBlocks:
     @staticmethod
     def begin(session: Session, folder: Path, dataset_id: int, calibration: str) -> DatasetBlocks:
         """No group yet, as the database stands."""
-        return DatasetBlocks(folder, dataset_id, calibration, newest_change(session))
+        return DatasetBlocks(folder, dataset_id, calibration, newest_change_id(session))
 
     @staticmethod
     def load(
@@ -124,7 +126,7 @@ class DatasetBlocks:
     ) -> DatasetBlocks | None:
         """What the cache holds; None where it holds nothing that this database could have said."""
         kept = cached_table(folder, calibration)
-        if kept is None or kept.mark > newest_change(session):
+        if kept is None or kept.mark > newest_change_id(session):
             return None
         number, digest = kept.entry
         if number and entry_hash(session, number) != digest:
@@ -138,52 +140,56 @@ class DatasetBlocks:
         """How many groups there are, solved or not."""
         return sum(block.groups for block in self.blocks) + self.bare.groups
 
-    def is_whole(self, session: Session) -> bool:
+    def has_all_groups(self, session: Session) -> bool:
         """Whether it holds as many groups as the dataset has; a million are counted once a change."""
         if self.whole != self.mark and self.groups == count_groups(session, self.dataset_id):
             self.whole = self.mark
         return self.whole == self.mark
 
-    def left(self, session: Session) -> int:
+    def count_groups_left(self, session: Session) -> int:
         """How many groups have to be read until it is in step."""
         total = (
             count_groups(session, self.dataset_id) - self.groups if self.through is not None else 0
         )
         return total + count_changes(session, self.dataset_id, self.mark)
 
-    def step(self, session: Session) -> bool:
+    def read_next_block(self, session: Session) -> bool:
         """Come a block of groups closer to the database; False: it is in step with the session."""
-        return self._gather(session) if self.through is not None else self._update(session)
+        return (
+            self._read_new_groups(session)
+            if self.through is not None
+            else self._read_changed_groups(session)
+        )
 
-    def _gather(self, session: Session) -> bool:
-        rows = groups_from(session, self.dataset_id, self.through or 0, BLOCK)
+    def _read_new_groups(self, session: Session) -> bool:
+        rows = groups_after(session, self.dataset_id, self.through or 0, BLOCK)
         solved, bare = read_tables(session, rows)
         if solved.groups:
             large = self.through or len(rows) >= WORTH_KEEPING
-            self.blocks.append(self._written(solved) if large else CachedBlock("", solved))
-        self.bare = join([self.bare, bare]) if bare.groups else self.bare
+            self.blocks.append(self._write_block(solved) if large else CachedBlock("", solved))
+        self.bare = join_tables([self.bare, bare]) if bare.groups else self.bare
         self.through = rows[-1].number if len(rows) == BLOCK else None
         self.version += 1
         if self.groups >= WORTH_KEEPING:
-            self._keep(session)
+            self._write_block_list(session)
         return True
 
-    def _update(self, session: Session) -> bool:
+    def _read_changed_groups(self, session: Session) -> bool:
         """Read again what has changed; what was only solved under other thresholds has not."""
         rows = changed_groups(session, self.dataset_id, self.mark, BLOCK)
         if not rows:
             # The changes of other datasets need not be passed over again.
-            self.mark = newest_change(session)
+            self.mark = newest_change_id(session)
             return False
         self.mark = rows[-1].change_id
         self.noted += len(rows)
         same = self._rows_in_blocks([row.group_id for row in rows])
         new = [row for row in rows if same.get(row.group_id) != _row_values(row)]
         if new:
-            self._replace(read_tables(session, new))
+            self._replace_rows(read_tables(session, new))
             self.version += 1
         if self.noted >= FLUSH:
-            self._flush(session)
+            self._write_unwritten_blocks(session)
         return True
 
     def _rows_in_blocks(self, group_ids: list[int]) -> dict[int, tuple[object, ...]]:
@@ -203,32 +209,32 @@ class DatasetBlocks:
                 )
         return found
 
-    def _replace(self, tables: tuple[YieldTable, YieldTable]) -> None:
+    def _replace_rows(self, tables: tuple[YieldTable, YieldTable]) -> None:
         solved, bare = tables
         new = np.concatenate([solved.group_id, bare.group_id])
         blocks = [block.without(new) for block in self.blocks]
         tail = [block for block in blocks if not block.name]
         self.blocks = [block for block in blocks if block.name and block.groups]
         if solved.groups or any(block.groups for block in tail):
-            table = join([*(block.only_live for block in tail), solved])
+            table = join_tables([*(block.only_live for block in tail), solved])
             self.blocks.append(CachedBlock("", table))
-        self.bare = join([self.bare.only(~np.isin(self.bare.group_id, new)), bare])
+        self.bare = join_tables([self.bare.select_groups(~np.isin(self.bare.group_id, new)), bare])
 
-    def _flush(self, session: Session) -> None:
+    def _write_unwritten_blocks(self, session: Session) -> None:
         """Write what is in memory alone, together with blocks that became small."""
         small = [block for block in self.blocks if not block.name or block.groups < BLOCK // 2]
         if any(not block.name for block in small):
             kept = [block for block in self.blocks if block not in small]
-            table = join([block.only_live for block in small])
-            self.blocks = [*kept, self._written(table)]
+            table = join_tables([block.only_live for block in small])
+            self.blocks = [*kept, self._write_block(table)]
             self.version += 1
             self.version += 1
-        self._keep(session)
+        self._write_block_list(session)
 
-    def _written(self, table: YieldTable) -> CachedBlock:
+    def _write_block(self, table: YieldTable) -> CachedBlock:
         return cache_block(self.folder, table)
 
-    def _keep(self, session: Session) -> None:
+    def _write_block_list(self, session: Session) -> None:
         number = newest_entry(session)
         entry = number, entry_hash(session, number) or ""
         cache_block_list(

@@ -72,7 +72,7 @@ def map_arrays(path: Path, *, whole: bool = False) -> ArraysFile:
         OSError: It cannot be read.
         ValueError: It is not what was written.
     """
-    found, checksum = _mapped(path)
+    found, checksum = _map_with_checksum(path)
     # A file from before there was a checksum has none to compare.
     if whole and checksum is not None and _checksum(found.arrays) != checksum:
         raise ValueError(f"{path.name} is not what was written")
@@ -86,7 +86,7 @@ def _checksum(arrays: Mapping[str, Any]) -> int:
     return now
 
 
-def _mapped(path: Path) -> tuple[ArraysFile, int | None]:
+def _map_with_checksum(path: Path) -> tuple[ArraysFile, int | None]:
     """The arrays of a file, and their checksum."""
     raw = np.asarray(np.memmap(path, np.uint8, "r"))
     length, checksum = np.frombuffer(raw[:_HEAD].tobytes(), "<u8").tolist()
@@ -142,7 +142,7 @@ class CachedBlock:
     @property
     def only_live(self) -> YieldTable:
         """The table of the groups that count."""
-        return self.table if self.live is None else self.table.only(self.live)
+        return self.table if self.live is None else self.table.select_groups(self.live)
 
     def without(self, group_ids: IntArray) -> CachedBlock:
         """The block in which some groups do not count any more."""
@@ -178,8 +178,8 @@ def cache_block(folder: Path, table: YieldTable) -> CachedBlock:
     arrays |= {item: getattr(table, item) for item in (*HEADS, *FIGURES)}
     about = {"format": FORMAT, "splits": table.splits, "matches": table.matches}
     try:
-        write_arrays(_block(folder, name), about, arrays)
-        return CachedBlock(name, _table(folder, name))
+        write_arrays(_block_path(folder, name), about, arrays)
+        return CachedBlock(name, _map_table(folder, name))
     except _NOT_READ as error:
         _log_failure(error)
         return CachedBlock("", table)
@@ -214,7 +214,9 @@ def cached_table(folder: Path, calibration: str) -> CachedTable | None:
         if found["format"] != FORMAT or found["calibration"] != calibration:
             return None
         blocks = tuple(
-            _with_gone(CachedBlock(item["name"], _table(folder, item["name"])), item["gone"])
+            _block_without(
+                CachedBlock(item["name"], _map_table(folder, item["name"])), item["gone"]
+            )
             for item in found["blocks"]
         )
         number, digest = found["entry"]
@@ -222,7 +224,7 @@ def cached_table(folder: Path, calibration: str) -> CachedTable | None:
             # What is used is not old, however long ago it was made.
             path.touch()
         through = found["through"]
-        bare = _empty_table(folder, found["mark"])
+        bare = _map_unsolved_table(folder, found["mark"])
         return CachedTable(calibration, found["mark"], (number, digest), through, blocks, bare)
     except FileNotFoundError:
         return None
@@ -240,7 +242,9 @@ def cache_results(folder: Path, block: CachedBlock, judged: BlockResults) -> Non
         if getattr(judged, name) is not None:
             arrays[name] = getattr(judged, name)
     try:
-        write_arrays(_results_path(folder, block.name), {"policy": _key(judged.policy)}, arrays)
+        write_arrays(
+            _results_path(folder, block.name), {"policy": _policy_key(judged.policy)}, arrays
+        )
     except OSError as error:
         _log_failure(error)
 
@@ -251,7 +255,7 @@ def cached_results(folder: Path, block: CachedBlock, policy: Policy) -> BlockRes
         return None
     try:
         found = map_arrays(_results_path(folder, block.name))
-        if found.about["policy"] != _key(policy):
+        if found.about["policy"] != _policy_key(policy):
             return None
         judgement = Judgement(**{name: found.arrays[name] for name in _JUDGEMENT})
         table = block.table
@@ -273,11 +277,11 @@ def delete_table(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def _key(policy: Policy) -> list[Any]:
+def _policy_key(policy: Policy) -> list[Any]:
     return [policy.hash, *noise_of(policy)]
 
 
-def _block(folder: Path, name: str) -> Path:
+def _block_path(folder: Path, name: str) -> Path:
     return folder / f"{name}.facts"
 
 
@@ -285,9 +289,9 @@ def _results_path(folder: Path, name: str) -> Path:
     return folder / f"{name}.judged"
 
 
-def _table(folder: Path, name: str) -> YieldTable:
+def _map_table(folder: Path, name: str) -> YieldTable:
     """The table of a block, mapped."""
-    found = map_arrays(_block(folder, name))
+    found = map_arrays(_block_path(folder, name))
     if found.about["format"] != FORMAT:
         raise ValueError("a block is of another format")
     arrays = found.arrays
@@ -297,11 +301,11 @@ def _table(folder: Path, name: str) -> YieldTable:
     table = YieldTable(**heads, splits=splits, matches=matches, facts=facts)
     # What follows from the facts is read, too.
     vars(table).update({item: arrays[item] for item in FIGURES})
-    _require_sound(table)
+    _require_valid_table(table)
     return table
 
 
-def _empty_table(folder: Path, mark: int) -> YieldTable:
+def _map_unsolved_table(folder: Path, mark: int) -> YieldTable:
     found = map_arrays(folder / BARE)
     if found.about["mark"] != mark:
         raise ValueError("the list of a table is not of one piece")
@@ -309,7 +313,7 @@ def _empty_table(folder: Path, mark: int) -> YieldTable:
     return YieldTable(**found.arrays, splits=splits, matches=matches, facts=NOTHING)
 
 
-def _require_sound(table: YieldTable) -> None:
+def _require_valid_table(table: YieldTable) -> None:
     """Raise ValueError unless every array has its type, its shape and rows that exist."""
     facts, lengths = table.facts, dict[str, int]()
     for name, (kind, shape) in COLUMNS.items():
@@ -331,7 +335,7 @@ def _require_sound(table: YieldTable) -> None:
         raise ValueError("a group lacks something")
 
 
-def _with_gone(block: CachedBlock, gone: Sequence[int]) -> CachedBlock:
+def _block_without(block: CachedBlock, gone: Sequence[int]) -> CachedBlock:
     if not gone:
         return block
     live = np.ones(block.table.groups, bool)

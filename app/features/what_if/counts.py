@@ -53,7 +53,7 @@ class GroupCounts:
     splits: Counter[str] = field(default_factory=Counter)
 
 
-def sum_of(tallies: Iterable[GroupCounts]) -> GroupCounts:
+def sum_counts(tallies: Iterable[GroupCounts]) -> GroupCounts:
     """All groups of several blocks."""
     total = GroupCounts()
     for counts in tallies:
@@ -71,7 +71,7 @@ def sum_of(tallies: Iterable[GroupCounts]) -> GroupCounts:
     return total
 
 
-def tally_of(
+def count_table_groups(
     table: YieldTable,
     live: BoolArray | slice,
     policy: Policy,
@@ -90,7 +90,7 @@ def tally_of(
         counted: What was counted under another policy: some of it is the same under each.
     """
     if counted is None:
-        curves = np.stack([_curve(steps[live]) for steps in table.steps])
+        curves = np.stack([_curve_of_steps(steps[live]) for steps in table.steps])
         counted = GroupCounts(unmeasured=int(table.unmeasured[live].sum()), curves=curves)
     passes, before = judgement.passes[live], present.passes[live]
     split = np.bincount(table.split[live][passes], minlength=len(table.splits))
@@ -101,20 +101,20 @@ def tally_of(
         unmeasured=counted.unmeasured,
         dropped=np.bincount(judgement.first[live], minlength=len(GATES) + 1),
         curves=counted.curves,
-        distances=_distances(judgement, live),
-        findings=_findings(table, live, policy, judgement),
+        distances=_count_by_distance(judgement, live),
+        findings=_count_findings(table, live, policy, judgement),
         splits=Counter(dict(zip(table.splits, split.tolist(), strict=True))),
     )
 
 
-def _curve(steps: IntArray) -> IntArray:
+def _curve_of_steps(steps: IntArray) -> IntArray:
     """A group counts at as many of the steps, from the first on, as are below its JaC."""
     counts = np.bincount(steps, minlength=len(JAC_STEPS) + 1)
     curve: IntArray = counts[::-1].cumsum()[::-1][1:]
     return curve
 
 
-def _distances(judgement: Judgement, live: BoolArray | slice) -> IntArray:
+def _count_by_distance(judgement: Judgement, live: BoolArray | slice) -> IntArray:
     distance, passes = judgement.distance[live], judgement.passes[live]
     place = np.searchsorted(DISTANCES, distance, "right") - 1
     place[np.isnan(distance)] = len(DISTANCES)
@@ -124,7 +124,7 @@ def _distances(judgement: Judgement, live: BoolArray | slice) -> IntArray:
     )
 
 
-def _findings(
+def _count_findings(
     table: YieldTable, live: BoolArray | slice, policy: Policy, judgement: Judgement
 ) -> IntArray:
     x, y, z = judgement.point.T
@@ -151,7 +151,7 @@ class Leak:
     splits: tuple[tuple[str, int], ...]
 
 
-def leaks(places: Counter[tuple[str, str]]) -> tuple[Leak, ...]:
+def find_split_leaks(places: Counter[tuple[str, str]]) -> tuple[Leak, ...]:
     """Matches in several splits, by name.
 
     Args:

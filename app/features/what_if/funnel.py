@@ -7,8 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from app.features.what_if.block_results import each, noise_of
-from app.features.what_if.counts import DISTANCES, FINDINGS, GroupCounts, Leak, leaks, sum_of
+from app.features.what_if.block_results import map_in_threads, noise_of
+from app.features.what_if.counts import (
+    DISTANCES,
+    FINDINGS,
+    GroupCounts,
+    Leak,
+    find_split_leaks,
+    sum_counts,
+)
 from app.features.what_if.service import Block, Snapshot, YieldStore
 from app.features.what_if.table import JAC_STEPS
 from app.geometry.arrays import IntArray
@@ -95,20 +102,20 @@ def get_yield(
         NotFoundError: There is no such dataset.
     """
     snapshot = yields.snapshot(dataset_id)
-    policy = _changed(snapshot.policy, values or {})
-    unanswered = needs_solving(snapshot.policy, policy)
+    policy = _changed_policy(snapshot.policy, values or {})
+    unanswered = thresholds_that_need_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
 
-    def tally(block: Block) -> GroupCounts:
-        return block.tally if same else block.count_under(policy)
+    def count_block(block: Block) -> GroupCounts:
+        return block.count_present if same else block.count_under(policy)
 
     # Who tries another noise judges every group anew; else threads would wait for each other.
     side_by_side = noise_of(policy) != noise_of(snapshot.policy)
-    total = sum_of((each if side_by_side else map)(tally, snapshot.blocks))
-    return _answer(snapshot, policy, total, unanswered)
+    total = sum_counts((map_in_threads if side_by_side else map)(count_block, snapshot.blocks))
+    return _make_yield(snapshot, policy, total, unanswered)
 
 
-def needs_solving(present: Policy, tried: Policy) -> tuple[str, ...]:
+def thresholds_that_need_solving(present: Policy, tried: Policy) -> tuple[str, ...]:
     """Names of thresholds that differ and that the table cannot answer for."""
     return tuple(
         item.name
@@ -117,13 +124,13 @@ def needs_solving(present: Policy, tried: Policy) -> tuple[str, ...]:
     )
 
 
-def _changed(policy: Policy, values: Mapping[str, Any]) -> Policy:
+def _changed_policy(policy: Policy, values: Mapping[str, Any]) -> Policy:
     values = dict(values)
     calibration = replace(policy.calibration, **values.pop("calibration", {}))
     return replace(policy, **{**values, "calibration": calibration})
 
 
-def _answer(
+def _make_yield(
     snapshot: Snapshot, policy: Policy, total: GroupCounts, unanswered: tuple[str, ...]
 ) -> Yield:
     return Yield(
@@ -131,26 +138,26 @@ def _answer(
         groups=snapshot.solved + snapshot.unsolved,
         passing=total.passing,
         unsolved=snapshot.unsolved,
-        funnel=_funnel(snapshot, total.dropped, policy),
+        funnel=_funnel_steps(snapshot, total.dropped, policy),
         given_not_measured=total.unmeasured,
         curves=tuple(
             ThresholdCurve(gamma, tuple(counts.tolist()))
             for gamma, counts in zip(GAMMAS_PERCENT, total.curves, strict=True)
         ),
-        splits=_splits(snapshot, total),
-        distances=_distances(snapshot, total),
+        splits=_yield_by_split(snapshot, total),
+        distances=_yield_by_distance(snapshot, total),
         findings=tuple(
             FunnelPart(kind, groups, passing)
             for kind, (groups, passing) in zip(FINDINGS, total.findings.tolist(), strict=True)
         ),
-        leakage=leaks(snapshot.places),
+        leakage=find_split_leaks(snapshot.places),
         gained=total.gained,
         lost=total.lost,
         needs_solving=unanswered,
     )
 
 
-def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[FunnelStep, ...]:
+def _funnel_steps(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[FunnelStep, ...]:
     """Gates that the policy asks for, in order, after the groups that are not solved."""
     inactive = {
         "agreement": policy.min_agreement is None,
@@ -168,7 +175,7 @@ def _funnel(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[Funn
     return tuple(steps)
 
 
-def _splits(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
+def _yield_by_split(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
     everyone: Counter[str] = Counter()
     for (_, split), groups in snapshot.places.items():
         everyone[split] += groups
@@ -177,7 +184,7 @@ def _splits(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
     )
 
 
-def _distances(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
+def _yield_by_distance(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
     groups, passing = total.distances.tolist()
     groups[-1] += snapshot.unsolved

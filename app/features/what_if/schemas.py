@@ -28,27 +28,27 @@ LABELS = {
 """What a step of the funnel asks, for people."""
 
 
-def _tried(part: type[Policy | CalibrationPolicy]) -> Any:
+def _optional_thresholds_model(part: type[Policy | CalibrationPolicy]) -> Any:
     """A model in which every threshold of a part of the policy can stand or be absent."""
     fields: dict[str, Any] = {
-        item.name: (_hint(item) | None, Field(default=None, description=item.text))
+        item.name: (_threshold_type(item) | None, Field(default=None, description=item.text))
         for item in thresholds_of(part)
     }
     return create_model(f"_{part.__name__}", __config__=ConfigDict(extra="forbid"), **fields)
 
 
-def _hint(item: Threshold) -> Any:
+def _threshold_type(item: Threshold) -> Any:
     """The type of a threshold, and between which ends it lies."""
     if item.is_word or item.minimum is None:
         return item.hint
     return Annotated[float, Field(ge=item.minimum, le=item.maximum)]
 
 
-class CalibrationValues(_tried(CalibrationPolicy)):  # type: ignore[misc]
+class CalibrationValues(_optional_thresholds_model(CalibrationPolicy)):  # type: ignore[misc]
     """What a view's calibration depends on; only solving again tells what another value does."""
 
 
-class WhatIf(_tried(Policy)):  # type: ignore[misc]
+class WhatIf(_optional_thresholds_model(Policy)):  # type: ignore[misc]
     """Thresholds to try; those that are absent stay as they are.
 
     `null` switches a gate off (`min_agreement`, `min_parallax_degrees`,

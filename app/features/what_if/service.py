@@ -17,7 +17,7 @@ from app.db.store import Store
 from app.errors import NotFoundError, OverloadedError, ReviewError
 from app.features.datasets.queries import dataset_names, find_dataset, policy_of
 from app.features.groups.revision_queries import count_changes, count_groups
-from app.features.what_if.block_results import BlockResults, each
+from app.features.what_if.block_results import BlockResults, map_in_threads
 from app.features.what_if.blocks import DatasetBlocks
 from app.features.what_if.cache import (
     ARRAYS,
@@ -27,8 +27,8 @@ from app.features.what_if.cache import (
     delete_table,
     map_arrays,
 )
-from app.features.what_if.counts import GroupCounts, tally_of
-from app.features.what_if.table import EMPTY, YieldTable, join
+from app.features.what_if.counts import GroupCounts, count_table_groups
+from app.features.what_if.table import EMPTY, YieldTable, join_tables
 from app.geometry.arrays import BoolArray
 from app.plural import plural
 from app.soccer.policy import Policy
@@ -55,15 +55,17 @@ class Block:
     judged: BlockResults
 
     @cached_property
-    def tally(self) -> GroupCounts:
+    def count_present(self) -> GroupCounts:
         """What is counted of its groups under the present policy."""
         judgement = self.judged.judgement
-        return tally_of(self.table, self.live, self.judged.policy, judgement, judgement)
+        return count_table_groups(self.table, self.live, self.judged.policy, judgement, judgement)
 
     def count_under(self, policy: Policy) -> GroupCounts:
         """What is counted of them under another one."""
-        judgement = self.judged.under(policy)
-        return tally_of(self.table, self.live, policy, self.judged.judgement, judgement, self.tally)
+        judgement = self.judged.judge_under(policy)
+        return count_table_groups(
+            self.table, self.live, policy, self.judged.judgement, judgement, self.count_present
+        )
 
     @property
     def table(self) -> YieldTable:
@@ -108,7 +110,7 @@ class Snapshot:
     @cached_property
     def table(self) -> YieldTable:
         """The groups that are solved, in one table."""
-        return join([EMPTY, *(part.block.only_live for part in self.blocks)])
+        return join_tables([EMPTY, *(part.block.only_live for part in self.blocks)])
 
     @property
     def nbytes(self) -> int:
@@ -126,7 +128,7 @@ class Snapshot:
 
 
 @dataclass
-class _StoreEntry:
+class _YieldEntry:
     """A dataset's groups, and the snapshot that was made of them last."""
 
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -143,7 +145,7 @@ class YieldStore:
     def __init__(self, store: Store):
         self._store = store
         self._lock = threading.Lock()
-        self._kept: OrderedDict[int, _StoreEntry] = OrderedDict()
+        self._kept: OrderedDict[int, _YieldEntry] = OrderedDict()
 
     def snapshot(self, dataset_id: int) -> Snapshot:
         """The table of a dataset as it is now; what has changed since the last look is read.
@@ -156,15 +158,17 @@ class YieldStore:
         if not kept.lock.acquire(timeout=PATIENCE_SECONDS):
             raise _not_ready_error(kept)
         try:
-            snapshot = self._tried(dataset_id, kept, AT_ONCE)
+            snapshot = self._try_refresh(dataset_id, kept, AT_ONCE)
         finally:
             kept.lock.release()
         if snapshot is None:
             error = _not_ready_error(kept)
-            work = threading.Thread(target=self._update_table, args=(dataset_id,), daemon=True)
+            work = threading.Thread(
+                target=self._update_table_or_log, args=(dataset_id,), daemon=True
+            )
             work.start()
             raise error
-        self._forget()
+        self._evict_snapshots()
         return snapshot
 
     def update_table(self, dataset_id: int) -> None:
@@ -175,8 +179,8 @@ class YieldStore:
         """
         kept = self._entry_of(dataset_id)
         with kept.lock:
-            self._tried(dataset_id, kept, None)
-        self._forget()
+            self._try_refresh(dataset_id, kept, None)
+        self._evict_snapshots()
 
     def refresh_large_datasets(self) -> None:
         """Bring those tables in step that would let somebody wait."""
@@ -184,9 +188,9 @@ class YieldStore:
             names = dataset_names(session)
             large = [number for number in names if count_groups(session, number) > AT_ONCE]
         for dataset_id in large:
-            self._update_table(dataset_id)
+            self._update_table_or_log(dataset_id)
 
-    def _update_table(self, dataset_id: int) -> None:
+    def _update_table_or_log(self, dataset_id: int) -> None:
         try:
             self.update_table(dataset_id)
         except ReviewError as error:
@@ -194,37 +198,39 @@ class YieldStore:
         except Exception:
             log.exception("a yield table stays behind")
 
-    def _entry_of(self, dataset_id: int) -> _StoreEntry:
+    def _entry_of(self, dataset_id: int) -> _YieldEntry:
         with self._lock:
-            kept = self._kept.setdefault(dataset_id, _StoreEntry())
+            kept = self._kept.setdefault(dataset_id, _YieldEntry())
             self._kept.move_to_end(dataset_id)
         return kept
 
     def _folder(self, dataset_id: int) -> Path:
         return self._store.settings.yields / str(dataset_id)
 
-    def _tried(self, dataset_id: int, kept: _StoreEntry, most: int | None) -> Snapshot | None:
+    def _try_refresh(self, dataset_id: int, kept: _YieldEntry, most: int | None) -> Snapshot | None:
         try:
-            return self._refreshed(dataset_id, kept, most)
+            return self._refresh_snapshot(dataset_id, kept, most)
         except NotFoundError:
             with self._lock:
                 self._kept.pop(dataset_id, None)
             delete_table(self._folder(dataset_id))
             raise
 
-    def _refreshed(self, dataset_id: int, kept: _StoreEntry, most: int | None) -> Snapshot | None:
+    def _refresh_snapshot(
+        self, dataset_id: int, kept: _YieldEntry, most: int | None
+    ) -> Snapshot | None:
         """The snapshot as of now; None where more groups than ``most`` would have to be read."""
         while True:
             with self._store.read() as session:
                 policy = read_policy(session, dataset_id)
-                blocks = self._gathered(session, dataset_id, kept, policy)
-                left = blocks.left(session)
+                blocks = self._current_blocks(session, dataset_id, kept, policy)
+                left = blocks.count_groups_left(session)
                 kept.read = blocks.groups, left
                 if most is not None and left > most:
                     return None
-                if blocks.step(session):
+                if blocks.read_next_block(session):
                     continue
-                if not blocks.is_whole(session):
+                if not blocks.has_all_groups(session):
                     # Groups went without a mark, as when the log is replayed.
                     folder, calibration = blocks.folder, blocks.calibration
                     kept.gathered = DatasetBlocks.begin(session, folder, dataset_id, calibration)
@@ -237,8 +243,8 @@ class YieldStore:
             kept.version = blocks.version
         return kept.snapshot
 
-    def _gathered(
-        self, session: Session, dataset_id: int, kept: _StoreEntry, policy: Policy
+    def _current_blocks(
+        self, session: Session, dataset_id: int, kept: _YieldEntry, policy: Policy
     ) -> DatasetBlocks:
         """The groups as they were looked at last, here or by another process."""
         calibration, folder = (
@@ -274,7 +280,7 @@ class YieldStore:
                     return Block(block, judged)
             table = block.table
             if known is not None:
-                judged = known.judged.moved(policy)
+                judged = known.judged.judged_by(policy)
             else:
                 judged = BlockResults.by(table.facts, table.jac, policy)
             if block.name:
@@ -282,9 +288,9 @@ class YieldStore:
                 cache_results(blocks.folder, block, judged)
             return Block(block, judged)
 
-        return Snapshot(policy, tuple(each(judged_block, blocks.blocks)), blocks.bare)
+        return Snapshot(policy, tuple(map_in_threads(judged_block, blocks.blocks)), blocks.bare)
 
-    def _forget(self) -> None:
+    def _evict_snapshots(self) -> None:
         with self._lock:
             sizes = {
                 key: kept.snapshot.nbytes
@@ -305,7 +311,7 @@ def read_policy(session: Session, dataset_id: int) -> Policy:
     return policy_of(row.policy)
 
 
-def _not_ready_error(kept: _StoreEntry) -> OverloadedError:
+def _not_ready_error(kept: _YieldEntry) -> OverloadedError:
     done, left = kept.read
     return OverloadedError(
         f"the yield is being counted: {done:,} groups are read, about {left:,} are left",

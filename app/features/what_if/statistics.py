@@ -20,7 +20,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.queries import dataset_names
-from app.features.groups.revision_queries import changed_ids, count_groups, newest_change
+from app.features.groups.revision_queries import changed_group_ids, count_groups, newest_change_id
 from app.features.queue.queries import columns_from, read_columns
 from app.features.queue.statistics import COLUMNS, Counted, Statistics, counted, statistics_of
 from app.features.verdicts.queries import judged_since, newest_verdict
@@ -81,10 +81,10 @@ class StatisticsStore:
             lock = self._locks.setdefault(dataset_id, threading.Lock())
         with lock:
             try:
-                found = self._refreshed(dataset_id)
+                found = self._refresh_columns(dataset_id)
             except NotFoundError:
                 self._kept.pop(dataset_id, None)
-                self._file(dataset_id).unlink(missing_ok=True)
+                self._cache_file(dataset_id).unlink(missing_ok=True)
                 raise
         return statistics_of(found.counted)
 
@@ -99,43 +99,45 @@ class StatisticsStore:
             except Exception:
                 log.exception("statistics stay behind")
 
-    def _file(self, dataset_id: int) -> Path:
+    def _cache_file(self, dataset_id: int) -> Path:
         return self._store.settings.yields / "statistics" / f"{dataset_id}.counted"
 
-    def _refreshed(self, dataset_id: int) -> _DatasetColumns:
+    def _refresh_columns(self, dataset_id: int) -> _DatasetColumns:
         with self._store.read() as session:
             policy = f"{read_policy(session, dataset_id).hash} {SOLVER_VERSION}"
-            kept = self._kept.get(dataset_id) or _load(session, self._file(dataset_id))
+            kept = self._kept.get(dataset_id) or _read_columns(
+                session, self._cache_file(dataset_id)
+            )
             if kept is not None and kept.policy == policy:
-                kept = _updated(session, dataset_id, kept)
+                kept = _update_columns(session, dataset_id, kept)
             if (
                 kept is None
                 or kept.policy != policy
                 or len(kept.group_id) != count_groups(session, dataset_id)
             ):
-                kept = replace(_gathered(session, dataset_id, policy), noted=FLUSH)
+                kept = replace(_read_all_columns(session, dataset_id, policy), noted=FLUSH)
         if kept.noted >= FLUSH and len(kept.group_id) >= WORTH_KEEPING:
-            _keep(self._file(dataset_id), kept)
+            _write_columns(self._cache_file(dataset_id), kept)
             kept = replace(kept, noted=0)
         self._kept[dataset_id] = kept
         return kept
 
 
-def _gathered(session: Session, dataset_id: int, policy: str) -> _DatasetColumns:
+def _read_all_columns(session: Session, dataset_id: int, policy: str) -> _DatasetColumns:
     """Every group."""
     ids, parts = [], []
-    for rows in _batches(session, dataset_id):
+    for rows in _column_batches(session, dataset_id):
         ids.append(np.array([row[0] for row in rows], np.int64))
         parts.append(counted([row[1:] for row in rows]))
     return _DatasetColumns(
         policy,
         **_current_marks(session),
         group_id=np.concatenate(ids or [np.zeros(0, np.int64)]),
-        counted=_join(parts) if parts else counted([]),
+        counted=_join_counted(parts) if parts else counted([]),
     )
 
 
-def _batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
+def _column_batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
     after = 0
     while rows := columns_from(session, dataset_id, ("group_id", *COLUMNS), after, BATCH):
         yield rows
@@ -145,15 +147,15 @@ def _batches(session: Session, dataset_id: int) -> Iterator[Sequence[Any]]:
 def _current_marks(session: Session) -> dict[str, Any]:
     number = newest_entry(session)
     return {
-        "change": newest_change(session),
+        "change": newest_change_id(session),
         "verdict": newest_verdict(session),
         "entry": (number, entry_hash(session, number) or ""),
     }
 
 
-def _updated(session: Session, dataset_id: int, kept: _DatasetColumns) -> _DatasetColumns:
+def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) -> _DatasetColumns:
     """What has changed, read again; groups that are gone show in the number of those left."""
-    changed = set(changed_ids(session, dataset_id, kept.change))
+    changed = set(changed_group_ids(session, dataset_id, kept.change))
     ids = sorted(changed | set(judged_since(session, dataset_id, kept.verdict)))
     moment = _current_marks(session)
     if not ids:
@@ -166,38 +168,40 @@ def _updated(session: Session, dataset_id: int, kept: _DatasetColumns) -> _Datas
     new = np.array([row[0] for row in rows], np.int64)
     stays = ~np.isin(kept.group_id, np.array(ids, np.int64))
     group_id = np.concatenate([kept.group_id[stays], new])
-    joined = _join([_only(kept.counted, stays), counted([row[1:] for row in rows])])
+    joined = _join_counted(
+        [_select_groups(kept.counted, stays), counted([row[1:] for row in rows])]
+    )
     order = np.argsort(group_id, kind="stable")
     return _DatasetColumns(
         kept.policy,
         **moment,
         group_id=group_id[order],
-        counted=_only(joined, order),
+        counted=_select_groups(joined, order),
         noted=kept.noted + len(ids),
     )
 
 
-def _only(found: Counted, chosen: Any) -> Counted:
+def _select_groups(found: Counted, chosen: Any) -> Counted:
     return replace(found, **{name: getattr(found, name)[..., chosen] for name in _ARRAYS})
 
 
-def _join(parts: Sequence[Counted]) -> Counted:
+def _join_counted(parts: Sequence[Counted]) -> Counted:
     splits = sorted({name for part in parts for name in part.splits})
     matches = sorted({name for part in parts for name in part.matches})
     joined = {
         name: np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in _ARRAYS
     }
-    joined["split"] = np.concatenate([_coded(part.splits, part.split, splits) for part in parts])
-    joined["match"] = np.concatenate([_coded(part.matches, part.match, matches) for part in parts])
+    joined["split"] = np.concatenate([_recode(part.splits, part.split, splits) for part in parts])
+    joined["match"] = np.concatenate([_recode(part.matches, part.match, matches) for part in parts])
     return Counted(tuple(splits), tuple(matches), **joined)
 
 
-def _coded(before: Sequence[str], codes: Any, names: Sequence[str]) -> Any:
+def _recode(before: Sequence[str], codes: Any, names: Sequence[str]) -> Any:
     places = {name: place for place, name in enumerate(names)}
     return np.array([places[name] for name in before], np.int32)[codes] if len(codes) else codes
 
 
-def _keep(file: Path, kept: _DatasetColumns) -> None:
+def _write_columns(file: Path, kept: _DatasetColumns) -> None:
     about = {
         "format": FORMAT,
         "policy": kept.policy,
@@ -214,13 +218,13 @@ def _keep(file: Path, kept: _DatasetColumns) -> None:
         log.warning("statistics cannot be kept", error=str(error))
 
 
-def _load(session: Session, file: Path) -> _DatasetColumns | None:
+def _read_columns(session: Session, file: Path) -> _DatasetColumns | None:
     """What the cache holds; None where it holds nothing that this database could have said."""
     try:
         found = map_arrays(file, whole=True)
         about, arrays = found.about, dict(found.arrays)
         number, digest = about["entry"]
-        if about["format"] != FORMAT or about["change"] > newest_change(session):
+        if about["format"] != FORMAT or about["change"] > newest_change_id(session):
             return None
         if number and entry_hash(session, number) != digest:
             return None

@@ -54,13 +54,13 @@ def qualifying_steps(facts: Facts, jac: FloatArray) -> npt.NDArray[np.uint8]:
 
 def is_unmeasured(facts: Facts) -> BoolArray:
     """Whether gate ``jac`` passes because the cameras are given and have no lines, shape (G,)."""
-    measured = _count(facts, facts.view_included & facts.view_measured)
-    given = _count(facts, facts.view_included & facts.view_camera & facts.view_given)
+    measured = _count_views_by_group(facts, facts.view_included & facts.view_measured)
+    given = _count_views_by_group(facts, facts.view_included & facts.view_camera & facts.view_given)
     unmeasured: BoolArray = (measured == 0) & (given > 0)
     return unmeasured
 
 
-def _count(facts: Facts, chosen: BoolArray) -> IntArray:
+def _count_views_by_group(facts: Facts, chosen: BoolArray) -> IntArray:
     return np.bincount(facts.view_group[chosen], minlength=facts.groups)
 
 
@@ -117,7 +117,7 @@ class YieldTable:
         """Groups whose cameras are given and have no lines to measure JaC, shape (G,)."""
         return is_unmeasured(self.facts)
 
-    def only(self, kept: BoolArray) -> YieldTable:
+    def select_groups(self, kept: BoolArray) -> YieldTable:
         """The table of some of the groups, in the same order."""
         facts = self.facts.only(kept) if self.facts.groups else self.facts
         heads = {name: getattr(self, name)[kept] for name in HEADS}
@@ -142,8 +142,8 @@ class YieldTable:
 
 def table_of(rows: Sequence[Any], facts: Facts) -> YieldTable:
     """The table of rows as ``groups_from`` returns them, with their facts or none."""
-    splits, split = _coded([row.split for row in rows])
-    matches, match = _coded([row.match for row in rows])
+    splits, split = _encode_names([row.split for row in rows])
+    matches, match = _encode_names([row.match for row in rows])
     return YieldTable(
         group_id=np.array([row.group_id for row in rows], np.int64),
         inputs=np.array([row.inputs_hash for row in rows], "S"),
@@ -156,10 +156,10 @@ def table_of(rows: Sequence[Any], facts: Facts) -> YieldTable:
     )
 
 
-def join(tables: Sequence[YieldTable]) -> YieldTable:
+def join_tables(tables: Sequence[YieldTable]) -> YieldTable:
     """The groups of several tables, one after the other."""
-    splits, split = _joined([(table.splits, table.split) for table in tables])
-    matches, match = _joined([(table.matches, table.match) for table in tables])
+    splits, split = _join_encoded_names([(table.splits, table.split) for table in tables])
+    matches, match = _join_encoded_names([(table.matches, table.match) for table in tables])
     return YieldTable(
         group_id=np.concatenate([table.group_id for table in tables]),
         inputs=np.concatenate([table.inputs for table in tables]),
@@ -172,13 +172,13 @@ def join(tables: Sequence[YieldTable]) -> YieldTable:
     )
 
 
-def _coded(names: list[str]) -> tuple[tuple[str, ...], IntArray]:
+def _encode_names(names: list[str]) -> tuple[tuple[str, ...], IntArray]:
     different = sorted(set(names))
     places = {name: place for place, name in enumerate(different)}
     return tuple(different), np.array([places[name] for name in names], np.int64)
 
 
-def _joined(
+def _join_encoded_names(
     parts: Sequence[tuple[tuple[str, ...], IntArray]],
 ) -> tuple[tuple[str, ...], IntArray]:
     different = sorted({name for names, _ in parts for name in names})

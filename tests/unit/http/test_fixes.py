@@ -11,7 +11,7 @@ import pytest
 
 from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.submit import load
-from app.features.groups.suggested_edits import _ACTIONS, offers
+from app.features.groups.suggested_edits import _ACTIONS, offers_of_fix
 from app.features.imports.ingest import ingest
 from app.soccer.finding import FINDING_KINDS, Fix
 from app.soccer.frames import ImagePoint
@@ -75,7 +75,7 @@ class TestRequests:
         (row,) = api.get("/api/v1/groups", params={"dataset": "fixed"}).json()["items"]
         document = api.get(f"/api/v1/groups/{row['id']}").json()
         state = load(store, row["id"])
-        (offer,) = offers(state.group, fix_of(action, state.group), ImagePoint(9.0, 8.0))
+        (offer,) = offers_of_fix(state.group, fix_of(action, state.group), ImagePoint(9.0, 8.0))
         edit = edit_to_json(offer.edit)
         assert edit["edit"] == ACTIONS[action][1]
         ids = {one["key"]: one["id"] for one in document["views"]}

@@ -22,8 +22,8 @@ from starlette.testclient import TestClient
 
 from app.db.store import Store
 from app.errors import DamagedError, StorageError
-from app.features.groups.large_edit_routes import LargeEdits
-from app.features.groups.preview_routes import Previews
+from app.features.groups.large_edit_routes import LargeGroupSolver
+from app.features.groups.preview_routes import PreviewSolver
 from app.features.imports.ingest import ingest
 from app.http import metrics
 from app.http.request_limits import EDITS, REQUEST_CLASSES
@@ -158,17 +158,17 @@ def break_down(*_: object) -> None:
 
 
 @pytest.fixture
-def previews(app: FastAPI) -> Iterator[Previews]:
+def previews(app: FastAPI) -> Iterator[PreviewSolver]:
     """What a server of a team has."""
     services = app.state.services
     settings = services.settings.model_copy(update={"team": True})
-    large = LargeEdits(settings)
+    large = LargeGroupSolver(settings)
     given = settings, services.store, services.paint, large
-    with closing(large), closing(Previews(*given)) as made:
+    with closing(large), closing(PreviewSolver(*given)) as made:
         yield made
 
 
-POOLS: dict[str, Callable[[Services, Previews], Any]] = {
+POOLS: dict[str, Callable[[Services, PreviewSolver], Any]] = {
     "pictures": lambda services, _: services.frames._pool,
     "readers": lambda services, _: services.frames._readers,
     "fetchers": lambda services, _: services.frames._fetchers,
@@ -187,7 +187,7 @@ def test_every_kind_of_children_begins_with_nobody(read, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", POOLS)
 def test_a_worker_that_ends_in_the_midst_of_its_task_counts_for_its_pool(
-    app: FastAPI, read, previews: Previews, kind: str
+    app: FastAPI, read, previews: PreviewSolver, kind: str
 ) -> None:
     def ended() -> dict[str, float]:
         name = "touchline_worker_ended_total"

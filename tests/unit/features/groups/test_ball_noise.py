@@ -9,10 +9,14 @@ import pytest
 from app.db.log import read_log
 from app.db.store import Store
 from app.features.groups import group_edits
-from app.features.groups.ball_noise import give_factors, read_placed, with_noise
+from app.features.groups.ball_noise import (
+    add_noise_of_actor,
+    apply_noise_factors,
+    read_last_ball_actors,
+)
 from app.features.groups.edit import CompositeEdit, SetBall, SetBalls
 from app.features.groups.history import history
-from app.features.groups.submit import load, preview, solved, submit, submit_all
+from app.features.groups.submit import load, preview, solve_and_keep, submit, submit_all
 from app.features.groups.undo import undo
 from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import ingest
@@ -41,7 +45,7 @@ FACTORS = (
 
 def give(store: Store, *factors: Factor) -> int:
     with store.write() as session:
-        return give_factors(session, 1, factors, "lea")
+        return apply_noise_factors(session, 1, factors, "lea")
 
 
 def place(store: Store, group: int, actor: str, ball: BallAnnotation = BALL) -> str:
@@ -60,7 +64,7 @@ def noise(store: Store, group: int) -> dict[str, float]:
 def static(store: Store, fill, make_static) -> int:
     """A solved group of static cameras, its balls as the dataset brought them."""
     (group,) = fill(make_static(10))
-    solved(store, group)
+    solve_and_keep(store, group)
     return group
 
 
@@ -73,7 +77,7 @@ class TestGiveFactors:
         assert give(store, *FACTORS) == 1
         assert noise(store, static) == dict.fromkeys(keys, 2.0)
         assert stale_groups(store, 1) and load(store, static).etag != before.etag
-        after = solved(store, static).solution
+        after = solve_and_keep(store, static).solution
         assert after is not None and after.ball is not None and before.solution is not None
         assert after.ball.point == before.solution.ball.point
         assert after.ball.sigma_m > before.solution.ball.sigma_m
@@ -111,7 +115,7 @@ class TestGiveFactors:
         assert noise(store, static)[key] == factor_of(FACTORS, camera.station.key, "ann")
         place(store, static, "ann", replace(BALL, predicted_by="yolo"))
         with store.read() as session:
-            assert read_placed(session, [static]) == {static: {}}
+            assert read_last_ball_actors(session, [static]) == {static: {}}
         give(store, Factor(None, None, 3.0))
         assert key not in noise(store, static)
         assert set(noise(store, static).values()) == {3.0}
@@ -152,22 +156,22 @@ class TestWithNoise:
     ) -> None:
         group = make_static(10)
         one, two = SetBall("cam2", BALL), SetBalls("cam1", (BALL,))
-        assert with_noise(FACTORS, group, one, "ann") == replace(one, noise=4.0)
-        assert with_noise(FACTORS, group, CompositeEdit((one, two)), "ann") == CompositeEdit(
-            (replace(one, noise=4.0), replace(two, noise=1.5))
-        )
+        assert add_noise_of_actor(FACTORS, group, one, "ann") == replace(one, noise=4.0)
+        assert add_noise_of_actor(
+            FACTORS, group, CompositeEdit((one, two)), "ann"
+        ) == CompositeEdit((replace(one, noise=4.0), replace(two, noise=1.5)))
         moving = group.view("cam2")
         assert moving is not None
         alone = group.with_view(replace(moving, station=replace(moving.station, shared=False)))
-        assert with_noise(FACTORS, alone, one, "ann") == replace(one, noise=1.5)
+        assert add_noise_of_actor(FACTORS, alone, one, "ann") == replace(one, noise=1.5)
 
     def test_an_edit_that_places_none_and_a_dataset_without_noise_stay_as_they_are(
         self, make_static
     ) -> None:
         group, none = make_static(10), SetBall("cam2", None)
-        assert with_noise(FACTORS, group, none, "ann") is none
+        assert add_noise_of_actor(FACTORS, group, none, "ann") is none
         placed = SetBall("cam2", BALL, 2.0)
-        assert with_noise((), group, placed, "ann") is placed
+        assert add_noise_of_actor((), group, placed, "ann") is placed
 
     def test_who_places_a_ball_later_brings_theirs_and_undo_takes_it_along(
         self, store: Store, static: int
@@ -189,7 +193,7 @@ class TestWithNoise:
         key = place(store, static, "ann", replace(BALL, predicted_by="yolo"))
         assert key not in noise(store, static)
         with store.read() as session:
-            assert read_placed(session, [static]) == {static: {}}
+            assert read_last_ball_actors(session, [static]) == {static: {}}
 
     def test_a_preview_keeps_what_the_view_has(self, store: Store, static: int) -> None:
         give(store, *FACTORS)
@@ -214,4 +218,4 @@ class TestReadPlaced:
         edits = [SetBall(key, BALL) for key in keys]
         submit_all(store, static, edits, if_match=state.etag, actor="ann")
         with store.read() as session:
-            assert read_placed(session, [static]) == {static: dict.fromkeys(keys, "ann")}
+            assert read_last_ball_actors(session, [static]) == {static: dict.fromkeys(keys, "ann")}

@@ -10,8 +10,8 @@ from app.features.groups.edit_codec import (
     MARKING_POINTS,
     REQUEST_POINTS,
     VIEW_POINTS,
-    require_few_points,
-    require_few_points_in_all,
+    require_point_limits,
+    require_point_limits_of_edits,
 )
 from app.features.groups.submit import load, preview, submit
 from app.features.stations.service import load_station, submit_station
@@ -28,9 +28,9 @@ def points(count: int) -> tuple[ImagePoint, ...]:
 
 class TestRequireFewPoints:
     def test_names_view_marking_count_and_limit(self) -> None:
-        require_few_points("view 7.png", NO_LINES, {"Middle line": points(MARKING_POINTS)})
+        require_point_limits("view 7.png", NO_LINES, {"Middle line": points(MARKING_POINTS)})
         with pytest.raises(TooManyPointsError) as caught:
-            require_few_points("view 7.png", NO_LINES, {"Middle line": points(101)})
+            require_point_limits("view 7.png", NO_LINES, {"Middle line": points(101)})
         assert (
             caught.value.message == "view 7.png: Middle line has 101 points, a marking may have 100"
         )
@@ -38,25 +38,25 @@ class TestRequireFewPoints:
     def test_counts_the_markings_that_stay_and_not_those_that_go(self) -> None:
         full = make_lines({name: points(VIEW_POINTS // 5) for name in NAMES})
         with pytest.raises(TooManyPointsError, match="Side line right its lines have 501 points"):
-            require_few_points("view 7.png", full, {"Side line right": points(1)})
-        require_few_points("view 7.png", full, {"Side line right": points(1), NAMES[0]: None})
+            require_point_limits("view 7.png", full, {"Side line right": points(1)})
+        require_point_limits("view 7.png", full, {"Side line right": points(1), NAMES[0]: None})
 
     def test_lines_of_a_dataset_that_are_denser_can_be_moved_and_thinned_out(self) -> None:
         dense = make_lines({"Middle line": points(600)})
-        require_few_points("view 7.png", dense, {"Middle line": points(600)})
-        require_few_points("view 7.png", dense, {"Middle line": points(300)})
+        require_point_limits("view 7.png", dense, {"Middle line": points(600)})
+        require_point_limits("view 7.png", dense, {"Middle line": points(300)})
         with pytest.raises(TooManyPointsError):
-            require_few_points("view 7.png", dense, {"Middle line": points(601)})
+            require_point_limits("view 7.png", dense, {"Middle line": points(601)})
 
 
 class TestRequireFewPointsInAll:
     def test_all_lines_of_a_request_count_together(self, make_group) -> None:
         each = {name: points(80) for name in NAMES}
         edits = [SetLines(f"{number}.png", each) for number in range(20, 25)]
-        require_few_points_in_all(make_group(7), edits)
+        require_point_limits_of_edits(make_group(7), edits)
         more = SetLines("c.png", {"Middle line": points(1)})
         with pytest.raises(TooManyPointsError, match=f"of {REQUEST_POINTS + 1} points, a request"):
-            require_few_points_in_all(make_group(7), [*edits, more])
+            require_point_limits_of_edits(make_group(7), [*edits, more])
 
 
 class TestEveryDoor:

@@ -5,7 +5,7 @@ import pytest
 from app.features.datasets.service import dataset_id
 from app.features.groups import group_edits
 from app.features.groups.edit import SetPitch
-from app.features.groups.group_edits import give_edits
+from app.features.groups.group_edits import edit_groups
 from app.features.groups.history import history
 from app.features.groups.submit import load
 from app.features.groups.undo import undo
@@ -22,7 +22,7 @@ def ids(store, fill, make_group) -> list[int]:
 def give(store, ids, edits, **options) -> int:
     with store.write() as session:
         where = (session, dataset_id(store, "demo"), "edit", ids)
-        return give_edits(*where, lambda some: edits(some), actor="ann", **options)
+        return edit_groups(*where, lambda some: edits(some), actor="ann", **options)
 
 
 class TestGiveEdits:

@@ -7,7 +7,7 @@ import pytest
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.groups.edit import SetBall, SetLines, SetStationLines
-from app.features.groups.history import Step, history, read_step
+from app.features.groups.history import EntryChanges, history, read_entry_changes
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
 from app.features.stations.service import load_station, submit_station
@@ -18,8 +18,8 @@ HERE = (ImagePoint(1.5, 2.5), ImagePoint(3.0, 4.0))
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
 
-def steps(store: Store, group: int) -> list[Step]:
-    return [read_step(store, group, entry.id) for entry in history(store, group)]
+def steps(store: Store, group: int) -> list[EntryChanges]:
+    return [read_entry_changes(store, group, entry.id) for entry in history(store, group)]
 
 
 class TestReadStep:
@@ -76,4 +76,4 @@ class TestReadStep:
         (entry,) = history(store, other)
         for group in (one, 99):
             with pytest.raises(NotFoundError):
-                read_step(store, group, entry.id)
+                read_entry_changes(store, group, entry.id)

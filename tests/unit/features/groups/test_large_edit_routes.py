@@ -12,7 +12,7 @@ import pytest
 from fastapi import FastAPI
 
 from app.errors import OverloadedError
-from app.features.groups.large_edit_routes import NICENESS, LargeEdits
+from app.features.groups.large_edit_routes import NICENESS, LargeGroupSolver
 from app.features.groups.state import read_record
 from app.features.solutions.service import solve_encoded
 from app.worker_process import COUNTS
@@ -55,10 +55,10 @@ def solve_nothing(*_: object) -> None:
 
 
 @pytest.fixture
-def ready(app: FastAPI) -> Iterator[LargeEdits]:
+def ready(app: FastAPI) -> Iterator[LargeGroupSolver]:
     """What a server of a team has, once its process answers."""
     services = app.state.services
-    with closing(LargeEdits(services.settings.model_copy(update={"team": True}))) as made:
+    with closing(LargeGroupSolver(services.settings.model_copy(update={"team": True}))) as made:
         app.state.services = replace(services, large=made)
         end = time.monotonic() + SECONDS
         while not made.workers[0].begin():

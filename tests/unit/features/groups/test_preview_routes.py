@@ -13,8 +13,8 @@ from fastapi import FastAPI
 
 from app.config import Settings
 from app.errors import DamagedError
-from app.features.groups.large_edit_routes import LargeEdits
-from app.features.groups.preview_routes import Previews
+from app.features.groups.large_edit_routes import LargeGroupSolver
+from app.features.groups.preview_routes import PreviewSolver
 from app.http.request_limits import LARGE_BYTES
 from tests.waiting import SECONDS
 
@@ -54,9 +54,9 @@ def see_damage(*_: object) -> None:
 
 
 @pytest.fixture
-def large(app: FastAPI) -> Iterator[LargeEdits]:
+def large(app: FastAPI) -> Iterator[LargeGroupSolver]:
     """What solves large ones on a server of a team."""
-    with closing(LargeEdits(settings_of_team(app))) as made:
+    with closing(LargeGroupSolver(settings_of_team(app))) as made:
         yield made
 
 
@@ -65,22 +65,24 @@ def never_ready(_: Settings) -> None:
 
 
 @pytest.fixture
-def apart(app: FastAPI, large: LargeEdits) -> Iterator[Previews]:
+def apart(app: FastAPI, large: LargeGroupSolver) -> Iterator[PreviewSolver]:
     """What a server of a team has."""
     with server_of_team(app, large) as made:
         yield made
 
 
 @contextmanager
-def server_of_team(app: FastAPI, large: LargeEdits) -> Iterator[Previews]:
+def server_of_team(app: FastAPI, large: LargeGroupSolver) -> Iterator[PreviewSolver]:
     services = app.state.services
-    with closing(Previews(settings_of_team(app), services.store, services.paint, large)) as made:
+    with closing(
+        PreviewSolver(settings_of_team(app), services.store, services.paint, large)
+    ) as made:
         app.state.services = replace(services, previews=made)
         yield made
 
 
 @pytest.fixture
-def ready(apart: Previews, large: LargeEdits, api) -> Previews:
+def ready(apart: PreviewSolver, large: LargeGroupSolver, api) -> PreviewSolver:
     """It, once all its processes answer."""
     assert preview(api).status_code == 200
     end = time.monotonic() + SECONDS
@@ -107,7 +109,9 @@ class TestApart:
     def test_who_begins_is_answered_before_the_process_is_there(
         self, app, large, api, monkeypatch
     ) -> None:
-        monkeypatch.setattr("app.features.groups.preview_routes.make_ready", never_ready)
+        monkeypatch.setattr(
+            "app.features.groups.preview_routes.prepare_preview_process", never_ready
+        )
         with server_of_team(app, large) as apart:
             answer = preview(api)
             assert (answer.status_code, apart.workers[0].is_ready) == (200, False)
@@ -157,7 +161,9 @@ class TestApart:
         with monkeypatch.context() as without:
             without.setattr(large.workers[0], "is_ready", False)
             assert alike(apart) == alike(large_preview(api))
-        monkeypatch.setattr("app.features.groups.preview_routes.solve_apart", break_down)
+        monkeypatch.setattr(
+            "app.features.groups.preview_routes.solve_preview_in_process", break_down
+        )
         answer = large_preview(api)
         assert (apart.status_code, answer.status_code) == (200, 503)
         assert answer.json()["detail"].startswith("solving this made its process crash")
@@ -165,7 +171,9 @@ class TestApart:
     def test_damage_that_the_process_sees_stops_changes_here(
         self, app, ready, api, monkeypatch
     ) -> None:
-        monkeypatch.setattr("app.features.groups.preview_routes.solve_apart", see_damage)
+        monkeypatch.setattr(
+            "app.features.groups.preview_routes.solve_preview_in_process", see_damage
+        )
         assert preview(api).status_code == 503
         with pytest.raises(DamagedError, match="nothing can be changed now: a row is torn"):
             app.state.services.store.require_undamaged()
@@ -174,7 +182,9 @@ class TestApart:
         self, ready, api, monkeypatch
     ) -> None:
         with monkeypatch.context() as broken:
-            broken.setattr("app.features.groups.preview_routes.solve_apart", break_down)
+            broken.setattr(
+                "app.features.groups.preview_routes.solve_preview_in_process", break_down
+            )
             answer = preview(api)
         assert (answer.status_code, "Retry-After" in answer.headers) == (503, True)
         assert answer.json()["detail"].startswith("this preview made its process crash")

@@ -7,13 +7,13 @@ from app.db.store import Store
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
 from app.features.groups.projection_queries import (
     all_groups,
-    all_noticed,
+    all_import_findings,
     all_stations,
     all_unassigned,
     all_verdicts,
-    rewrite,
+    replace_all_rows,
 )
-from app.features.groups.queries import put_unassigned
+from app.features.groups.queries import upsert_unassigned
 from app.features.paint.proposal_queries import Proposal, read_proposals, save_proposals
 from app.features.predictions.tables import PredictionModel, PredictionSetModel
 from app.features.verdicts.queries import StoredVerdict, insert_verdicts
@@ -29,7 +29,7 @@ class TestAll:
     def test_everything_that_the_log_can_make_anew_is_read(self, filled: Store, full_group) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
-            put_unassigned(session, 1, {("cam1", "99"): b"x"})
+            upsert_unassigned(session, 1, {("cam1", "99"): b"x"})
             said = {"group_id": 1, "kind": "edited", "sentence": "kept"}
             session.execute(insert(ImportFindingModel), [said])
         with filled.read() as session:
@@ -39,7 +39,7 @@ class TestAll:
             (verdict,) = all_verdicts(session)
             assert {**verdict, "id": 7} == vars(VERDICT)
             assert [(row.camera, row.frame) for row in all_unassigned(session)] == [("cam1", "99")]
-            assert [row.sentence for row in all_noticed(session)] == ["kept"]
+            assert [row.sentence for row in all_import_findings(session)] == ["kept"]
 
 
 def whole(session):
@@ -54,10 +54,10 @@ class TestRewrite:
     def test_rows_are_replaced_while_verdicts_refer_to_them(self, filled: Store) -> None:
         with filled.write() as session:
             insert_verdicts(session, 1, [VERDICT], actor="ann", at="t")
-            put_unassigned(session, 1, {("cam1", "99"): b"x"})
+            upsert_unassigned(session, 1, {("cam1", "99"): b"x"})
             stations, groups, views = whole(session)
             label = [{**row, "label": "anew"} for row in groups]
-            rewrite(
+            replace_all_rows(
                 session, stations=stations, groups=label, views=views, noticed=[], unassigned=[]
             )
         with filled.read() as session:
@@ -81,7 +81,7 @@ class TestRewrite:
             box = {"set_id": 1, "x": 1.0, "y": 2.0, "width": 3.0, "height": 4.0, "score": 0.5}
             session.execute(insert(PredictionModel), [{**box, "view_id": item} for item in ids])
             before = session.execute(select(*PredictionModel.__table__.columns)).all()
-            rewrite(
+            replace_all_rows(
                 session,
                 stations=stations,
                 groups=groups,

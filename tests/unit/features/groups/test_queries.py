@@ -2,10 +2,10 @@ from __future__ import annotations
 
 from app.features.groups import queries as spare
 from app.features.groups.queries import (
-    known_unassigned,
-    put_unassigned,
     sorted_unassigned_rows,
+    unassigned_extras,
     unassigned_rows,
+    upsert_unassigned,
 )
 
 BODIES = {("cam2", "9"): b"a", ("cam1", "10"): b"b", ("cam1", "9"): b"c"}
@@ -14,9 +14,9 @@ BODIES = {("cam2", "9"): b"a", ("cam1", "10"): b"b", ("cam1", "9"): b"c"}
 class TestPutSpare:
     def test_what_is_known_is_replaced(self, filled) -> None:
         with filled.write() as session:
-            put_unassigned(session, 1, BODIES)
-            put_unassigned(session, 1, {("cam2", "9"): b"new"})
-            assert known_unassigned(session, 1, {"9"}) == {
+            upsert_unassigned(session, 1, BODIES)
+            upsert_unassigned(session, 1, {("cam2", "9"): b"new"})
+            assert unassigned_extras(session, 1, {"9"}) == {
                 ("cam2", "9"): b"new",
                 ("cam1", "9"): b"c",
             }
@@ -26,7 +26,7 @@ class TestSpareRows:
     def test_all_come_whatever_the_size_of_a_batch(self, filled, monkeypatch) -> None:
         monkeypatch.setattr(spare, "BATCH", 2)
         with filled.write() as session:
-            put_unassigned(session, 1, BODIES)
+            upsert_unassigned(session, 1, BODIES)
             found = [(row.camera, row.frame) for row in unassigned_rows(session, 1)]
             assert found == list(BODIES)
             assert list(unassigned_rows(session, 2)) == []
@@ -35,7 +35,7 @@ class TestSpareRows:
 class TestSortedSpareRows:
     def test_they_come_by_camera_and_frame(self, filled) -> None:
         with filled.write() as session:
-            put_unassigned(session, 1, BODIES)
+            upsert_unassigned(session, 1, BODIES)
             found = [
                 (row.camera, row.frame, row.extras) for row in sorted_unassigned_rows(session, 1)
             ]

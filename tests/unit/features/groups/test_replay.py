@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.groups.ball_noise import give_factors
+from app.features.groups.ball_noise import apply_noise_factors
 from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
 from app.features.groups.replay import rebuild, replay
 from app.features.groups.state_snapshot import read_state_snapshot
@@ -51,7 +51,9 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
         lines = {"Middle line": None}
     undo_station(store, station.id, if_match=station.etag, actor="ann")
     with store.write() as session:
-        give_factors(session, 1, (Factor("cam2", None, 2.0), Factor("cam2", "ann", 3.0)), "ann")
+        apply_noise_factors(
+            session, 1, (Factor("cam2", None, 2.0), Factor("cam2", "ann", 3.0)), "ann"
+        )
     state = load(store, ids[2])
     submit(
         store, ids[2], SetBall(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"

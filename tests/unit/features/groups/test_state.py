@@ -5,12 +5,12 @@ from __future__ import annotations
 from app.db.store import Store
 from app.features.groups.edit import IncludeView, SetStationLines
 from app.features.groups.state import (
+    GroupHead,
     GroupState,
-    Head,
     content_tag_of,
     group_etag,
     read_etags,
-    read_head,
+    read_group_head,
 )
 from app.features.groups.submit import load, submit
 from app.features.groups.undo import undo
@@ -95,5 +95,5 @@ class TestReadHead:
     ) -> None:
         with store.read() as session:
             said = state.etag.strip('"').partition("-")[0]
-            assert read_head(session, state.id) == Head(said, state.policy.hash)
-            assert read_head(session, 99) is None
+            assert read_group_head(session, state.id) == GroupHead(said, state.policy.hash)
+            assert read_group_head(session, 99) is None

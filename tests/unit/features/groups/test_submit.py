@@ -20,7 +20,7 @@ from app.features.groups import state as state_module
 from app.features.groups.edit import IncludeView, SetBall, SetBalls, SetLines, SetPicture
 from app.features.groups.history import history
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, preview, solved, submit
+from app.features.groups.submit import load, preview, solve_and_keep, submit
 from app.features.groups.undo import undo
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
@@ -149,7 +149,7 @@ class TestSubmit:
 
     def test_a_solution_that_arrives_is_no_conflict(self, store, fill, make_group) -> None:
         unsolved = load(store, fill(make_group(), solved=False)[0])
-        with_solution = solved(store, unsolved.id)
+        with_solution = solve_and_keep(store, unsolved.id)
         assert with_solution.etag != unsolved.etag
         after = change(store, unsolved, SetBall("7.png", BALL))
         assert after.group.view("7.png").balls == (BALL,)

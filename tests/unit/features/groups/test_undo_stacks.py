@@ -7,7 +7,7 @@ from functools import reduce
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.features.groups.undo_stacks import UndoStacks, _stacks_of, _stacks_of_newest
+from app.features.groups.undo_stacks import UndoStacks, _stacks_after, _stacks_of_newest
 
 
 def possible(kinds: list[str]) -> list[tuple[str, int]]:
@@ -26,10 +26,10 @@ class TestStacksOf:
     @given(st.lists(st.sampled_from(["edit", "undo", "redo"])).map(possible))
     def test_is_one_step_after_the_other(self, steps: list[tuple[str, int]]) -> None:
         one_by_one = reduce(lambda stacks, step: stacks.then(*step), steps, UndoStacks())
-        assert _stacks_of(steps) == one_by_one
+        assert _stacks_after(steps) == one_by_one
 
     def test_a_fresh_edit_clears_what_was_undone(self) -> None:
-        assert _stacks_of([("edit", 1), ("edit", 2), ("undo", 3), ("edit", 4)]) == UndoStacks(
+        assert _stacks_after([("edit", 1), ("edit", 2), ("undo", 3), ("edit", 4)]) == UndoStacks(
             (1, 4)
         )
 
@@ -43,7 +43,7 @@ class TestUpperPart:
     def test_the_newest_steps_tell_the_same_as_all_or_nothing(
         self, steps: list[tuple[str, int]], count: int
     ) -> None:
-        whole, upper = _stacks_of(steps), _stacks_of_newest(steps[-count:])
+        whole, upper = _stacks_after(steps), _stacks_of_newest(steps[-count:])
         if upper is not None:
             assert upper.undone == whole.undone
             assert upper.done == whole.done[-len(upper.done) :]

@@ -15,7 +15,7 @@ from app.features.groups.replay import rebuild, replay
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, preview, submit
 from app.features.groups.undo import redo, undo
-from app.features.groups.view_paint import PaintFollower
+from app.features.groups.view_paint import PaintUpdater
 from app.features.paint.service import take_back_paint
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -48,8 +48,8 @@ class Frames:
 
 
 @pytest.fixture
-def paint(painted) -> PaintFollower:
-    return PaintFollower(Frames(painted.settings))
+def paint(painted) -> PaintUpdater:
+    return PaintUpdater(Frames(painted.settings))
 
 
 def without_a_line(store, number=1):
@@ -120,7 +120,7 @@ class TestFollow:
         ids=["too many wait", "its process ended", "it took too long"],
     )
     def test_where_no_frame_can_be_read_the_edit_is_saved_all_the_same(self, painted, problem):
-        broken = PaintFollower(Frames(painted.settings, problem))
+        broken = PaintUpdater(Frames(painted.settings, problem))
         after = change(painted, broken, without_a_line(painted))
         assert after.solution.views[0].calibration.source == "lines"
         assert kinds(painted) == ["no_paint"]
@@ -148,10 +148,10 @@ class TestFollow:
         paint_of = {key: item for key, item in state.group.paint.items() if key != view.key}
         bare = replace(state.group, paint=paint_of)
         policy = state.stored.policy.calibration
-        assert set(paint.follow(bare, policy, {}).paint) == set(state.group.paint)
+        assert set(paint.update_paint(bare, policy, {}).paint) == set(state.group.paint)
         monkeypatch.setattr(Frames, "ask_to", lambda *_: pytest.fail("a picture was asked for"))
         without = bare.with_view(replace(view, media=None))
-        assert paint.follow(without, policy, {}) is without
+        assert paint.update_paint(without, policy, {}) is without
 
     def test_after_its_reading_was_taken_back_an_edit_reads_no_paint(self, painted, paint, looked):
         with painted.write() as session:

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.features.datasets.service import list_datasets
 from app.features.imports import jobs as imports
-from app.features.imports.jobs import Outcome, import_in_worker
+from app.features.imports.jobs import ImportOutcome, import_in_worker
 from app.features.imports.sources import Source, import_source
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.progress import ReportProgress
@@ -37,7 +37,7 @@ def apart(
     dry_run: bool = False,
     progress: ReportProgress = lambda *told: None,
     stop: Callable[[], None] = wanted,
-) -> Outcome:
+) -> ImportOutcome:
     source = Source("soccernet-v3", path, name="data")
     return import_in_worker(
         store, dataset, source, actor="ann", dry_run=dry_run, progress=progress, stop=stop
@@ -91,7 +91,7 @@ class TestImportInWorker:
         here = import_source(
             store, "here", Source("soccernet-v3", tree, name="data"), store.settings
         )
-        assert outcome == Outcome(here.values(), True, None)
+        assert outcome == ImportOutcome(here.values(), True, None)
         assert done == [(1, None, "")]
         assert [(item.name, item.groups) for item in list_datasets(store)] == [
             ("apart", 1),
@@ -170,7 +170,7 @@ class TestImportInWorker:
                 raise JobCancelled
 
         monkeypatch.setattr(store, "turn", Turn())
-        monkeypatch.setattr(imports, "import_here", take_and_keep)
+        monkeypatch.setattr(imports, "import_in_this_process", take_and_keep)
         with pytest.raises(JobCancelled):
             apart(store, tree, stop=stop)
         with store.write():
@@ -179,7 +179,7 @@ class TestImportInWorker:
     def test_damage_that_the_worker_meets_ends_changes_here(
         self, there: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(imports, "import_here", meet_damage)
+        monkeypatch.setattr(imports, "import_in_this_process", meet_damage)
         with pytest.raises(DamagedError, match=r"^touchline\.db is damaged$"):
             apart(there, tree)
         with pytest.raises(DamagedError, match="nothing can be changed now"), there.write():
@@ -188,7 +188,7 @@ class TestImportInWorker:
     def test_one_that_breaks_down_is_counted(
         self, store: Store, tree: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(imports, "import_here", break_down)
+        monkeypatch.setattr(imports, "import_in_this_process", break_down)
         before = COUNTS["imports"].ended["crash"]
         with pytest.raises(TooLargeError, match="made its process crash"):
             apart(store, tree)

@@ -16,9 +16,9 @@ from app.features.imports.merge_parse import (
     FORMAT,
     FORMAT_VERSION,
     HEAD,
-    _station,
+    _station_of_record,
     parse_group,
-    read_head,
+    read_merge_header,
 )
 from app.formats.report import Report
 from app.formats.trees import open_tree
@@ -46,7 +46,7 @@ class TestReadHead:
         tree = open_tree(tmp_path, Report())
         assert tree is not None
         with pytest.raises(DatasetFormatError, match=f"is not a policy: {said}"):
-            read_head(tree)
+            read_merge_header(tree)
 
     @pytest.mark.parametrize("policy", [{"calibration": 12}, {"calibration": None}, 5, None])
     def test_a_policy_that_is_none_is_named(self, tmp_path: Path, policy: Any) -> None:
@@ -55,27 +55,29 @@ class TestReadHead:
         tree = open_tree(tmp_path, Report())
         assert tree is not None
         with pytest.raises(DatasetFormatError, match=r"touchline\.json, policy: is not a policy"):
-            read_head(tree)
+            read_merge_header(tree)
 
 
 class TestStation:
     def test_lines_that_were_proposed_are_lines_that_it_has(self) -> None:
         lines = {"Middle line": [[1, 2], [3, 4]]}
         value = {**station_to_json(Station("cam1", ImageSize(96, 54))), "lines": lines}
-        assert _station({**value, "proposed": ["Middle line"]}).proposed == ("Middle line",)
+        assert _station_of_record({**value, "proposed": ["Middle line"]}).proposed == (
+            "Middle line",
+        )
         for wrong in (["Circle left"], "Middle line", ["Middle line", "Middle line"], [7]):
             with pytest.raises(InputError, match="were proposed and are not there"):
-                _station({**value, "proposed": wrong})
+                _station_of_record({**value, "proposed": wrong})
 
     def test_lines_have_no_more_points_than_those_of_other_imports(self) -> None:
         points = [[float(place), 2.0] for place in range(MAX_POINTS // 2)]
         value = station_to_json(Station("cam1", ImageSize(96, 54)))
         lines = {"Middle line": points, "Side line top": points}
-        assert len(_station({**value, "lines": lines}).lines) == 2
+        assert len(_station_of_record({**value, "lines": lines}).lines) == 2
         with pytest.raises(
             InputError, match="1,001 points in the lines of cam1, and a view may have 1,000"
         ):
-            _station({**value, "lines": {**lines, "Side line left": points[:1]}})
+            _station_of_record({**value, "lines": {**lines, "Side line left": points[:1]}})
 
 
 class TestParseGroup:

@@ -14,7 +14,7 @@ import pytest
 from app.config import Settings
 from app.db.leftovers import delete_leftovers
 from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
-from app.features.imports.upload_parts import PartWriter, begin_in_parts
+from app.features.imports.upload_parts import PartWriter, begin_upload_in_parts
 from app.features.imports.upload_queries import (
     Upload,
     delete_upload,
@@ -36,7 +36,7 @@ def settings(tmp_path: Path) -> Settings:
 def begin(
     settings: Settings, mark: str = "monday", by: str = "ann", size: int = len(FILM)
 ) -> Upload:
-    return begin_in_parts(settings, "final.mp4", size, mark, by=by)
+    return begin_upload_in_parts(settings, "final.mp4", size, mark, by=by)
 
 
 def send(settings: Settings, upload: Upload, first: int, last: int) -> Upload:

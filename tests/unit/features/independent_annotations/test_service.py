@@ -14,7 +14,7 @@ from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationL
 from app.features.groups.history import history
 from app.features.groups.replay import rebuild
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load, solved, submit
+from app.features.groups.submit import load, solve_and_keep, submit
 from app.features.groups.undo import undo
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.gold import mark
@@ -74,7 +74,7 @@ class TestBeginTake:
         assert copy.stored.inputs_hash == state.stored.inputs_hash
         assert (
             copy.solution is not None
-            and copy.solution.ball == solved(store, state.id).solution.ball
+            and copy.solution.ball == solve_and_keep(store, state.id).solution.ball
         )
         assert copy.dataset_id > COPIES and copy.policy == state.policy
         assert copy.verdicts == [] and not copy.can_undo

@@ -286,7 +286,7 @@ def job_that_servers_died_at(store: Store, deaths: int) -> int:
         jobs.start()
         assert gate.started.wait(SECONDS)
         # What a server says that is killed: nothing any more.
-        jobs._save = lambda *_, **__: None  # type: ignore[method-assign]
+        jobs._save_columns = lambda *_, **__: None  # type: ignore[method-assign]
         jobs.close()
     return job
 
@@ -432,8 +432,8 @@ class TestUnderWay:
         try:
             made = [submit(jobs, lambda _: held.wait(SECONDS), dataset_id=one).id for _ in "ab"]
             last = submit(jobs, lambda _: None, dataset_id=other).id
-            assert [job.id for job in jobs.under_way(None, EVERYTHING)] == [*made, last]
-            assert [job.id for job in jobs.under_way(one, EVERYTHING)] == made
-            assert jobs.under_way(None, Visibility(all_but=False)) == []
+            assert [job.id for job in jobs.open_jobs(None, EVERYTHING)] == [*made, last]
+            assert [job.id for job in jobs.open_jobs(one, EVERYTHING)] == made
+            assert jobs.open_jobs(None, Visibility(all_but=False)) == []
         finally:
             held.set()

@@ -59,7 +59,7 @@ class Work:
         self.begun.release()
         assert self.go_on.acquire(timeout=SECONDS)
         if self._looks:
-            progress.require_wanted()
+            progress.require_not_cancelled()
             progress(1, 1)
         return "done"
 
@@ -112,7 +112,7 @@ class TestSharedJobs:
         work.go_on.release()
         assert (asked.wait(job.id, SECONDS).result, asked.is_leader()) == ("done", False)
         # Whoever has read it when it waited may not begin it again.
-        leads._join(job)
+        leads._enqueue_job(job)
         work.go_on.release()
         work.go_on.release()
         assert leads.wait(ask(asked).id, SECONDS).state == "done"
@@ -152,7 +152,7 @@ class TestSharedJobs:
         job = ask(first)
         assert unaware.begun.acquire(timeout=SECONDS)
         claims.free = False
-        first._attempt()
+        first._lead_or_log_failure()
         assert not first.is_leader()
         first._ended.set()
         claims.free = True
@@ -175,7 +175,7 @@ class TestSharedJobs:
         assert work.begun.acquire(timeout=SECONDS)
         (run,) = jobs._queue.runs
         claims.free = False
-        jobs._attempt()
+        jobs._lead_or_log_failure()
         work.go_on.release()
         assert run.over.wait(SECONDS)
         assert (jobs.get(job.id).state, jobs.get(job.id).tries) == ("running", 0)
@@ -210,7 +210,7 @@ def test_a_progress_whose_claim_is_lost_wants_nothing(store: Store, opened: Open
 
     lost = threading.Event()
     progress = SharedProgress(ask(opened()), lost, store)
-    progress.require_wanted()
+    progress.require_not_cancelled()
     lost.set()
     with pytest.raises(JobCancelled):
-        progress.require_wanted()
+        progress.require_not_cancelled()

@@ -136,7 +136,7 @@ class TestProposeViews:
 
         def look(task, settings):  # type: ignore[no-untyped-def]
             seen.append(has_index(task.media, settings))
-            return task.without_picture(MISSING)
+            return task.proposal_without_picture(MISSING)
 
         monkeypatch.setattr(editing, "read_proposal", look)
         told: list[str] = []

@@ -101,13 +101,13 @@ def here(monkeypatch) -> Iterator[type[Here]]:
 def looked(monkeypatch) -> list[str]:
     """Keys of views whose pictures were looked at, not only compared."""
     seen: list[str] = []
-    whole = paint_reading._read
+    whole = paint_reading._read_paint_of_image
 
     def read(task, digest, image):
         seen.append(task.view.key)
         return whole(task, digest, image)
 
-    monkeypatch.setattr(paint_reading, "_read", read)
+    monkeypatch.setattr(paint_reading, "_read_paint_of_image", read)
     return seen
 
 

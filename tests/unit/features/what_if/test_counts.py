@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from app.features.what_if.counts import Leak, leaks
+from app.features.what_if.counts import Leak, find_split_leaks
 
 
 def test_matches_in_several_splits_are_told_by_name_with_their_groups():
@@ -17,11 +17,11 @@ def test_matches_in_several_splits_are_told_by_name_with_their_groups():
             ("c", "test"): 4,
         }
     )
-    assert leaks(places) == (
+    assert find_split_leaks(places) == (
         Leak("a", (("train", 5), ("valid", 2))),
         Leak("b", (("test", 1), ("train", 3))),
     )
 
 
 def test_groups_without_a_split_make_no_leak():
-    assert leaks(Counter({("a", ""): 3, ("a", "train"): 1})) == ()
+    assert find_split_leaks(Counter({("a", ""): 3, ("a", "train"): 1})) == ()

@@ -40,8 +40,8 @@ def small(store: Store, monkeypatch) -> Iterator[None]:
 def looked(monkeypatch) -> list[int]:
     """Fills with one number a look that read every group."""
     looks: list[int] = []
-    gathered = kept._gathered
-    monkeypatch.setattr(kept, "_gathered", lambda *args: looks.append(1) or gathered(*args))
+    gathered = kept._read_all_columns
+    monkeypatch.setattr(kept, "_read_all_columns", lambda *args: looks.append(1) or gathered(*args))
     return looks
 
 
