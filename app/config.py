@@ -90,7 +90,7 @@ class StoreSettings(BaseModel):
     seconds: float = Field(default=10.0, gt=0, le=600)
 
     @model_validator(mode="after")
-    def _one_way_in(self) -> StoreSettings:
+    def _require_one_login_method(self) -> StoreSettings:
         given = (self.key is not None and self.secret is not None, self.key_file is not None)
         if sum((*given, self.anonymous)) != 1:
             raise ValueError(
@@ -245,7 +245,7 @@ class Settings(BaseSettings):
 
     @field_validator("import_folders", mode="before")
     @classmethod
-    def _folders(cls, value: object) -> object:
+    def _split_folders(cls, value: object) -> object:
         if not isinstance(value, str):
             return value
         if value.lstrip().startswith("["):
@@ -254,7 +254,7 @@ class Settings(BaseSettings):
 
     @field_validator("url")
     @classmethod
-    def _address(cls, value: str | None) -> str | None:
+    def _normalise_url(cls, value: str | None) -> str | None:
         if value is None or _URL.fullmatch(value.lower()):
             return None if value is None else value.lower().rstrip("/")
         raise ValueError(
@@ -262,7 +262,7 @@ class Settings(BaseSettings):
         )
 
     @model_validator(mode="after")
-    def _database_of_file(self) -> Settings:
+    def _read_database_url_file(self) -> Settings:
         if self.database_url_file is None:
             return self
         if self.database_url is not None:

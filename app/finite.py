@@ -19,7 +19,7 @@ MAX_ID = 2**63 - 1
 """The largest whole number that a column of ids, and an answer, holds."""
 
 
-class _Told:
+class _TimeFormat:
     """How a time of a value that is served is told; the value itself keeps the text of the database."""
 
     def __init__(self, kind: type[date]):
@@ -38,9 +38,9 @@ class _Told:
         return {**told, "serialization": written}
 
 
-Moment = Annotated[str, _Told(datetime)]
+Moment = Annotated[str, _TimeFormat(datetime)]
 """A time as ``text_of`` writes it; RFC 3339 where it is served."""
-Day = Annotated[str, _Told(date)]
+Day = Annotated[str, _TimeFormat(date)]
 """A day, ISO 8601."""
 
 
@@ -77,15 +77,15 @@ def json_text(
         # Numbers that are not finite are null to this encoder, which is ten times as fast as Python's.
         data = msgspec.json.encode(value)
     except (TypeError, UnicodeEncodeError):
-        return _slow_text(value, indent, ascii_, compact)
+        return _json_text_slowly(value, indent, ascii_, compact)
     if ascii_ and not data.isascii():
-        return _slow_text(value, indent, ascii_, compact)
+        return _json_text_slowly(value, indent, ascii_, compact)
     if not compact:
         data = msgspec.json.format(data, indent=indent or 0)
     return data.decode()
 
 
-def _slow_text(value: Any, indent: int | None, ascii_: bool, compact: bool) -> str:
+def _json_text_slowly(value: Any, indent: int | None, ascii_: bool, compact: bool) -> str:
     """``json_text`` of what the fast encoder has no place for: other keys and numbers than Python's,
     halves of a surrogate pair; and of letters that are to be escaped."""
     separators = (",", ":") if compact else None

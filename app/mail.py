@@ -83,14 +83,14 @@ class MailServer:
         problems: list[str | None] = []
         until = monotonic() + seconds
         try:
-            with self._connected() as connection:
+            with self._connect() as connection:
                 for letter in letters:
                     if monotonic() > until:
                         raise TimeoutError
                     problems.append(self._send_one(connection, letter))
         except (OSError, smtplib.SMTPException) as error:
             # After the last letter it has been taken, whatever becomes of the farewell.
-            reason = self._reason(error)
+            reason = self._failure_sentence(error)
             problems += [reason] * (len(letters) - len(problems))
         failed = sum(problem is not None for problem in problems)
         if failed:
@@ -105,15 +105,15 @@ class MailServer:
             InputError: Mail cannot be sent.
         """
         try:
-            with self._connected():
+            with self._connect():
                 pass
         except (OSError, smtplib.SMTPException) as error:
-            raise InputError(self._reason(error), hint=_HINT) from None
+            raise InputError(self._failure_sentence(error), hint=_HINT) from None
         account = f", logged in as {self.user}" if self.user else ""
         return f"{self.host}:{self.port} answers ({self.security}{account}); nothing was sent"
 
     @contextmanager
-    def _connected(self) -> Iterator[smtplib.SMTP]:
+    def _connect(self) -> Iterator[smtplib.SMTP]:
         tls = ssl.create_default_context()
         # A name of its own: to find one, the library would ask the name server for longer than that.
         where = (self.host, self.port, self.own_name)
@@ -142,12 +142,12 @@ class MailServer:
             connection.send_message(message, self.sender, [letter.to])
         except smtplib.SMTPRecipientsRefused as error:
             code, text = next(iter(error.recipients.values()))
-            return _refused(code, text)
+            return _refusal_sentence(code, text)
         except (smtplib.SMTPSenderRefused, smtplib.SMTPDataError) as error:
-            return _refused(error.smtp_code, error.smtp_error)
+            return _refusal_sentence(error.smtp_code, error.smtp_error)
         return None
 
-    def _reason(self, error: Exception) -> str:
+    def _failure_sentence(self, error: Exception) -> str:
         """Why nothing can be sent, in a sentence."""
         name = f"the mail server {self.host}:{self.port}"
         if isinstance(error, smtplib.SMTPAuthenticationError):
@@ -165,7 +165,7 @@ class MailServer:
         if isinstance(error, smtplib.SMTPServerDisconnected):
             return f"{name} ended the connection"
         if isinstance(error, smtplib.SMTPResponseException):
-            return f"{name} answers {error.smtp_code}: {_text(error.smtp_error)}"
+            return f"{name} answers {error.smtp_code}: {_response_text(error.smtp_error)}"
         return f"{name} cannot be reached ({getattr(error, 'strerror', None) or error})"
 
 
@@ -238,11 +238,11 @@ def _password(settings: Settings) -> str:
     return read_private(settings.smtp_password_file, "TOUCHLINE_SMTP_PASSWORD_FILE")
 
 
-def _refused(code: int, text: bytes | str) -> str:
-    return f"the mail server refuses the letter ({code}: {_text(text)})"
+def _refusal_sentence(code: int, text: bytes | str) -> str:
+    return f"the mail server refuses the letter ({code}: {_response_text(text)})"
 
 
-def _text(response: bytes | str) -> str:
+def _response_text(response: bytes | str) -> str:
     """What a mail server answered, short and in one line."""
     text = response.decode("utf-8", "replace") if isinstance(response, bytes) else response
     return "".join(c if c.isprintable() else " " for c in text)[:200]

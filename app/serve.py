@@ -70,7 +70,7 @@ def serve(
     require_processes(settings, settings.web_workers)
     log_to_stderr(settings.log_format)
     with server_lock(settings, shared=not dialect_of(settings).is_file):
-        _prepare(settings)
+        _prepare_home(settings)
         if not settings.team and team is None:
             with opened_store(settings) as store:
                 require_no_people(store)
@@ -78,7 +78,7 @@ def serve(
             _make_sample(settings)
         with listen(settings.host, settings.port) as (socket, address):
             if settings.web_workers > 1:
-                _say_address(settings, address)
+                _print_address(settings, address)
                 serve_with(settings.web_workers, _serve_part, settings, socket)
                 return
             application = create_app(settings, pool=server_pool(settings))
@@ -86,7 +86,7 @@ def serve(
                 application.state.services.store.require_whole()
             say(f"Touchline is at {address}")
             if settings.team:
-                _say_first_link(application.state.services.store, settings.url or address)
+                _print_first_link(application.state.services.store, settings.url or address)
             run(application, socket)
 
 
@@ -125,14 +125,14 @@ def _serve_part(settings: Settings, socket: socket) -> None:
     run(create_app(settings, pool=server_pool(settings)), socket)
 
 
-def _say_address(settings: Settings, address: str) -> None:
+def _print_address(settings: Settings, address: str) -> None:
     say(f"Touchline is at {address}")
     if settings.team:
         with opened_store(settings) as store:
-            _say_first_link(store, settings.url or address)
+            _print_first_link(store, settings.url or address)
 
 
-def _say_first_link(store: Store, base: str) -> None:
+def _print_first_link(store: Store, base: str) -> None:
     """Show whoever starts a server without an admin how to become one."""
     from app.features.people.links import FIRST_LASTS, make_first_link
 
@@ -157,7 +157,7 @@ def migrate() -> None:
     say(f"schema {migrated.revision}")
 
 
-def _prepare(settings: Settings) -> None:
+def _prepare_home(settings: Settings) -> None:
     """Make the home private and its database the present one; the log says what was changed."""
     import structlog
 

@@ -173,8 +173,8 @@ class WorkerPool:
                 )
             self._tasks.add(task)
             self._counts.add_waiting(1)
-            task.future.add_done_callback(lambda _: self._forget(task))
-            self._threads.submit(self._run, task, work, arguments)
+            task.future.add_done_callback(lambda _: self._forget_task(task))
+            self._threads.submit(self._run_task, task, work, arguments)
         return task
 
     def close(self) -> None:
@@ -190,14 +190,16 @@ class WorkerPool:
         for worker in self._workers:
             worker.close()
 
-    def _run(self, task: PoolTask, work: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    def _run_task(
+        self, task: PoolTask, work: Callable[..., Any], arguments: tuple[Any, ...]
+    ) -> None:
         worker = self._free.get()
         try:
             task.run(worker, self._counts, work, arguments)
         finally:
             self._free.put(worker)
 
-    def _forget(self, task: PoolTask) -> None:
+    def _forget_task(self, task: PoolTask) -> None:
         if task.future.cancelled():
             # It waited until now: a task that runs ends with an error.
             self._counts.add_waiting(-1)

@@ -165,7 +165,7 @@ class WorkerProcess:
             RuntimeError: The work has a fault; the text is its traceback.
         """
         try:
-            pipe = self._start(stop)
+            pipe = self._ensure_process(stop)
             pipe.send((work, arguments, on_message is not None))
             kind, value = self._receive(pipe, self.limits.silence, stop)
             while kind == "message" and on_message is not None:
@@ -207,13 +207,13 @@ class WorkerProcess:
         if pipe is not None:
             pipe.close()
 
-    def _start(self, stop: Callable[[], None] | None) -> Connection:
+    def _ensure_process(self, stop: Callable[[], None] | None) -> Connection:
         """The pipe to the process, which is started where there is none."""
         if self._process is not None and not self._process.is_alive():
             self.close()
         if self._pipe is None:
             try:
-                self._process, self._pipe = _launch(self.limits)
+                self._process, self._pipe = _start_process(self.limits)
                 self._receive(self._pipe, START_SECONDS, stop)
             except (OSError, EOFError, WorkerEnded) as error:
                 raise OverloadedError(
@@ -250,12 +250,12 @@ class WorkerProcess:
         return causes.get(code, "crash")
 
 
-def _launch(limits: WorkerLimits) -> tuple[BaseProcess, Connection]:
+def _start_process(limits: WorkerLimits) -> tuple[BaseProcess, Connection]:
     """A process that has been started, and the pipe to it."""
     context = multiprocessing.get_context("spawn")
     pipe, far = context.Pipe()
     with closing(far):
-        process = context.Process(target=_serve, args=(far, limits), daemon=True)
+        process = context.Process(target=_serve_tasks, args=(far, limits), daemon=True)
         # Ctrl+C reaches every process of a terminal; the parent alone decides what ends. The first
         # worker would have multiprocessing start its tracker, which lets it through again.
         resource_tracker.ensure_running()
@@ -270,7 +270,7 @@ def _launch(limits: WorkerLimits) -> tuple[BaseProcess, Connection]:
     return process, pipe
 
 
-def _serve(pipe: Connection, limits: WorkerLimits) -> None:
+def _serve_tasks(pipe: Connection, limits: WorkerLimits) -> None:
     """Run one task after the other in the worker process, until the parent hangs up."""
     end_with_parent()
     # A library that crashes says on stderr where it was called.
@@ -281,7 +281,7 @@ def _serve(pipe: Connection, limits: WorkerLimits) -> None:
     for name in _ONE_THREAD:
         os.environ[name] = "1"
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _limit(resource.RLIMIT_DATA, limits.memory)
+    _set_resource_limit(resource.RLIMIT_DATA, limits.memory)
     with suppress(OSError):
         # Where memory runs out all the same, the kernel takes this process first.
         Path("/proc/self/oom_score_adj").write_text("1000")
@@ -295,11 +295,13 @@ def _serve(pipe: Connection, limits: WorkerLimits) -> None:
         while True:
             work, arguments, sends = pipe.recv()
             usage = resource.getrusage(resource.RUSAGE_SELF)
-            _limit(resource.RLIMIT_CPU, usage.ru_utime + usage.ru_stime + limits.processor)
-            pipe.send(_outcome(work, (*arguments, send) if sends else arguments))
+            _set_resource_limit(
+                resource.RLIMIT_CPU, usage.ru_utime + usage.ru_stime + limits.processor
+            )
+            pipe.send(_outcome_of_work(work, (*arguments, send) if sends else arguments))
 
 
-def _limit(kind: int, amount: float) -> None:
+def _set_resource_limit(kind: int, amount: float) -> None:
     if math.isinf(amount):
         return
     hard = resource.getrlimit(kind)[1]
@@ -307,7 +309,7 @@ def _limit(kind: int, amount: float) -> None:
     resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
 
 
-def _outcome(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+def _outcome_of_work(work: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
     try:
         return "result", work(*arguments)
     except (ReviewError, JobCancelled) as error:
@@ -346,7 +348,7 @@ def spawned_pool(
         initialize: Called in each before its first task.
     """
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, _begin_spawned, (initialize,)) as pool:
+    with ProcessPoolExecutor(workers, context, _initialize_spawned, (initialize,)) as pool:
         try:
             yield pool
         except BaseException:
@@ -354,7 +356,7 @@ def spawned_pool(
             raise
 
 
-def _begin_spawned(initialize: Callable[[], object] | None) -> None:
+def _initialize_spawned(initialize: Callable[[], object] | None) -> None:
     # Ctrl+C reaches every process of a terminal, where the parent alone decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()

@@ -55,7 +55,7 @@ def open_zip(path: Path | StoredPath) -> zipfile.ZipFile:
     """
     if isinstance(path, Path) and not stat.S_ISREG(path.stat().st_mode):
         raise zipfile.BadZipFile("is not a plain file")
-    return _open_part(_whole(path))
+    return _open_zip_part(_whole_file(path))
 
 
 def open_nested(
@@ -77,13 +77,13 @@ def open_nested(
     if member.flag_bits & _ENCRYPTED:
         raise zipfile.BadZipFile("is encrypted")
     if member.compress_type == zipfile.ZIP_STORED:
-        file, at = _whole(path), member.header_offset
+        file, at = _whole_file(path), member.header_offset
         file.seek(at)
         header = file.read(_HEADER.size)
         if len(header) < _HEADER.size or not header.startswith(_HEADER_MARK):
             raise zipfile.BadZipFile("has no header where the zip file's list of members says")
         start = at + _HEADER.size + sum(_HEADER.unpack(header))
-        return _open_part(file.part(start, member.file_size))
+        return _open_zip_part(file.part(start, member.file_size))
     if not isinstance(path, Path):
         # To reach a member of it, all of it would have to be fetched.
         raise zipfile.BadZipFile("is a zip compressed inside another; put it there by itself")
@@ -96,7 +96,7 @@ def open_nested(
                     raise zipfile.BadZipFile(f"unpacks to more than {MAX_UNPACKED:,} bytes")
                 unpacked.write(chunk)
         unpacked.flush()
-        return _open_part(_part_of(os.dup(unpacked.fileno()), total))
+        return _open_zip_part(_part_of_handle(os.dup(unpacked.fileno()), total))
 
 
 def nested_name(archive: zipfile.ZipFile, name: str) -> tuple[str, str] | None:
@@ -142,14 +142,14 @@ def first_member_names(path: Path, most: int) -> list[str]:
         file.seek(end.at - end.list_bytes)
         records = file.read(min(end.list_bytes, MAX_LIST))
     names: list[str] = []
-    for _at, _flags, name in _entries(records):
+    for _at, _flags, name in _member_records(records):
         if len(names) == most:
             break
         names.append(name.decode("utf-8", errors="replace").replace("\\", "/"))
     return names
 
 
-class _End(NamedTuple):
+class _EndRecord(NamedTuple):
     """What the end of a zip says: where it lies, bytes and members of the list before it, and whether
     the members are counted beyond 65,535."""
 
@@ -159,7 +159,7 @@ class _End(NamedTuple):
     is_wide: bool
 
 
-def _end_record(file: IO[bytes]) -> _End | None:
+def _end_record(file: IO[bytes]) -> _EndRecord | None:
     most = _END_64.size + _LOCATOR_BYTES + _END.size + _MAX_COMMENT
     begin = max(file.seek(0, os.SEEK_END) - most, 0)
     file.seek(begin)
@@ -170,14 +170,14 @@ def _end_record(file: IO[bytes]) -> _End | None:
     members, size = _END.unpack_from(tail, end)
     wide = end - _LOCATOR_BYTES - _END_64.size
     if wide < 0 or not tail.startswith(_LOCATOR_MARK, end - _LOCATOR_BYTES):
-        return _End(begin + end, size, members, False)
+        return _EndRecord(begin + end, size, members, False)
     if not tail.startswith(_END_64_MARK, wide):
-        return _End(begin + end, 0, members, False)
+        return _EndRecord(begin + end, 0, members, False)
     members, size = _END_64.unpack_from(tail, wide)
-    return _End(begin + wide, size, members, True)
+    return _EndRecord(begin + wide, size, members, True)
 
 
-def _entries(records: bytes) -> Iterator[tuple[int, int, bytes]]:
+def _member_records(records: bytes) -> Iterator[tuple[int, int, bytes]]:
     """Place, flags and name of each member in a list of members, as far as it is one."""
     at = 0
     while records.startswith(_ENTRY_MARK, at) and at + _ENTRY.size <= len(records):
@@ -260,18 +260,18 @@ class FilePart(io.RawIOBase):
         super().close()
 
 
-def _whole(path: Path | StoredPath) -> FilePart:
+def _whole_file(path: Path | StoredPath) -> FilePart:
     if isinstance(path, StoredPath):
         return FilePart(path.reads().pread, 0, path.size)
     handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    return _part_of(handle, os.fstat(handle).st_size)
+    return _part_of_handle(handle, os.fstat(handle).st_size)
 
 
-def _part_of(handle: int, size: int) -> FilePart:
+def _part_of_handle(handle: int, size: int) -> FilePart:
     return FilePart(partial(os.pread, handle), 0, size, partial(os.close, handle))
 
 
-def _open_part(file: FilePart) -> zipfile.ZipFile:
+def _open_zip_part(file: FilePart) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(file)
     except UnicodeDecodeError:
@@ -287,7 +287,7 @@ def _without_false_marks(records: bytes) -> bytes:
     Their own headers keep the false mark, so that ``zipfile`` could not open them anyway.
     """
     changed = bytearray(records)
-    for at, flags, name in _entries(records):
+    for at, flags, name in _member_records(records):
         try:
             name.decode("utf-8")
         except UnicodeDecodeError:

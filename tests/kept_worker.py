@@ -47,7 +47,7 @@ class KeptWorker(WorkerProcess):
         self.shelf[self.limits].append((self._process, self._pipe))
         self._process = self._pipe = None
 
-    def _start(self, stop: Callable[[], None] | None) -> Connection:
+    def _ensure_process(self, stop: Callable[[], None] | None) -> Connection:
         if self._pipe is None and self.shelf[self.limits]:
             self._process, self._pipe = self.shelf[self.limits].pop()
-        return super()._start(stop)
+        return super()._ensure_process(stop)

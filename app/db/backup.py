@@ -123,14 +123,14 @@ def write_backup(
         DamagedError: The database is damaged; nothing is written.
         StorageError: The disk is full, or somebody writes the same backup.
     """
-    _require_place(out, replace)
+    _require_free_place(out, replace)
     try:
-        with _workshop(out) as folder:
+        with _temporary_folder(out) as folder:
             copy, partial = folder / DATABASE, folder / "backup.zip"
             _copy_database(settings, copy)
             manifest = _write_zip(settings, copy, partial, folders)
             verify_backup(partial)
-            _require_place(out, replace)
+            _require_free_place(out, replace)
             partial.replace(out)
             sync(out.parent)
     except OSError as error:
@@ -172,7 +172,10 @@ def verify_backup(path: Path) -> BackupManifest:
                 raise InputError(f"{path} does not hold the files that its manifest names")
             for name in names:
                 with backup.open(name) as member:
-                    if _digest(iter(lambda: member.read(_CHUNK), b"")) != manifest.files[name]:
+                    if (
+                        _digest_chunks(iter(lambda: member.read(_CHUNK), b""))
+                        != manifest.files[name]
+                    ):
                         raise InputError(f"{path}, {name}: not what was written")
     except (zipfile.BadZipFile, EOFError, OSError, zlib.error) as error:
         raise InputError(
@@ -215,18 +218,18 @@ def examine_database(
                 for name in _COUNTED
                 if name in tables
             }
-            return anchor_of(session) or _without_installation(session), counts
+            return anchor_of(session) or _anchor_without_installation(session), counts
     finally:
         engine.dispose()
 
 
-def _without_installation(session: Session) -> Anchor:
+def _anchor_without_installation(session: Session) -> Anchor:
     schema = session.execute(text("SELECT version_num FROM alembic_version")).scalar_one()
     last = session.execute(text("SELECT id, hash FROM log ORDER BY id DESC LIMIT 1")).first()
     return Anchor("", "", schema, *(tuple(last) if last else (0, "")))
 
 
-def _require_place(out: Path, replace: bool) -> None:
+def _require_free_place(out: Path, replace: bool) -> None:
     if out.exists() and not replace:
         raise InputError(f"{out} is there already", hint="Name a file that does not exist yet.")
     if not out.parent.is_dir():
@@ -234,7 +237,7 @@ def _require_place(out: Path, replace: bool) -> None:
 
 
 @contextmanager
-def _workshop(out: Path) -> Iterator[Path]:
+def _temporary_folder(out: Path) -> Iterator[Path]:
     """A folder beside the backup, gone at the end; what a killed run left in it goes first."""
     folder = out.with_name(f".{out.name}{PARTIAL}")
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -282,17 +285,17 @@ def _write_zip(
     anchor, rows = examine_database(settings, copy, settings.database_file)
     with closing(pysqlite3.dbapi2.connect(str(copy))) as connection:
         connection.execute("PRAGMA journal_mode=DELETE")
-        elsewhere = _frames_elsewhere(connection, [settings.home / name for name in folders])
+        elsewhere = _count_frames_elsewhere(connection, [settings.home / name for name in folders])
     files: dict[str, dict[str, int | str]] = {}
     handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(handle, "w+b") as file:
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=_QUICK) as backup:
-            files[DATABASE] = _add(backup, DATABASE, copy, zipfile.ZIP_DEFLATED)
-            for path in _files(settings.home, folders):
+            files[DATABASE] = _add_file(backup, DATABASE, copy, zipfile.ZIP_DEFLATED)
+            for path in _files_of_folders(settings.home, folders):
                 name = path.relative_to(settings.home).as_posix()
                 # Uploads expire, and exports are deleted, meanwhile.
                 with suppress(FileNotFoundError):
-                    files[name] = _add(backup, name, path, zipfile.ZIP_STORED)
+                    files[name] = _add_file(backup, name, path, zipfile.ZIP_STORED)
             manifest = BackupManifest(
                 made=now(),
                 home=str(settings.home.resolve()),
@@ -310,13 +313,13 @@ def _write_zip(
     return manifest
 
 
-def _frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
+def _count_frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
     statement = "SELECT DISTINCT media_path FROM view WHERE media_path IS NOT NULL"
     paths = [Path(path) for (path,) in connection.execute(statement)]
     return sum(not any(path.is_relative_to(folder) for folder in folders) for path in paths)
 
 
-def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
+def _files_of_folders(home: Path, folders: Sequence[str]) -> Iterator[Path]:
     """Files of folders, in order; half-written ones are nobody's yet."""
     for name in folders:
         walk = os.walk(home / name)
@@ -325,19 +328,19 @@ def _files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
                 yield path
 
 
-def _add(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[str, int | str]:
+def _add_file(backup: zipfile.ZipFile, name: str, path: Path, packed: int) -> dict[str, int | str]:
     """Put a file into a backup; FileNotFoundError, and nothing is in it, where there is none."""
-    with _reading(path):
+    with _report_read_errors(path):
         info = zipfile.ZipInfo.from_file(path, name)
         source = path.open("rb")
     info.compress_type = packed
     with source, backup.open(info, "w", force_zip64=True) as target:
-        return _digest(_chunks(source, path), target)
+        return _digest_chunks(_read_chunks(source, path), target)
 
 
-def _chunks(source: IO[bytes], path: Path) -> Iterator[bytes]:
+def _read_chunks(source: IO[bytes], path: Path) -> Iterator[bytes]:
     while True:
-        with _reading(path):
+        with _report_read_errors(path):
             chunk = source.read(_CHUNK)
         if not chunk:
             return
@@ -345,7 +348,7 @@ def _chunks(source: IO[bytes], path: Path) -> Iterator[bytes]:
 
 
 @contextmanager
-def _reading(path: Path) -> Iterator[None]:
+def _report_read_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError:
@@ -358,7 +361,9 @@ def _reading(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _digest(chunks: Iterable[bytes], target: IO[bytes] | None = None) -> dict[str, int | str]:
+def _digest_chunks(
+    chunks: Iterable[bytes], target: IO[bytes] | None = None
+) -> dict[str, int | str]:
     digest, size = hashlib.sha256(), 0
     for chunk in chunks:
         digest.update(chunk)

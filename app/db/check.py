@@ -50,7 +50,7 @@ def record_name(key: object) -> str:
     return str(key)
 
 
-def _equal(logged: Any, present: Any) -> bool:
+def _equal_but_null_characters(logged: Any, present: Any) -> bool:
     """Whether two values are the same, but for U+0000, which is read from the log as U+FFFD."""
     return bool(logged == present) or repr(logged) == repr(present).replace(r"\x00", "\ufffd")
 
@@ -69,7 +69,11 @@ def compare_with_log(
     """
     if isinstance(logged, Mapping):
         keys = sorted(logged.keys() | present)
-        names = [call(key) for key in keys if not _equal(logged.get(key), present.get(key))]
+        names = [
+            call(key)
+            for key in keys
+            if not _equal_but_null_characters(logged.get(key), present.get(key))
+        ]
     else:
         # Parts of what is in a set may be missing, and missing parts have no order.
         names = sorted(map(call, logged ^ present))

@@ -141,7 +141,9 @@ def run_in_worker(
         given = store.settings, structlog.contextvars.get_contextvars(), work, arguments
         try:
             with COUNTS[kind].working():
-                result: Result = worker.run(_work, *given, on_message=on_message, stop=stop)
+                result: Result = worker.run(
+                    _work_in_process, *given, on_message=on_message, stop=stop
+                )
         except DamagedError as error:
             store.note_damage(error)
             raise
@@ -164,7 +166,7 @@ def run_here(
         progress(*value)
         return False, None
 
-    return _run(work, store, arguments, Caller(on_message))
+    return _run_and_flush(work, store, arguments, Caller(on_message))
 
 
 def with_grace(check: Callable[[], None]) -> Callable[[], None]:
@@ -187,7 +189,7 @@ def with_grace(check: Callable[[], None]) -> Callable[[], None]:
     return stop
 
 
-def _work(
+def _work_in_process(
     settings: Settings,
     log_fields: Mapping[str, Any],
     work: Callable[..., Any],
@@ -200,10 +202,10 @@ def _work(
         structlog.contextvars.bound_contextvars(**log_fields),
         closing(Store.open(settings, caller)) as store,
     ):
-        return _run(work, store, arguments, caller)
+        return _run_and_flush(work, store, arguments, caller)
 
 
-def _run(
+def _run_and_flush(
     work: Callable[..., Result], store: Store, arguments: tuple[Any, ...], caller: Caller
 ) -> Result:
     result = work(store, *arguments, caller)

@@ -103,7 +103,7 @@ def private_files(settings: Settings) -> Iterator[Path]:
     home, database = settings.home, settings.database_file
     yield home
     yield from (home / name for name in LOCKS if (home / name).exists())
-    yield from _of_database(home, database)
+    yield from _files_of_database(home, database)
     ours = (home / name for name in FOLDERS)
     for top in (*ours, *home.glob(f"{ASIDE}*"), database.with_name(RESTORING)):
         for folder, _folders, names in os.walk(top):
@@ -111,15 +111,15 @@ def private_files(settings: Settings) -> Iterator[Path]:
             yield from (Path(folder, file) for file in names)
 
 
-def _of_database(home: Path, database: Path) -> Iterator[Path]:
+def _files_of_database(home: Path, database: Path) -> Iterator[Path]:
     """A database and what lies beside it; outside of the home only where it is surely ours."""
-    if not database.resolve().is_relative_to(home.resolve()) and not _is_ours(database):
+    if not database.resolve().is_relative_to(home.resolve()) and not _is_own_database(database):
         return
     names = (*(f"{database.name}{end}" for end in SIDES), "home.json")
     yield from (path for path in map(database.with_name, names) if path.exists())
 
 
-def _is_ours(file: Path) -> bool:
+def _is_own_database(file: Path) -> bool:
     """Whether a file is the database of the installation that is named beside it."""
     # It needs numpy, and commands that only print a help text come by here.
     from app.db.recovery.wal import read_header
@@ -187,7 +187,7 @@ def installation_key(settings: Settings, name: str) -> bytes:
     path = settings.home / name
     try:
         if not path.exists():
-            _make(path)
+            _make_key_file(path)
         key = path.read_bytes()
     except OSError as error:
         raise refused(path, error) from error
@@ -199,7 +199,7 @@ def installation_key(settings: Settings, name: str) -> bytes:
     return key
 
 
-def _make(path: Path) -> None:
+def _make_key_file(path: Path) -> None:
     """Whole or not at all; of two that make one at a time, the first counts."""
     partial = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
     try:

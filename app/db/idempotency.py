@@ -163,15 +163,15 @@ def claim(store: Store, key: str, actor: str) -> bool:
     Raises:
         StorageError: The database cannot be asked.
     """
-    return store.sharing.claim(_claim(key, actor))
+    return store.sharing.claim(_claim_name(key, actor))
 
 
 def end_claim(store: Store, key: str, actor: str) -> None:
     """Let others respond under it: what they find is stored by now."""
-    store.sharing.release(_claim(key, actor))
+    store.sharing.release(_claim_name(key, actor))
 
 
-def _claim(key: str, actor: str) -> str:
+def _claim_name(key: str, actor: str) -> str:
     return f"answer/{actor}/{key}"
 
 

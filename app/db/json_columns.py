@@ -41,7 +41,7 @@ def parse(text: str | bytes) -> Json:
     try:
         return msgspec.json.decode(text)
     except ValueError as error:
-        raise _damaged() from error
+        raise _damaged_record_error() from error
 
 
 def parse_as(text: str | bytes, kind: type[Shape]) -> Shape:
@@ -53,7 +53,7 @@ def parse_as(text: str | bytes, kind: type[Shape]) -> Shape:
     try:
         return msgspec.json.decode(text, type=kind)
     except (ValueError, msgspec.MsgspecError) as error:
-        raise _damaged() from error
+        raise _damaged_record_error() from error
 
 
 def look_through(kind: Any) -> None:
@@ -76,7 +76,7 @@ def as_written() -> Iterator[None]:
     try:
         yield
     except _MISSHAPEN as error:
-        raise _damaged() from error
+        raise _damaged_record_error() from error
 
 
 def pack(value: Json) -> bytes:
@@ -103,8 +103,8 @@ def inflate(data: bytes) -> bytes:
     try:
         return zlib.decompress(data)
     except zlib.error as error:
-        raise _damaged() from error
+        raise _damaged_record_error() from error
 
 
-def _damaged() -> DamagedError:
+def _damaged_record_error() -> DamagedError:
     return DamagedError("the database holds a record that is not what was written", hint=EXAMINE)

@@ -42,10 +42,10 @@ of such a name is somebody's."""
 def is_half_written(path: Path, home: Path) -> bool:
     """Whether a path of a home is, or lies in, what something is writing or was when it was killed."""
     parts = path.relative_to(home).parts
-    return any(_names(pattern.split("/"), parts) for pattern in _HALF_WRITTEN)
+    return any(_matches_pattern(pattern.split("/"), parts) for pattern in _HALF_WRITTEN)
 
 
-def _names(pattern: list[str], parts: tuple[str, ...]) -> bool:
+def _matches_pattern(pattern: list[str], parts: tuple[str, ...]) -> bool:
     return len(parts) >= len(pattern) and all(map(fnmatchcase, parts, pattern))
 
 

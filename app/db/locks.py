@@ -62,7 +62,10 @@ class DatabaseInUse:
 
     def __init__(self, settings: Settings):
         home = make_home(settings)
-        self._handle, self._opening = _open(home / DATABASE_LOCK), _open(home / OPENING_LOCK)
+        self._handle, self._opening = (
+            _open_lock_file(home / DATABASE_LOCK),
+            _open_lock_file(home / OPENING_LOCK),
+        )
         try:
             require_lock(self._opening, "has been opening the database", OPENING_SECONDS)
         except BusyError:
@@ -76,11 +79,11 @@ class DatabaseInUse:
         """Let others open it, too."""
         fcntl.flock(self._handle, fcntl.LOCK_SH)
         self.alone = False
-        self._opening = _closed(self._opening)
+        self._opening = _close_handle(self._opening)
 
     def release(self) -> None:
         """It is closed."""
-        self._handle, self._opening = _closed(self._handle), _closed(self._opening)
+        self._handle, self._opening = _close_handle(self._handle), _close_handle(self._opening)
 
 
 @contextmanager
@@ -109,7 +112,7 @@ def server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
     Raises:
         StorageError: Another server holds it.
     """
-    handle = _open(make_home(settings) / SERVER_LOCK)
+    handle = _open_lock_file(make_home(settings) / SERVER_LOCK)
     try:
         try:
             kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
@@ -131,7 +134,7 @@ def server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
 @contextmanager
 def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[None]:
     """Hold the practice groups while they are made; ``waiting`` is called while others make them."""
-    handle = _open(make_home(settings) / PRACTICE_LOCK)
+    handle = _open_lock_file(make_home(settings) / PRACTICE_LOCK)
     try:
         while not lock_within(handle, NOTICE_SECONDS):
             waiting()
@@ -140,13 +143,13 @@ def practice_lock(settings: Settings, waiting: Callable[[], None]) -> Iterator[N
         os.close(handle)
 
 
-def _closed(handle: int) -> int:
+def _close_handle(handle: int) -> int:
     if handle >= 0:
         os.close(handle)
     return -1
 
 
-def _open(path: Path) -> int:
+def _open_lock_file(path: Path) -> int:
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:

@@ -93,7 +93,7 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
                         hint="Stop it, then run touchline migrate.",
                     )
                 if dialect.is_file:
-                    copy = _backups(settings) / COPY.format(SCHEMA_REVISION)
+                    copy = _backup_folder(settings) / COPY.format(SCHEMA_REVISION)
                     write_backup(settings, copy, replace=True)
             if revision != SCHEMA_REVISION:
                 make_schema(engine, dialect, new=revision is None)
@@ -101,7 +101,7 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
     finally:
         engine.dispose()
     if copy is not None:
-        _forget_other_copies(copy)
+        _delete_older_copies(copy)
     return Migrated(SCHEMA_REVISION, copy)
 
 
@@ -121,13 +121,13 @@ def make_schema(engine: Engine, dialect: Dialect, *, new: bool) -> None:
         command.upgrade(config, "head")
 
 
-def _backups(settings: Settings) -> Path:
+def _backup_folder(settings: Settings) -> Path:
     folder = settings.home / "backups"
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder
 
 
-def _forget_other_copies(copy: Path) -> None:
+def _delete_older_copies(copy: Path) -> None:
     """Of an earlier migration, which this one has shown to be good."""
     for other in copy.parent.glob(COPY.format("*")):
         if other != copy:
@@ -137,10 +137,10 @@ def _forget_other_copies(copy: Path) -> None:
 def schema_revision(engine: Engine) -> str | None:
     """The revision that the database says it has; None for an empty one."""
     with engine.connect() as connection:
-        return _revision(connection)
+        return _read_revision(connection)
 
 
-def _revision(connection: Connection) -> str | None:
+def _read_revision(connection: Connection) -> str | None:
     if not inspect(connection).has_table("alembic_version"):
         return None
     revision = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()

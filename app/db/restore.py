@@ -69,13 +69,13 @@ def restore(settings: Settings, source: Path) -> Restored:
         database_alone(settings, "it cannot be replaced meanwhile"),
     ):
         try:
-            with _workshop(settings) as folder:
-                return _restore(settings, source, folder)
+            with _temporary_folder(settings) as folder:
+                return _restore_in_folder(settings, source, folder)
         except OSError as error:
             raise refused(Path(error.filename or settings.home), error) from error
 
 
-def _restore(settings: Settings, source: Path, folder: Path) -> Restored:
+def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> Restored:
     if zipfile.is_zipfile(source):
         expected, foreign_log = _unpack(source, folder), False
     else:
@@ -89,13 +89,13 @@ def _restore(settings: Settings, source: Path, folder: Path) -> Restored:
     # The files of the backup, and those of its database's log, which SQLite may have left.
     os.sync()
     aside = _move_aside(settings, [path.name for path in folder.iterdir() if path.is_dir()])
-    _move_in(settings, folder, anchor)
+    _move_into_home(settings, folder, anchor)
     make_private(settings)
     return Restored(settings.home, anchor.schema, anchor.entries, rows, files, aside, foreign_log)
 
 
 @contextmanager
-def _workshop(settings: Settings) -> Iterator[Path]:
+def _temporary_folder(settings: Settings) -> Iterator[Path]:
     folder = settings.database_file.with_name(RESTORING)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(mode=FOLDER_MODE)
@@ -110,7 +110,7 @@ def _unpack(source: Path, folder: Path) -> tuple[int, str]:
     manifest = verify_backup(source)
     with zipfile.ZipFile(source) as backup:
         for name in manifest.files:
-            target = folder / _safe(name, source)
+            target = folder / _safe_member_path(name, source)
             target.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
             handle = os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             with backup.open(name) as member, os.fdopen(handle, "wb") as file:
@@ -118,7 +118,7 @@ def _unpack(source: Path, folder: Path) -> tuple[int, str]:
     return manifest.entries, manifest.hash
 
 
-def _safe(name: str, source: Path) -> PurePosixPath:
+def _safe_member_path(name: str, source: Path) -> PurePosixPath:
     """The path of a member below the home: the database, or in one of our folders."""
     path = PurePosixPath(name)
     ours = path.parts[0] in (*FRAMES, *EXPORTS) and len(path.parts) > 1
@@ -172,7 +172,7 @@ def _new_folder(home: Path) -> Path:
     return folder
 
 
-def _move_in(settings: Settings, folder: Path, anchor: Anchor) -> None:
+def _move_into_home(settings: Settings, folder: Path, anchor: Anchor) -> None:
     """The database last: without it nothing is served."""
     # Their marks are those of the changes of another database.
     shutil.rmtree(settings.yields, ignore_errors=True)

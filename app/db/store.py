@@ -123,7 +123,7 @@ class Store:
         lock = DatabaseInUse(settings)
         engine: Engine | None = None
         try:
-            engine = _open(settings, lock.alone)
+            engine = _open_engine(settings, lock.alone)
             lock.share()
             return Store(engine, settings, lock, Turn() if turn is None else turn)
         except BaseException:
@@ -177,7 +177,12 @@ class Store:
         """
         self.require_undamaged()
         writer = self._writer if lasting else self._passing
-        with self.turn, self._remembered(), self._noting_damage(), Session(writer) as session:
+        with (
+            self.turn,
+            self._remember_write_failure(),
+            self._noting_damage(),
+            Session(writer) as session,
+        ):
             # Take the lock before anything is read, so that what is read is still true when it
             # is written.
             session.begin()
@@ -194,7 +199,7 @@ class Store:
                 release_admission()
             session.commit()
             self._refused = None
-            self._anchored(session)
+            self._save_anchor(session)
         self.notify_listeners()
 
     def require_writable(self) -> None:
@@ -207,7 +212,7 @@ class Store:
                 session.execute(_UNCHANGED)
 
     @contextmanager
-    def _remembered(self) -> Iterator[None]:
+    def _remember_write_failure(self) -> Iterator[None]:
         """Note what keeps the database from being written."""
         try:
             yield
@@ -289,7 +294,7 @@ class Store:
                 hint=EXAMINE,
             )
 
-    def _anchored(self, session: Session) -> None:
+    def _save_anchor(self, session: Session) -> None:
         """Tell the home how long the log is by now; an anchor that stays behind is right, too."""
         end = session.log_end
         if end is None or self._anchor is None:
@@ -313,7 +318,7 @@ class Store:
 
     def subscribe(self) -> None:
         """Hear of what other processes commit, where the database tells."""
-        self.sharing.subscribe(self._receive)
+        self.sharing.subscribe(self._receive_notification)
         self.sharing.listen()
 
     def publish(self, word: str) -> None:
@@ -322,7 +327,7 @@ class Store:
             with self.read_one() as session:
                 self.sharing.publish(session, word)
 
-    def _receive(self, word: str) -> None:
+    def _receive_notification(self, word: str) -> None:
         if word in (COMMITTED, AGAIN):
             self.notify_listeners()
 
@@ -341,7 +346,7 @@ class Store:
             self._lock.release()
 
 
-def _open(settings: Settings, alone: bool) -> Engine:
+def _open_engine(settings: Settings, alone: bool) -> Engine:
     dialect, engine = dialect_of(settings), make_engine(settings)
     if dialect.is_file:
         if alone:

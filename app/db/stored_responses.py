@@ -70,7 +70,9 @@ class StoredResponse:
 
 def find_response(session: Session, key: str, actor: str) -> StoredResponse | None:
     """The response that is stored under an actor's key, or None."""
-    row = session.execute(_FIND, {"key": key, "actor": actor, "oldest": _oldest()}).one_or_none()
+    row = session.execute(
+        _FIND, {"key": key, "actor": actor, "oldest": _oldest_kept_time()}
+    ).one_or_none()
     if row is None:
         return None
     body = inflate(row.body) if row.body else None
@@ -87,7 +89,7 @@ def insert_response(session: Session, key: str, actor: str, response: StoredResp
         "headers": json_text(response.headers, ascii_=True),
         "body": zlib_ng.compress(response.body or b"", _FAST),
         "at": now(),
-        "oldest": _oldest(),
+        "oldest": _oldest_kept_time(),
     }
     return session.execute(_KEEP, row).one_or_none() is not None
 
@@ -96,7 +98,7 @@ def delete_old_responses(session: Session) -> int:
     """Delete the responses that are too old; returns how many."""
     gone = (
         delete(StoredResponseModel)
-        .where(StoredResponseModel.at < _oldest())
+        .where(StoredResponseModel.at < _oldest_kept_time())
         .returning(StoredResponseModel.key)
     )
     return len(session.scalars(gone).all())
@@ -113,7 +115,7 @@ def shorten_responses(session: Session, most: int) -> int:
     return len(session.scalars(_SHORTEN, {"most": most, "empty": b""}).all())
 
 
-def _oldest() -> str:
+def _oldest_kept_time() -> str:
     oldest = datetime.now(UTC) - timedelta(hours=KEPT_HOURS)
     return text_of(oldest)
 

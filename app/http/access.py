@@ -92,10 +92,10 @@ class Access:
             TooManyTriesError: Nobody's, with one of many tokens that are none.
         """
         if bearer_of(scope) is None and not read_cookie(scope, self._team.cookie):
-            raise _not_logged_in()
+            raise _not_logged_in_error()
         login = self._login_at_once(scope)
         if login is None:
-            login = await run_sync(self._look_up, scope, limiter=self._threads)
+            login = await run_sync(self._find_login, scope, limiter=self._threads)
         scope[ASKS] = login.actor
         return login
 
@@ -163,31 +163,31 @@ class Access:
             return self._team.logins.find(read_cookie(scope, self._team.cookie) or "", at_once=True)
         return None
 
-    def _look_up(self, scope: Scope) -> Login:
+    def _find_login(self, scope: Scope) -> Login:
         bearer = bearer_of(scope)
         if bearer is not None:
             return self._team.login_with(bearer, Request(scope))
         login = self._team.logins.find(read_cookie(scope, self._team.cookie) or "")
         if login is None:
-            raise _not_logged_in()
+            raise _not_logged_in_error()
         return login
 
     def _note_use(self, login: Login) -> None:
         """Write down that a session or token is used, seldom and while nobody waits for it."""
         key = (login.token is not None, login.id)
-        if key in self._touching or not self._kind(login).is_use_unlogged(login):
+        if key in self._touching or not self._store_of_login(login).is_use_unlogged(login):
             return
-        task = asyncio.ensure_future(self._touch(login))
+        task = asyncio.ensure_future(self._save_use(login))
         self._touching[key] = task
         task.add_done_callback(lambda _task: self._touching.pop(key, None))
 
-    async def _touch(self, login: Login) -> None:
+    async def _save_use(self, login: Login) -> None:
         try:
-            await run_sync(self._kind(login).touch, login, limiter=self._threads)
+            await run_sync(self._store_of_login(login).touch, login, limiter=self._threads)
         except StorageError as error:
             log.warning("the use of a session or token could not be noted", error=str(error))
 
-    def _kind(self, login: Login) -> Logins | AccessTokens:
+    def _store_of_login(self, login: Login) -> Logins | AccessTokens:
         return self._team.logins if login.token is None else self._team.tokens
 
 
@@ -244,5 +244,5 @@ class _WhileAllowed(Response):
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
 
-def _not_logged_in() -> NotLoggedInError:
+def _not_logged_in_error() -> NotLoggedInError:
     return NotLoggedInError("you are not logged in", hint="Log in first.")

@@ -67,17 +67,17 @@ def read_json(body: bytes) -> Any:
         text = body.decode("utf-8")
     except UnicodeDecodeError:
         raise BodyError(400, "the body is not UTF-8 text") from None
-    _require_flat(body)
+    _require_few_parts(body)
     try:
         value = json.loads(
-            text, parse_constant=_refuse_constant, object_pairs_hook=_without_repetition
+            text, parse_constant=_refuse_constant, object_pairs_hook=_object_without_repeated_names
         )
     except ValueError as error:
         place = f" at character {error.pos}" if isinstance(error, json.JSONDecodeError) else ""
         raise BodyError(400, f"the body is not JSON{place}") from None
     if _DOUBTFUL.search(body):
         _refuse_what_cannot_be_written(value)
-    if rb"\u0000" in body and (where := _null_character(value)) is not None:
+    if rb"\u0000" in body and (where := _find_null_character(value)) is not None:
         raise BodyError(
             400,
             f"the text at {quoted(where, 80)} in the body holds U+0000, which is not stored",
@@ -86,7 +86,7 @@ def read_json(body: bytes) -> Any:
     return value
 
 
-def _null_character(value: object, place: str = "") -> str | None:
+def _find_null_character(value: object, place: str = "") -> str | None:
     """JSON pointer to a text, or to a name, that holds U+0000; None where there is none."""
     parts: Iterable[tuple[object, object]] = ()
     if isinstance(value, str):
@@ -97,11 +97,11 @@ def _null_character(value: object, place: str = "") -> str | None:
         parts = value.items()
     elif isinstance(value, list):
         parts = enumerate(value)
-    found = (_null_character(part, f"{place}/{name}") for name, part in parts)
+    found = (_find_null_character(part, f"{place}/{name}") for name, part in parts)
     return next((one for one in found if one is not None), None)
 
 
-def _require_flat(body: bytes) -> None:
+def _require_few_parts(body: bytes) -> None:
     """Count brackets and commas before anything is made of them, on text that may not be JSON."""
     outside = _without_strings(body)
     if outside.count(b",") > MAX_VALUES:
@@ -126,7 +126,7 @@ def _refuse_constant(name: str) -> NoReturn:
     raise BodyError(400, f"{name} is not a number in JSON")
 
 
-def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _object_without_repeated_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object whose names differ: of two equal ones, readers disagree which counts."""
     if len(pairs) > MAX_NAMES:
         raise BodyError(400, f"an object of the body has more than {MAX_NAMES} names")
@@ -163,7 +163,7 @@ async def read_body(headers: Headers, receive: Receive, most: int) -> bytes:
     if not declared.isascii() or not declared.isdigit():
         raise BodyError(400, "Content-Length is not a number")
     if len(declared) > 18 or int(declared) > most:
-        raise _too_large(most)
+        raise _too_large_error(most)
     body = bytearray()
     more = True
     while more:
@@ -173,11 +173,11 @@ async def read_body(headers: Headers, receive: Receive, most: int) -> bytes:
         body += message.get("body", b"")
         more = message.get("more_body", False)
         if len(body) > most:
-            raise _too_large(most)
+            raise _too_large_error(most)
     return bytes(body)
 
 
-def _too_large(most: int) -> BodyError:
+def _too_large_error(most: int) -> BodyError:
     return BodyError(413, f"a request body may have at most {most} bytes")
 
 

@@ -71,7 +71,7 @@ class Connection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take it; where there is no room, in the place of the one that is idle for longest."""
         if len(self.connections) >= connection_limit() and not self._make_room():
-            transport.write(_answer(503, "the server has too many connections"))
+            transport.write(_error_response_bytes(503, "the server has too many connections"))
             transport.close()
             return
         super().connection_made(transport)
@@ -91,7 +91,9 @@ class Connection(H11Protocol):
         self._used = self.loop.time()
         self._received += len(data)
         if self.conn.their_state is h11.IDLE and self._is_too_long_a_head(data):
-            self._refuse(431, f"the head of the request is longer than {HEAD_BYTES:,} bytes")
+            self._answer_and_close(
+                431, f"the head of the request is longer than {HEAD_BYTES:,} bytes"
+            )
             return
         super().data_received(data)
         self._update_deadline()
@@ -110,7 +112,7 @@ class Connection(H11Protocol):
 
     def send_400_response(self, msg: str) -> None:
         """Answer bytes that are no HTTP like every other mistake, and close."""
-        self._refuse(400, "the request is not valid HTTP")
+        self._answer_and_close(400, "the request is not valid HTTP")
 
     @property
     def is_idle(self) -> bool:
@@ -139,30 +141,32 @@ class Connection(H11Protocol):
     def _set_deadline(self, what: str, seconds: float) -> None:
         if self._owed != what:
             self._owed, self._received = what, 0
-            self._deadline = self.loop.call_later(seconds, self._overdue)
+            self._deadline = self.loop.call_later(seconds, self._end_overdue_request)
 
     def _clear_deadline(self) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
         self._deadline, self._owed = None, ""
 
-    def _overdue(self) -> None:
+    def _end_overdue_request(self) -> None:
         what, self._owed = self._owed, ""
         if self.transport.is_closing():
             return
         if what == "body" and self.flow.read_paused:
             self._set_deadline("body", BODY_SECONDS)
             return
-        self._refuse(408, f"the {'head' if what == 'head' else 'rest'} of the request did not come")
+        self._answer_and_close(
+            408, f"the {'head' if what == 'head' else 'rest'} of the request did not come"
+        )
 
-    def _refuse(self, status: int, detail: str) -> None:
+    def _answer_and_close(self, status: int, detail: str) -> None:
         """Answer, if no answer has begun, and close."""
         begun = self.cycle is not None and self.cycle.response_started and not self.is_idle
         if self.cycle is not None and not self.is_idle:
             self.cycle.disconnected = True
             self.cycle.message_event.set()
         if not begun and self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self.transport.write(_answer(status, detail))
+            self.transport.write(_error_response_bytes(status, detail))
         self.transport.close()
 
     def _make_room(self) -> bool:
@@ -177,7 +181,7 @@ class Connection(H11Protocol):
         return True
 
 
-def _answer(status: int, detail: str) -> bytes:
+def _error_response_bytes(status: int, detail: str) -> bytes:
     """A whole answer that says what is wrong, for a connection that ends with it."""
     busy = {"Retry-After": RETRY_SECONDS} if status == 503 else {}
     problem = problem_response(make_problem(status, detail), busy)

@@ -89,7 +89,7 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
         ) -> Any:
             if not isinstance(whole, ListDocument):
                 return whole
-            items, following = page_of(whole.items, limit, cursor, _list_of(whose, arguments))
+            items, following = page_of(whole.items, limit, cursor, _list_identity(whose, arguments))
             return whole.model_copy(update={"items": items, "next": following})
 
         if inspect.iscoroutinefunction(route):
@@ -109,7 +109,7 @@ def paged(default: int | None = None) -> Callable[[Callable[P, Answer]], Callabl
             ) -> Any:
                 return cut(direct(*args, **requested), limit, cursor, requested)
 
-        page.__signature__ = _with_page(route, default)  # type: ignore[attr-defined]
+        page.__signature__ = _signature_with_page(route, default)  # type: ignore[attr-defined]
         return page  # type: ignore[return-value]
 
     return decorate
@@ -129,40 +129,40 @@ def page_of(
     Raises:
         InputError: The cursor is none of this list.
     """
-    start = 0 if cursor is None else _start(items, cursor, whose)
+    start = 0 if cursor is None else _start_of_page(items, cursor, whose)
     end = len(items) if limit is None else min(start + limit, len(items))
     if end == len(items) or end == start:
         return list(items[start:end]), None
-    return list(items[start:end]), f"{end - 1}.{_identity(items[end - 1])}.{whose}"
+    return list(items[start:end]), f"{end - 1}.{_item_identity(items[end - 1])}.{whose}"
 
 
-def _start(items: Sequence[Any], cursor: str, whose: str) -> int:
+def _start_of_page(items: Sequence[Any], cursor: str, whose: str) -> int:
     found = _CURSOR.fullmatch(cursor)
     if found is None or found[3] != whose:
         raise foreign_cursor()
     place = int(found[1])
-    if place < len(items) and _identity(items[place]) == found[2]:
+    if place < len(items) and _item_identity(items[place]) == found[2]:
         return place + 1
-    now = (index for index, item in enumerate(items) if _identity(item) == found[2])
+    now = (index for index, item in enumerate(items) if _item_identity(item) == found[2])
     # Where the item is gone, the one behind it has moved into its place.
     return next((index + 1 for index in now), min(place, len(items)))
 
 
-def _identity(item: Any) -> str:
+def _item_identity(item: Any) -> str:
     value = item.model_dump(mode="json") if isinstance(item, BaseModel) else item
     if isinstance(value, dict):
         value = {name: value[name] for name in _NAMES if name in value} or value
     return hashlib.sha256(json_text(value).encode()).hexdigest()[:12]
 
 
-def _list_of(route: str, arguments: Mapping[str, Any]) -> str:
+def _list_identity(route: str, arguments: Mapping[str, Any]) -> str:
     """Which list is asked for: the route, and what its address and query say."""
     texts = {name: value for name, value in arguments.items() if isinstance(value, str | int)}
     text = json_text([route, sorted(texts.items())])
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def _with_page(route: Callable[..., Any], default: int | None) -> inspect.Signature:
+def _signature_with_page(route: Callable[..., Any], default: int | None) -> inspect.Signature:
     signature = inspect.signature(route, eval_str=True)
     if default is None:
         kind: Any = int | None

@@ -35,11 +35,11 @@ class Document(BaseModel):
 def json_of(value: Any) -> bytes:
     """The JSON of a document, or of a frozen dataclass, which is its own; no number is infinite or NaN."""
     kind: Any = type(value)
-    return _writer(kind).dump_json(value)
+    return _adapter_of_type(kind).dump_json(value)
 
 
 @cache
-def _writer(kind: Any) -> TypeAdapter[Any]:
+def _adapter_of_type(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 

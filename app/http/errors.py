@@ -115,7 +115,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
         hint=hint,
         pointer=error.pointer,
         station=error.station if isinstance(error, SharedStationError) else None,
-        here=_presences(error) if isinstance(error, HeldGroupError) else None,
+        here=_presence_documents(error) if isinstance(error, HeldGroupError) else None,
     )
     headers = {"Retry-After": RETRY_SECONDS} if status in (503, 507) else {}
     if isinstance(error, TooManyTriesError):
@@ -135,7 +135,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
     return problem_response(problem, headers, current)
 
 
-def _presences(error: HeldGroupError) -> list[PresenceDocument]:
+def _presence_documents(error: HeldGroupError) -> list[PresenceDocument]:
     return [PresenceDocument.model_validate(one) for one in error.here]
 
 
@@ -148,16 +148,18 @@ async def _validation_error(request: Request, error: Exception) -> Response:
             missing = f"there is no {detail['loc'][1]} with such an id"
             return problem_response(make_problem(404, missing))
     errors = [
-        FieldProblem(pointer=_pointer(detail["loc"]), detail=_sentence(request, detail))
+        FieldProblem(
+            pointer=_pointer_of_location(detail["loc"]), detail=_problem_sentence(request, detail)
+        )
         for detail in details[:20]
     ]
-    first = _first(errors)
+    first = _most_telling_problem(errors)
     place = f"{first.pointer}: " if first.pointer else ""
     problem = make_problem(422, f"{place}{first.detail}", pointer=first.pointer, errors=errors)
     return problem_response(problem)
 
 
-def _first(errors: Sequence[FieldProblem]) -> FieldProblem:
+def _most_telling_problem(errors: Sequence[FieldProblem]) -> FieldProblem:
     """The problem to speak of: a misspelt name rather than that the right one is missing."""
     missing = str(errors[0].pointer)
     place, _, name = missing.rpartition("/")
@@ -168,7 +170,7 @@ def _first(errors: Sequence[FieldProblem]) -> FieldProblem:
     return errors[0]
 
 
-def _sentence(request: Request, detail: dict[str, Any]) -> str:
+def _problem_sentence(request: Request, detail: dict[str, Any]) -> str:
     """Pydantic's message without the prefix that it gives to our own validators."""
     if detail["type"] == UNKNOWN:
         return sentence_about(request, detail["loc"])
@@ -214,7 +216,7 @@ _PLAIN = {
 """What is said instead of the framework's words, which are Python's."""
 
 
-def _pointer(location: Sequence[int | str]) -> str:
+def _pointer_of_location(location: Sequence[int | str]) -> str:
     """JSON pointer (RFC 6901) of the place; the first part says body, query or header."""
     parts = [part for part in location[1:] if part != "[key]"]
     escaped = (str(part).replace("~", "~0").replace("/", "~1") for part in parts)

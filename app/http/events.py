@@ -213,7 +213,9 @@ class Events:
             self._counts.opened += 1
             self._counts.resumed += resumed
             if self._thread is None:
-                self._thread = threading.Thread(target=self._tail, name="events", daemon=True)
+                self._thread = threading.Thread(
+                    target=self._publish_until_closed, name="events", daemon=True
+                )
                 self._thread.start()
         self._wake.set()
         return feed
@@ -232,19 +234,19 @@ class Events:
         """End every feed, so that the server can stop; may be called twice."""
         self._closing.set()
         self._wake.set()
-        _deliver({feed: [] for feed in self._listening()}, ended=True)
+        _deliver_events({feed: [] for feed in self._current_listeners()}, ended=True)
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(5)
 
-    def _listening(self) -> list[Listener]:
+    def _current_listeners(self) -> list[Listener]:
         with self._lock:
             return list(self._feeds)
 
-    def _tail(self) -> None:
+    def _publish_until_closed(self) -> None:
         awake = False
         while not self._closing.is_set():
-            if feeds := self._listening():
+            if feeds := self._current_listeners():
                 try:
                     self._publish_changes(feeds, first=not awake)
                     awake = True
@@ -253,7 +255,7 @@ class Events:
                 except Exception:
                     log.exception("events could not be sent")
                 idle = monotonic() - PING_SECONDS
-                _deliver({feed: [KEEPALIVE_COMMENT] for feed in feeds if feed.told < idle})
+                _deliver_events({feed: [KEEPALIVE_COMMENT] for feed in feeds if feed.told < idle})
                 self._closing.wait(PAUSE)
             else:
                 awake = False
@@ -273,15 +275,15 @@ class Events:
             feed.position = max(feed.position, news.entry)
             if events := [written(item) for item in wanted if feed.is_told(item)]:
                 queued[feed] = events
-        _deliver(queued)
+        _deliver_events(queued)
 
     def _look_for_banner(self, feeds: list[Listener], *, first: bool) -> None:
         """Tell each listener of another notice of maintenance, whichever process has set it."""
         before, self._banner = self._banner, read_banner(self._store)
         if first or self._banner == before:
             return
-        event = _event("maintenance", MaintenanceEvent(banner=self._banner))
-        _deliver({feed: [event] for feed in feeds})
+        event = _format_event("maintenance", MaintenanceEvent(banner=self._banner))
+        _deliver_events({feed: [event] for feed in feeds})
 
     def publish_lease(self, lease: Lease) -> None:
         """Tell who has a group of a batch open."""
@@ -302,15 +304,17 @@ class Events:
             self._publish_work(int(dataset_id), WorkEvent.model_validate_json(text))
 
     def _publish_work(self, dataset_id: int, document: WorkEvent) -> None:
-        event = _event("work", document)
-        _deliver({feed: [event] for feed in self._listening() if feed.wants(dataset_id)})
+        event = _format_event("work", document)
+        _deliver_events(
+            {feed: [event] for feed in self._current_listeners() if feed.wants(dataset_id)}
+        )
 
     def _publish_job(self, job: Job) -> None:
-        event, feeds = _job_event(job), self._listening()
-        _deliver({feed: [event] for feed in feeds if feed.wants(job.dataset_id, job.actor)})
+        event, feeds = _job_event(job), self._current_listeners()
+        _deliver_events({feed: [event] for feed in feeds if feed.wants(job.dataset_id, job.actor)})
 
 
-def _deliver(queued: Mapping[Listener, list[bytes]], *, ended: bool = False) -> None:
+def _deliver_events(queued: Mapping[Listener, list[bytes]], *, ended: bool = False) -> None:
     """Tell listeners of something, each loop by one call; from any thread."""
 
     def take(loop: asyncio.AbstractEventLoop) -> None:
@@ -333,7 +337,7 @@ def _change_event(change: Change) -> bytes:
     identity = None if change.id is None else str(change.id)
     if change.group_id is None:
         document = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)
-        return _event("dataset", document, identity)
+        return _format_event("dataset", document, identity)
     group = GroupEvent(
         group=change.group_id,
         dataset=change.dataset,
@@ -341,12 +345,12 @@ def _change_event(change: Change) -> bytes:
         kind=change.kind,
         actor=change.actor,
     )
-    return _event("group", group, identity)
+    return _format_event("group", group, identity)
 
 
 def _job_event(job: Job) -> bytes:
-    return _event("job", JobDocument.model_validate(job))
+    return _format_event("job", JobDocument.model_validate(job))
 
 
-def _event(kind: str, document: BaseModel, identity: str | None = None) -> bytes:
+def _format_event(kind: str, document: BaseModel, identity: str | None = None) -> bytes:
     return format_sse_event(data_str=document.model_dump_json(), event=kind, id=identity)

@@ -127,13 +127,13 @@ class Idempotency:
             return problem_response(problem)
         store: Store = request.app.state.services.store
         async with self._respond_alone(store, keys[0], actor):
-            known = await self._find(store, keys[0], actor)
+            known = await self._find_stored_response(store, keys[0], actor)
             if known is None or await hidden():
                 return await self._carry_out(request, digest, keys[0], actor, work)
             is_same = await digest.whole() == known.request_digest
             if is_same and known.under_way:
                 return await self._carry_out(request, digest, keys[0], actor, work)
-            return _replay(known, is_same=is_same)
+            return _response_of_stored(known, is_same=is_same)
 
     @asynccontextmanager
     async def _respond_alone(self, store: Store, key: str, actor: str) -> AsyncIterator[None]:
@@ -149,7 +149,7 @@ class Idempotency:
             if not store.sharing.is_shared:
                 yield
                 return
-            await self._claim(store, key, actor)
+            await self._claim_key(store, key, actor)
             try:
                 yield
             finally:
@@ -159,7 +159,7 @@ class Idempotency:
             del self._under_way[whose]
             done.set()
 
-    async def _claim(self, store: Store, key: str, actor: str) -> None:
+    async def _claim_key(self, store: Store, key: str, actor: str) -> None:
         """Let no other process answer; raises OverloadedError where patience comes to its end."""
         until = time.monotonic() + PATIENCE
         while not await run_sync(claim, store, key, actor, limiter=self._finding):
@@ -167,7 +167,9 @@ class Idempotency:
                 raise _in_progress_error()
             await asyncio.sleep(AGAIN_SECONDS)
 
-    async def _find(self, store: Store, key: str, actor: str) -> StoredResponse | None:
+    async def _find_stored_response(
+        self, store: Store, key: str, actor: str
+    ) -> StoredResponse | None:
         """What is stored under a key; in a thread only where there is something to wait for."""
         try:
             return find_stored(store, key, actor, at_once=True)
@@ -184,7 +186,7 @@ class Idempotency:
             keyed = KeyedRequest(IdempotencyKey(key, actor, await digest.whole()))
             request.scope[KEYED_REQUEST] = keyed
         response = await work()
-        if not (keyed and keyed.stored) and _is_stored(response):
+        if not (keyed and keyed.stored) and _is_storable(response):
             try:
                 sent = stored_form(response, await digest.whole())
                 await run_sync(store_sent, store, key, actor, sent, limiter=self._storing)
@@ -194,7 +196,7 @@ class Idempotency:
         return response
 
 
-def _is_stored(response: Response) -> bool:
+def _is_storable(response: Response) -> bool:
     """Whether it is a success of a size that is stored; what was refused may be tried again."""
     body = getattr(response, "body", None)
     return 200 <= response.status_code < 300 and body is not None and len(body) <= MAX_ANSWER_BYTES
@@ -204,7 +206,7 @@ def _in_progress_error() -> OverloadedError:
     return OverloadedError("the first request of this key is still being answered")
 
 
-def _replay(known: StoredResponse, *, is_same: bool) -> Response:
+def _response_of_stored(known: StoredResponse, *, is_same: bool) -> Response:
     if not is_same:
         problem = make_problem(
             422, f"this {HEADER} was used for another request", hint="Send a new key with it."

@@ -102,7 +102,7 @@ class DatabaseCollector(Collector):
     def collect(self) -> Iterator[Metric]:
         """Every number of this moment."""
         services: Services = self._app.state.services
-        yield from _database(services.store)
+        yield from _database_metrics(services.store)
 
 
 class ProcessCollector(Collector):
@@ -119,8 +119,8 @@ class ProcessCollector(Collector):
         """Every number of this moment."""
         services: Services = self._app.state.services
         yield from self._request_classes()
-        yield from _streams(services.events.counts)
-        yield from _workers()
+        yield from _stream_metrics(services.events.counts)
+        yield from _worker_metrics()
 
     def _request_classes(self) -> Iterator[Metric]:
         doors = self._doors.all
@@ -152,9 +152,9 @@ class SharedNumbers:
             for family in self._own.collect():
                 for sample in family.samples:
                     if family.type == "gauge":
-                        self._gauge(family, sample)
+                        self._set_gauge(family, sample)
                     else:
-                        self._count(family, sample)
+                        self._set_counter(family, sample)
 
     async def keep_fresh(self) -> None:
         """Refresh every second, without an end."""
@@ -162,7 +162,7 @@ class SharedNumbers:
             self.refresh()
             await asyncio.sleep(REFRESH_SECONDS)
 
-    def _gauge(self, family: Metric, sample: Sample) -> None:
+    def _set_gauge(self, family: Metric, sample: Sample) -> None:
         names = tuple(sample.labels)
         if family.name not in self._gauges:
             self._gauges[family.name] = Gauge(
@@ -175,7 +175,7 @@ class SharedNumbers:
         gauge = self._gauges[family.name]
         (gauge.labels(**sample.labels) if names else gauge).set(sample.value)
 
-    def _count(self, family: Metric, sample: Sample) -> None:
+    def _set_counter(self, family: Metric, sample: Sample) -> None:
         names = tuple(sample.labels)
         if family.name not in self._counters:
             self._counters[family.name] = Counter(
@@ -188,14 +188,14 @@ class SharedNumbers:
         self._counted[key] = sample.value
 
 
-def _streams(counts: Counts) -> Iterator[Metric]:
+def _stream_metrics(counts: Counts) -> Iterator[Metric]:
     yield _gauge("event_streams", "Windows that listen for events.", counts.open)
     ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
     text = "Event streams that were opened, came back, or were let go for being too slow."
     yield _counter("event_stream", text, "what", ended)
 
 
-def _workers() -> Iterator[Metric]:
+def _worker_metrics() -> Iterator[Metric]:
     busy = {kind: counts.busy for kind, counts in COUNTS.items()}
     yield _gauges("worker_busy", "Tasks at work in worker processes.", "kind", busy)
     waiting = {kind: counts.waiting for kind, counts in COUNTS.items()}
@@ -211,7 +211,7 @@ def _workers() -> Iterator[Metric]:
     yield ended
 
 
-def _database(store: Store) -> Iterator[Metric]:
+def _database_metrics(store: Store) -> Iterator[Metric]:
     home = None
     with suppress(StorageError):
         home = read_home(store)
@@ -220,10 +220,10 @@ def _database(store: Store) -> Iterator[Metric]:
     text = "1 from the first sign on that the database is damaged."
     yield _gauge("database_damaged", text, int(store.is_damaged))
     if home is not None:
-        yield from _home(home)
+        yield from _home_metrics(home)
 
 
-def _home(home: Home) -> Iterator[Metric]:
+def _home_metrics(home: Home) -> Iterator[Metric]:
     yield _gauge("groups", "Groups of all datasets.", home.groups)
     yield _gauge("unsolved_groups", "Groups that wait to be solved.", home.unsolved)
     yield _gauge(

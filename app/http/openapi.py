@@ -72,7 +72,7 @@ def example_of(schema: Schema, schemas: Mapping[str, Schema], name: str = "", de
     """
     if "$ref" in schema:
         found = schemas[schema["$ref"].rpartition("/")[2]]
-        return example_of({**found, **_given(schema)}, schemas, name, deep + 1)
+        return example_of({**found, **_given_example(schema)}, schemas, name, deep + 1)
     for word in ("examples", "enum"):
         if schema.get(word):
             return schema[word][0]
@@ -88,19 +88,19 @@ def example_of(schema: Schema, schemas: Mapping[str, Schema], name: str = "", de
             return example_of(choices[0], schemas, name, deep)
     kind = schema.get("type")
     if kind == "object":
-        return _object(schema, schemas, deep)
+        return _example_object(schema, schemas, deep)
     if kind == "array":
-        return _array(schema, schemas, name, deep)
+        return _example_array(schema, schemas, name, deep)
     if kind in ("integer", "number"):
-        return _number(schema, kind, name)
-    return {"boolean": True, "null": None}.get(str(kind), _text(schema, name))
+        return _example_number(schema, kind, name)
+    return {"boolean": True, "null": None}.get(str(kind), _example_text(schema, name))
 
 
-def _given(schema: Schema) -> dict[str, Any]:
+def _given_example(schema: Schema) -> dict[str, Any]:
     return {word: schema[word] for word in ("examples", "default") if word in schema}
 
 
-def _object(schema: Schema, schemas: Mapping[str, Schema], deep: int) -> dict[str, Any]:
+def _example_object(schema: Schema, schemas: Mapping[str, Schema], deep: int) -> dict[str, Any]:
     found = {
         key: example_of(one, schemas, key, deep + 1)
         for key, one in schema.get("properties", {}).items()
@@ -111,14 +111,16 @@ def _object(schema: Schema, schemas: Mapping[str, Schema], deep: int) -> dict[st
     return found
 
 
-def _array(schema: Schema, schemas: Mapping[str, Schema], name: str, deep: int) -> list[Any]:
+def _example_array(
+    schema: Schema, schemas: Mapping[str, Schema], name: str, deep: int
+) -> list[Any]:
     if "prefixItems" in schema:
         return [example_of(one, schemas, name, deep + 1) for one in schema["prefixItems"]]
     count = schema.get("minItems", 1 if deep <= _DEEP else 0)
     return [example_of(schema.get("items", {}), schemas, name, deep + 1)] * count
 
 
-def _number(schema: Schema, kind: str, name: str) -> int | float:
+def _example_number(schema: Schema, kind: str, name: str) -> int | float:
     usual = NUMBERS.get(name, 12 if kind == "integer" else 0.5)
     value = min(usual, schema.get("maximum", usual))
     if value <= schema.get("exclusiveMinimum", value - 1):
@@ -127,7 +129,7 @@ def _number(schema: Schema, kind: str, name: str) -> int | float:
     return int(value) if kind == "integer" else float(value)
 
 
-def _text(schema: Schema, name: str) -> str:
+def _example_text(schema: Schema, name: str) -> str:
     text = str(_FORMATS.get(str(schema.get("format")), NAMES.get(name, name or "text")))
     return text.ljust(schema.get("minLength", 0), "x")[: schema.get("maxLength", len(text) + 99)]
 
@@ -203,13 +205,13 @@ def describe(app: FastAPI) -> None:
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
-            app.openapi_schema = _document(app)
+            app.openapi_schema = _make_document(app)
         return app.openapi_schema
 
     app.openapi = openapi  # type: ignore[method-assign]
 
 
-def _document(app: FastAPI) -> dict[str, Any]:
+def _make_document(app: FastAPI) -> dict[str, Any]:
     document = get_openapi(
         title=app.title,
         version=app.version,
@@ -229,15 +231,15 @@ def _document(app: FastAPI) -> dict[str, Any]:
         schemas.update(described.pop("$defs", {}))
         schemas[model.__name__] = described
     shown = [field.field_info.annotation for field in get_fields_from_routes(app.routes)]
-    for kind in {value for model in (*shown, *models) for value in _values(model)}:
+    for kind in {value for model in (*shown, *models) for value in _value_types(model)}:
         _describe_value(kind, schemas)
     _describe_schemas(schemas)
-    _secure(document, routes)
-    _give_examples(document)
+    _describe_security(document, routes)
+    _add_examples(document)
     return document
 
 
-def _values(kind: Any, above: frozenset[Any] = frozenset()) -> Iterator[type[Any]]:
+def _value_types(kind: Any, above: frozenset[Any] = frozenset()) -> Iterator[type[Any]]:
     """Frozen values that a response holds, which are their own models."""
     if kind in above:
         return
@@ -248,7 +250,7 @@ def _values(kind: Any, above: frozenset[Any] = frozenset()) -> Iterator[type[Any
     elif isinstance(kind, type) and issubclass(kind, BaseModel):
         hints = [field.annotation for field in kind.model_fields.values()]
     for hint in hints:
-        yield from _values(hint, above | {kind})
+        yield from _value_types(hint, above | {kind})
 
 
 def _describe_value(kind: type[Any], schemas: Mapping[str, dict[str, Any]]) -> None:
@@ -279,7 +281,7 @@ def _describe_schemas(schemas: dict[str, Any]) -> None:
             )
 
 
-def _secure(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
+def _describe_security(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
     """Say with what one may ask: on a server that one person runs alone, with nothing."""
     document["components"]["securitySchemes"] = SCHEMES
     document["security"] = [*({name: []} for name in SCHEMES), {}]
@@ -289,7 +291,7 @@ def _secure(document: dict[str, Any], routes: Mapping[str, Route]) -> None:
                 operation["security"] = []
 
 
-def _give_examples(document: dict[str, Any]) -> None:
+def _add_examples(document: dict[str, Any]) -> None:
     """Give every answer in JSON an example."""
     schemas = document["components"]["schemas"]
     for operations in document["paths"].values():
@@ -306,7 +308,7 @@ def _complete_operations(document: dict[str, Any], routes: Mapping[str, Route]) 
     for path, operations in document["paths"].items():
         for method, operation in operations.items():
             # What the framework makes of a function's name may be that of another one, too.
-            operation["summary"] = _words(operation["operationId"])
+            operation["summary"] = _summary_words(operation["operationId"])
             parameters = operation.setdefault("parameters", [])
             for parameter in parameters:
                 if not parameter.get("description"):
@@ -323,7 +325,7 @@ def _complete_operations(document: dict[str, Any], routes: Mapping[str, Route]) 
                 answer.get("content", {}).get("text/event-stream", {}).pop("itemSchema", None)
 
 
-def _words(name: str) -> str:
+def _summary_words(name: str) -> str:
     """``listSavedViews`` as a person writes it: *List saved views*."""
     words = re.sub("([A-Z])", lambda found: f" {found[1].lower()}", name)
     return words[:1].upper() + words[1:]

@@ -86,13 +86,13 @@ class SameOrigin:
         self._name = "" if self.url is None else host_name(self.url.partition("://")[2])
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "http" and not self._is_ours(scope):
+        if scope["type"] == "http" and not self._is_same_origin(scope):
             problem = make_problem(403, "requests from pages of another site are refused")
             await problem_response(problem)(scope, receive, send)
             return
         await self.app(scope, receive, send)
 
-    def _is_ours(self, scope: Scope) -> bool:
+    def _is_same_origin(self, scope: Scope) -> bool:
         if scope["method"] in SAFE_METHODS:
             return True
         headers, scheme = Headers(scope=scope), scope.get("scheme", "http")

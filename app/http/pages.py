@@ -71,10 +71,10 @@ class Modules(StaticFiles):
             raise HTTPException(status_code=404)
         names = {name for name, _ in scope["headers"]}
         plain = not names & {b"range", b"if-none-match", b"if-modified-since"}
-        if plain and (known := self._known(path)) is not None:
+        if plain and (known := self._cached_response(path)) is not None:
             return known
         response = await super().get_response(path, scope)
-        return self._remember(path, response) if plain else response
+        return self._cache_response(path, response) if plain else response
 
     def file_response(
         self,
@@ -95,9 +95,9 @@ class Modules(StaticFiles):
         for path in paths:
             file, status = self.lookup_path(path)
             if status is not None:
-                self._remember(path, self.file_response(file, status, {"headers": []}))
+                self._cache_response(path, self.file_response(file, status, {"headers": []}))
 
-    def _known(self, path: str) -> Response | None:
+    def _cached_response(self, path: str) -> Response | None:
         """The answer given before, if its file has not changed."""
         file, changed, response = self._read.get(path, ("", 0, None))
         try:
@@ -105,7 +105,7 @@ class Modules(StaticFiles):
         except OSError:
             return None
 
-    def _remember(self, path: str, response: Response) -> Response:
+    def _cache_response(self, path: str, response: Response) -> Response:
         """The same answer with the file's bytes in memory."""
         if not isinstance(response, FileResponse):
             return response

@@ -98,12 +98,12 @@ def may(
     of_none = action in (Action.ACCOUNT, Action.ADMINISTER)
     if not (of_none or things or body or where is not Where.NAMED):
         raise TypeError("say what the route names, or where else a role counts")
-    return _says(found)
+    return _mark_permission(found)
 
 
 def open_to_all(endpoint: E) -> E:
     """Say that anybody may ask a route, also before they have logged in."""
-    return _says(OPEN)(endpoint)
+    return _mark_permission(OPEN)(endpoint)
 
 
 def permission_of(endpoint: Callable[..., Any]) -> Permission | None:
@@ -112,12 +112,12 @@ def permission_of(endpoint: Callable[..., Any]) -> Permission | None:
     return found
 
 
-def _says(permission: Permission) -> Callable[[E], E]:
-    def decorate(endpoint: E) -> E:
+def _mark_permission(permission: Permission) -> Callable[[E], E]:
+    def mark_endpoint(endpoint: E) -> E:
         setattr(endpoint, _PERMISSION, permission)
         return endpoint
 
-    return decorate
+    return mark_endpoint
 
 
 WHOLE = frozenset(
@@ -184,7 +184,7 @@ class RequestSubject:
         """What a request names, by the parameters of its path and the rest of it."""
         query = tuple(parse_qsl(query_string, keep_blank_values=True))
         return RequestSubject(
-            permission, query, body, tuple(_mentions(permission, path, query, body))
+            permission, query, body, tuple(_mentions_of_request(permission, path, query, body))
         )
 
 
@@ -194,7 +194,7 @@ def require_allowed(store: Store, subject: RequestSubject, login: Login) -> list
     Raises:
         ForbiddenError: They may not do that where they see what it names.
     """
-    owned = _owned(store, subject, login)
+    owned = _find_owned_mentions(store, subject, login)
     _require_roles(subject, owned, login)
     return owned
 
@@ -223,10 +223,10 @@ def is_hidden(store: Store, owned: list[OwnedMention]) -> bool:
 def needs_database(subject: RequestSubject, login: Login) -> bool:
     """Whether ``require_allowed`` has to ask the database."""
     named = (mention.named for mention in subject.mentions)
-    return not login.roles.is_admin and any(_is_lookup(one, login.roles) for one in named)
+    return not login.roles.is_admin and any(_needs_ownership(one, login.roles) for one in named)
 
 
-def _owned(store: Store, subject: RequestSubject, login: Login) -> list[OwnedMention]:
+def _find_owned_mentions(store: Store, subject: RequestSubject, login: Login) -> list[OwnedMention]:
     """Where everything is that a request mentions.
 
     Each is found by one indexed statement, and none is asked for where it decides nothing: an
@@ -238,7 +238,7 @@ def _owned(store: Store, subject: RequestSubject, login: Login) -> list[OwnedMen
     visibility = login.visibility
     # What a query names comes first: it says which of the versions of a name is meant.
     for mention in sorted(subject.mentions, key=lambda item: item.place != "query"):
-        ownership = _ownership(store, mention.named, login, visibility)
+        ownership = _find_ownership_if_needed(store, mention.named, login, visibility)
         if mention.place == "query" and ownership is not None and ownership.dataset is not None:
             visibility = Visibility(False, frozenset({ownership.dataset}), login.owner)
         found.append(OwnedMention(mention, ownership))
@@ -260,7 +260,7 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
         require(roles.highest, action)
     for item in owned:
         if item.mention.named.kind is OwnedKind.NEW_DATASET:
-            _require_new(item.ownership, roles, action)
+            _require_may_make(item.ownership, roles, action)
         elif item.ownership is not None:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
             role = role_at(item.ownership, roles, login.owner)
@@ -299,12 +299,12 @@ def _queries_in(body: Any) -> Iterator[str]:
 def _names_operator_folder(subject: RequestSubject) -> bool:
     """Whether a body names a folder of the operator, which lies beside all datasets."""
     return any(
-        kind is OwnedKind.FOLDER and _field(subject.body, name) is not None
+        kind is OwnedKind.FOLDER and _field_of_body(subject.body, name) is not None
         for name, kind in subject.permission.body.items()
     )
 
 
-def _require_new(present: Ownership | None, roles: DatasetRoles, action: Action) -> None:
+def _require_may_make(present: Ownership | None, roles: DatasetRoles, action: Action) -> None:
     """What is made where it is not there; whoever cannot know that it is, is not told."""
     role = roles.everywhere if present is None else roles.role_in(present.dataset)
     if role is not Role.NONE or present is None:
@@ -316,11 +316,11 @@ def _require_new(present: Ownership | None, roles: DatasetRoles, action: Action)
     )
 
 
-def _ownership(
+def _find_ownership_if_needed(
     store: Store, named: Named, login: Login, visibility: Visibility
 ) -> Ownership | None:
     roles: DatasetRoles = login.roles
-    if not _is_lookup(named, roles):
+    if not _needs_ownership(named, roles):
         return None if roles.everywhere is Role.NONE else Ownership(None, frozenset({login.owner}))
     found = find_ownership(store, named, visibility)
     if found is None or named.kind is OwnedKind.NEW_DATASET:
@@ -331,12 +331,12 @@ def _ownership(
     return None if hidden else found
 
 
-def _is_lookup(named: Named, roles: DatasetRoles) -> bool:
+def _needs_ownership(named: Named, roles: DatasetRoles) -> bool:
     """Whether it matters where something is: who is the same everywhere is so there."""
     return bool(roles.single or roles.blind) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
 
 
-def _mentions(
+def _mentions_of_request(
     permission: Permission,
     path: Mapping[str, str],
     query: tuple[tuple[str, str], ...],
@@ -345,17 +345,19 @@ def _mentions(
     names = permission.names
     for name, kind in names.items():
         if name in path:
-            yield from _mention("path", name, kind, path[name])
+            yield from _mention_of_value("path", name, kind, path[name])
     for name, value in query:
         if name in names and name not in path:
-            yield from _mention("query", name, names[name], value)
+            yield from _mention_of_value("query", name, names[name], value)
     for name, kind in permission.body.items():
-        found = None if kind is OwnedKind.FOLDER else _field(body, name)
+        found = None if kind is OwnedKind.FOLDER else _field_of_body(body, name)
         if isinstance(found, str if kind in TEXTS else int) and not isinstance(found, bool):
-            yield from _mention("body", name, kind, found)
+            yield from _mention_of_value("body", name, kind, found)
 
 
-def _mention(place: str, name: str, kind: OwnedKind, value: str | int) -> Iterator[Mention]:
+def _mention_of_value(
+    place: str, name: str, kind: OwnedKind, value: str | int
+) -> Iterator[Mention]:
     """Nothing for what is no id: the route refuses it by the same rule."""
     if kind in TEXTS:
         yield Mention(place, name, Named(kind, value))
@@ -366,7 +368,7 @@ def _mention(place: str, name: str, kind: OwnedKind, value: str | int) -> Iterat
         return
 
 
-def _field(body: Any, name: str) -> Any:
+def _field_of_body(body: Any, name: str) -> Any:
     for part in name.split("/"):
         body = body.get(part) if isinstance(body, dict) else None
     return body

@@ -177,7 +177,7 @@ class FairLimiter:
 
     def take(self, who: str) -> bool:
         """Take a place where one is free for somebody."""
-        if not self._may(who):
+        if not self._may_start(who):
             return False
         self.free -= 1
         self._at_work[who] += 1
@@ -208,7 +208,7 @@ class FairLimiter:
             raise
         finally:
             if not mine.done():
-                self._forget(who, mine)
+                self._remove_waiting(who, mine)
         return mine.done() and mine.result()
 
     def give(self, who: str) -> None:
@@ -217,7 +217,7 @@ class FairLimiter:
         self._at_work[who] -= 1
         if not self._at_work[who]:
             del self._at_work[who]
-        following = next(filter(self._may, self._of), None)
+        following = next(filter(self._may_start, self._of), None)
         if following is None:
             return
         waiting = self._of.pop(following)
@@ -227,10 +227,10 @@ class FairLimiter:
         if waiting:
             self._of[following] = waiting
 
-    def _may(self, who: str) -> bool:
+    def _may_start(self, who: str) -> bool:
         return self.free > 0 and (not who or self._at_work[who] < self._each)
 
-    def _forget(self, who: str, mine: asyncio.Future[bool]) -> None:
+    def _remove_waiting(self, who: str, mine: asyncio.Future[bool]) -> None:
         self._of[who].remove(mine)
         self.waiting -= 1
         if not self._of[who]:
@@ -317,9 +317,9 @@ async def turn(door: ClassLimiter | None, scope: Scope) -> AsyncIterator[Respons
     login = login_of(scope)
     who = "" if login is None else login.name
     if not await door.enter(who):
-        yield _refusal(scope, door.lane)
+        yield _busy_response(scope, door.lane)
         return
-    place = _Place(door, who)
+    place = _AdmittedRequest(door, who)
     hold_admission(place.leave_from_anywhere)
     try:
         yield None
@@ -327,7 +327,7 @@ async def turn(door: ClassLimiter | None, scope: Scope) -> AsyncIterator[Respons
         place.end()
 
 
-def _refusal(scope: Scope, request_class: RequestClass) -> Response:
+def _busy_response(scope: Scope, request_class: RequestClass) -> Response:
     """What who had no turn is told: a page for people who asked for one, else a problem."""
     later = {"Retry-After": RETRY_SECONDS}
     if request_class is PAGES and "text/html" in Headers(scope=scope).get("accept", ""):
@@ -340,7 +340,7 @@ def _refusal(scope: Scope, request_class: RequestClass) -> Response:
     return problem_response(problem, later)
 
 
-class _Place:
+class _AdmittedRequest:
     """One request's place in its lane; it is given back once."""
 
     def __init__(self, limiter: ClassLimiter, who: str):
@@ -351,9 +351,9 @@ class _Place:
         """Give the place back before the work is done, from another thread; only so many may do so."""
         # A loop that has stopped lets nobody in any more.
         with suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(self._leave)
+            self._loop.call_soon_threadsafe(self._give_place_back)
 
-    def _leave(self) -> None:
+    def _give_place_back(self) -> None:
         if self._has and self._door.away < AWAY:
             self._door.away += 1
             self._has = False

@@ -35,7 +35,7 @@ MOST_REFUSALS = 20
 """Refused requests of one second that are told of one by one; of the others the number is told."""
 
 
-def _in_a_second(work: Callable[[], None]) -> None:
+def _call_in_a_second(work: Callable[[], None]) -> None:
     # What is told then is of no request alone.
     asyncio.get_running_loop().call_later(1.0, work, context=Context())
 
@@ -51,7 +51,7 @@ class RefusalBound:
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
-        later: Callable[[Callable[[], None]], Any] = _in_a_second,
+        later: Callable[[Callable[[], None]], Any] = _call_in_a_second,
     ):
         self._clock, self._later = clock, later
         self._began = -inf
@@ -65,11 +65,11 @@ class RefusalBound:
             self._told += 1
             return True
         if not self._untold:
-            self._later(self._tell_rest)
+            self._later(self._log_refused_count)
         self._untold += 1
         return False
 
-    def _tell_rest(self) -> None:
+    def _log_refused_count(self) -> None:
         log.warning("more requests were refused", count=self._untold)
         self._untold = 0
 

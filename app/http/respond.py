@@ -47,7 +47,7 @@ def responds(
                 outcome: Any = route(**given)  # type: ignore[call-arg]
             return outcome if isinstance(outcome, Response) else pending.response_to(outcome)
 
-        respond.__signature__ = _with_key(route)  # type: ignore[attr-defined]
+        respond.__signature__ = _signature_with_key(route)  # type: ignore[attr-defined]
         return respond  # type: ignore[return-value]
 
     return decorate
@@ -80,7 +80,7 @@ async def get_keyed_request(request: Request) -> KeyedRequest | None:
     return keyed
 
 
-def _with_key(route: Callable[..., Any]) -> inspect.Signature:
+def _signature_with_key(route: Callable[..., Any]) -> inspect.Signature:
     """The signature of a route as FastAPI calls it."""
     signature = inspect.signature(route, eval_str=True)
     keyword = inspect.Parameter.KEYWORD_ONLY

@@ -97,14 +97,14 @@ class Route(APIRoute):
         body = Body()
         if request.method not in SAFE_METHODS:
             try:
-                body = await self._read(gate, request)
+                body = await self._read_request_body(gate, request)
             except BodyError as error:
                 return error.response()
         if access is None or login is None:
-            return await self._once(gate, request, body, handler)
-        return await self._as(access, login, gate, request, body, handler)
+            return await self._answer_once_per_key(gate, request, body, handler)
+        return await self._answer_as_login(access, login, gate, request, body, handler)
 
-    async def _as(
+    async def _answer_as_login(
         self,
         access: Access,
         login: Login,
@@ -123,19 +123,19 @@ class Route(APIRoute):
         )
         owned = await access.allow(asked, login)
         access.admit(scope, login)
-        _call_by_id(scope, owned)
+        _replace_names_by_ids(scope, owned)
 
         async def work(request: Request) -> Response:
             await access.require_there(owned)
             return await handler(request)
 
         hidden = partial(access.is_hidden, owned)
-        response = await self._once(gate, request, body, work, hidden)
+        response = await self._answer_once_per_key(gate, request, body, work, hidden)
         if isinstance(response, StreamingResponse) and response.media_type == "text/event-stream":
             return access.while_allowed(response, asked, login)
         return response
 
-    async def _once(
+    async def _answer_once_per_key(
         self,
         gate: Gate,
         request: Request,
@@ -145,7 +145,7 @@ class Route(APIRoute):
     ) -> Response:
         """The answer that was given before, else a new one."""
         if request.method in SAFE_METHODS or not self.stores_response:
-            return await self._in_turn(gate, ReadRequest(request, body), handler)
+            return await self._answer_within_limits(gate, ReadRequest(request, body), handler)
         digest = RequestDigest(
             request, body.value, has_value=body.has_value, is_streamed=self._takes_bytes
         )
@@ -154,11 +154,11 @@ class Route(APIRoute):
             request,
             digest,
             actor_of(request.scope, LOCAL_USER),
-            hidden or _nothing_is_hidden,
-            partial(self._in_turn, gate, read, handler),
+            hidden or _hides_nothing,
+            partial(self._answer_within_limits, gate, read, handler),
         )
 
-    async def _read(self, gate: Gate, request: Request) -> Body:
+    async def _read_request_body(self, gate: Gate, request: Request) -> Body:
         """The body of a request that may change something.
 
         Raises:
@@ -177,7 +177,9 @@ class Route(APIRoute):
         require_json_type(types)
         return Body(sent, read_json(sent), has_value=True)
 
-    async def _in_turn(self, gate: Gate, request: Request, handler: Handler) -> Response:
+    async def _answer_within_limits(
+        self, gate: Gate, request: Request, handler: Handler
+    ) -> Response:
         door = gate.doors.of(self.lane, request.scope)
         async with turn(door, request.scope) as refusal:
             return refusal or await handler(request)
@@ -249,11 +251,11 @@ def routes_of(app: FastAPI) -> Iterator[tuple[str, Route]]:
                 yield f"{method} {context.path}", context.original_route
 
 
-async def _nothing_is_hidden() -> bool:
+async def _hides_nothing() -> bool:
     return False
 
 
-def _call_by_id(scope: Scope, owned: list[OwnedMention]) -> None:
+def _replace_names_by_ids(scope: Scope, owned: list[OwnedMention]) -> None:
     """Ask by its id for what has a name that several have, of which its reader sees one."""
     called = {
         item.mention.field: item.ownership.called

@@ -41,7 +41,7 @@ def listen(host: str, port: int) -> Iterator[tuple[socket.socket, str]]:
         InputError: The address is taken or is not one of this machine's.
     """
     try:
-        server = _bind(host.strip("[]"), port)
+        server = _bind_socket(host.strip("[]"), port)
     except OSError as error:
         taken = error.errno == errno.EADDRINUSE
         reason = "is already in use" if taken else f"cannot be used ({error.strerror})"
@@ -53,7 +53,7 @@ def listen(host: str, port: int) -> Iterator[tuple[socket.socket, str]]:
         yield server, f"http://{name}:{server.getsockname()[1]}"
 
 
-def _bind(host: str, port: int) -> socket.socket:
+def _bind_socket(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     # With the protocol named: asyncio turns Nagle's algorithm off only then, and with it on
     # every second answer waits 40 ms for an acknowledgement.

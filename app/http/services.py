@@ -18,7 +18,7 @@ from app.features.exports.folder import ExportFolder
 from app.features.exports.jobs import resume_exports
 from app.features.groups.large_edit_routes import LargeGroupSolver
 from app.features.groups.preview_routes import PreviewSolver
-from app.features.groups.view_paint import PaintUpdater
+from app.features.groups.view_paint import PaintFollower
 from app.features.imports.jobs import resume_imports
 from app.features.jobs.service import Jobs, Pool
 from app.features.jobs.shared import SharedJobs
@@ -94,9 +94,9 @@ class Services:
     stopping: Stopping = field(default_factory=Stopping)
 
     @property
-    def paint(self) -> PaintUpdater:
+    def paint(self) -> PaintFollower:
         """Reads the paint of edited lines again."""
-        return PaintUpdater(self.frames)
+        return PaintFollower(self.frames)
 
     @staticmethod
     def open(settings: Settings, pool: Pool = nullcontext) -> Services:
@@ -112,7 +112,7 @@ class Services:
             RecordingFrames(settings),
             BallFollower(settings),
             large,
-            PreviewSolver(settings, store, PaintUpdater(frames), large),
+            PreviewSolver(settings, store, PaintFollower(frames), large),
             PredictionReader(settings),
             exports,
             jobs,
@@ -127,7 +127,7 @@ class Services:
     def start(self) -> None:
         """Load the solver's kernels, and take up the work that an earlier run left undone."""
         Thread(target=warm_up, daemon=True).start()
-        Thread(target=self._keep_large_up, name="yield", daemon=True).start()
+        Thread(target=self._refresh_large_datasets, name="yield", daemon=True).start()
         self.frames.warm()
         resume_solving(self.jobs, self.store)
         for kind in (PAINT, PROPOSALS, PICTURES, POSITIONS, RIG, TRACKS):
@@ -150,17 +150,17 @@ class Services:
         """Begin what one process does for all."""
         if not self._solved_leftovers():
             Thread(target=self._solve_leftovers_later, daemon=True).start()
-        Thread(target=self._compare_left, name="agreement", daemon=True).start()
+        Thread(target=self._compare_uncompared_annotations, name="agreement", daemon=True).start()
         self.webhooks.wake()
 
-    def _compare_left(self) -> None:
+    def _compare_uncompared_annotations(self) -> None:
         """Compare annotations that an earlier run was stopped before."""
         try:
             compare_left(self.store, self.paint)
         except Exception:
             log.exception("annotations could not be compared")
 
-    def _keep_large_up(self) -> None:
+    def _refresh_large_datasets(self) -> None:
         self.statistics.refresh_large_datasets()
         self.yields.refresh_large_datasets()
 

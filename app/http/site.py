@@ -62,13 +62,13 @@ def digest(folder: Path) -> str:
         OSError: One of them cannot be read.
     """
     found = hashlib.sha256()
-    for name in (*sorted(_modules(folder)), LOCK):
+    for name in (*sorted(_module_paths(folder)), LOCK):
         found.update(f"{name}\n".encode())
         found.update((folder / name).read_bytes())
     return found.hexdigest()
 
 
-def _modules(folder: Path) -> Iterator[str]:
+def _module_paths(folder: Path) -> Iterator[str]:
     for place, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if name not in APART]
         for name in names:

@@ -53,17 +53,17 @@ def stored_file(settings: Settings, sealed: str, name: str, request: Request) ->
     }
     if etag_matches(request, stored.etag):
         return Response(status_code=304, headers=headers)
-    return _part(store, stored, headers, request)
+    return _partial_response(store, stored, headers, request)
 
 
-def _part(
+def _partial_response(
     store: ObjectStore, stored: Stored, headers: dict[str, str], request: Request
 ) -> Response:
     range_header = request.headers.get("range", "")
     # A range of another content than the one that is there would be a part of nothing.
     if request.headers.get("if-range", stored.etag) != stored.etag:
         range_header = ""
-    span = _span(range_header, stored.size)
+    span = _parse_range(range_header, stored.size)
     if span is None:
         return Response(
             status_code=416, headers={**headers, "Content-Range": f"bytes */{stored.size}"}
@@ -74,14 +74,14 @@ def _part(
     if not whole:
         headers["Content-Range"] = f"bytes {start}-{end - 1}/{stored.size}"
     return StreamingResponse(
-        _chunks(store, stored, start, end),
+        _read_chunks(store, stored, start, end),
         status_code=200 if whole else 206,
         media_type="application/zip",
         headers=headers,
     )
 
 
-def _span(range_header: str, size: int) -> tuple[int, int] | None:
+def _parse_range(range_header: str, size: int) -> tuple[int, int] | None:
     """First byte and the one after the last, of one range; None where it begins after the end."""
     found = _RANGE.fullmatch(range_header.strip())
     if found is None or found[1] == found[2] == "":
@@ -92,7 +92,7 @@ def _span(range_header: str, size: int) -> tuple[int, int] | None:
     return (start, end) if start < end else None
 
 
-def _chunks(store: ObjectStore, stored: Stored, start: int, end: int) -> Iterator[bytes]:
+def _read_chunks(store: ObjectStore, stored: Stored, start: int, end: int) -> Iterator[bytes]:
     """The bytes, as fast as the client takes them; a thread waits for the store, not the loop."""
     for at in range(start, end, CHUNK):
         yield store.read(stored.key, at, min(at + CHUNK, end), stored.etag)

@@ -39,14 +39,14 @@ async def refuse_unknown_parameters(request: Request) -> None:
             is spelled as Python's ``int`` reads it and nobody writes it: ``1_0``, ``+1``, `` 1``.
     """
     route = request.scope["route"]
-    known = _parameters(route)
+    known = _parameter_names(route)
     given = Counter(name for name, _ in request.query_params.multi_items())
     problems = [
         {"type": REPEATED if name in known else UNKNOWN, "loc": ("query", name), "msg": _ONCE}
         for name, times in given.items()
         if name not in known or times > 1
     ]
-    for place, name, spelling in _numbers(route.path_format, route.endpoint):
+    for place, name, spelling in _number_parameters(route.path_format, route.endpoint):
         sent = request.path_params if place == "path" else request.query_params
         if name in sent and not spelling.fullmatch(str(sent[name])):
             problems.append({"type": "value_error", "loc": (place, name), "msg": _NO_NUMBER})
@@ -58,26 +58,26 @@ def sentence_about(request: Request, location: tuple[int | str, ...]) -> str:
     """What to say of a name that nobody knows, at its place in the request."""
     place, name = location[0], str(location[-1])
     route = request.scope["route"]
-    known = _parameters(route) if place == "query" else _fields(route)
+    known = _parameter_names(route) if place == "query" else _body_field_names(route)
     what = "parameter" if place == "query" else "field"
     nearest = get_close_matches(name, known, n=1)
     meant = f"; did you mean {nearest[0]}?" if nearest else ""
     return f"there is no such {what}{meant}"
 
 
-def _parameters(route: APIRoute) -> frozenset[str]:
-    return _read_by(route.path_format, route.endpoint)
+def _parameter_names(route: APIRoute) -> frozenset[str]:
+    return _names_read_by_endpoint(route.path_format, route.endpoint)
 
 
 @lru_cache(maxsize=256)
-def _read_by(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
+def _names_read_by_endpoint(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
     dependant = get_dependant(path=path, call=endpoint)
     found = get_flat_params(dependant)
     return frozenset(item.alias for item in found if isinstance(item.field_info, Query))
 
 
 @lru_cache(maxsize=256)
-def _numbers(
+def _number_parameters(
     path: str, endpoint: Callable[..., Any]
 ) -> tuple[tuple[str, str, re.Pattern[str]], ...]:
     """Place, name and spelling of each parameter of a route that is a number."""
@@ -91,24 +91,24 @@ def _numbers(
     return tuple(found)
 
 
-def _fields(route: APIRoute) -> frozenset[str]:
+def _body_field_names(route: APIRoute) -> frozenset[str]:
     """Every name that stands anywhere in the body of a route."""
     if route.body_field is None:
         return frozenset()
     if route.endpoint not in _FIELDS:
         body: Any = route.body_field.field_info.annotation
         # To make a schema takes milliseconds, in which nobody is answered.
-        _FIELDS[route.endpoint] = frozenset(_names(TypeAdapter(body).json_schema()))
+        _FIELDS[route.endpoint] = frozenset(_property_names(TypeAdapter(body).json_schema()))
     return _FIELDS[route.endpoint]
 
 
-def _names(schema: Any) -> Iterator[str]:
+def _property_names(schema: Any) -> Iterator[str]:
     if isinstance(schema, dict):
         properties = schema.get("properties")
         if isinstance(properties, dict):
             yield from properties
         for part in schema.values():
-            yield from _names(part)
+            yield from _property_names(part)
     elif isinstance(schema, list):
         for part in schema:
-            yield from _names(part)
+            yield from _property_names(part)

@@ -101,7 +101,9 @@ class Team:
 
     def cookie_values(self, token: str | None) -> dict[str, Any]:
         """How the cookie of a token is set; None: how it is taken back."""
-        return self._values(SESSION, token or "", int(LASTS.total_seconds()) if token else 0)
+        return self._cookie_arguments(
+            SESSION, token or "", int(LASTS.total_seconds()) if token else 0
+        )
 
     def asker(self, request: Request) -> str:
         """What a browser alone knows that was asked to sign with a passkey; empty: it was not."""
@@ -109,7 +111,7 @@ class Team:
 
     def asker_values(self, asker: str) -> dict[str, Any]:
         """How it is told that."""
-        return self._values(PASSKEY, asker, int(CHALLENGE_LASTS.total_seconds()))
+        return self._cookie_arguments(PASSKEY, asker, int(CHALLENGE_LASTS.total_seconds()))
 
     def count_try(self, request: Request, name: str | None = None) -> None:
         """Count that somebody asks whether a password is right.
@@ -124,7 +126,9 @@ class Team:
 
     def device_values(self, name: str) -> dict[str, Any]:
         """How a browser is told that it is a known one of a person, who has just logged in there."""
-        values = self._values(DEVICE, self.devices.make(name), int(DEVICE_LASTS.total_seconds()))
+        values = self._cookie_arguments(
+            DEVICE, self.devices.make(name), int(DEVICE_LASTS.total_seconds())
+        )
         return {**values, "key": self._device_cookie(name)}
 
     def _device_cookie(self, name: str) -> str:
@@ -136,7 +140,9 @@ class Team:
 
     def begun_values(self, asker: str | None) -> dict[str, Any]:
         """How it is told that; None: how it is taken back."""
-        return self._values(SIGN_ON, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0)
+        return self._cookie_arguments(
+            SIGN_ON, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0
+        )
 
     def landing(self, request: Request) -> str:
         """The address to which the provider sends people back."""
@@ -166,7 +172,7 @@ class Team:
         """
         url = urlsplit(self.base(request))
         name = url.hostname or ""
-        if name == "localhost" or (url.scheme == "https" and not _is_number(name)):
+        if name == "localhost" or (url.scheme == "https" and not _is_ip_address(name)):
             port = f":{url.port}" if url.port not in (None, 80, 443) else ""
             return PasskeySite(name, f"{url.scheme}://{name}{port}")
         raise ConflictError(
@@ -177,7 +183,7 @@ class Team:
     def _cookie_name(self, name: str) -> str:
         return cookie_name(name, self.secure)
 
-    def _values(self, name: str, value: str, age: int) -> dict[str, Any]:
+    def _cookie_arguments(self, name: str, value: str, age: int) -> dict[str, Any]:
         return cookie_values(name, value, age, self.secure)
 
     def token(self, request: Request) -> str | None:
@@ -215,7 +221,7 @@ class Team:
         return forwarded[-1].rpartition(",")[2].strip()[:60] or peer
 
 
-def _is_number(name: str) -> bool:
+def _is_ip_address(name: str) -> bool:
     """Whether that is an address of numbers, which no passkey is for."""
     try:
         ip_address(name)

@@ -47,15 +47,15 @@ class Tries:
         Raises:
             TooManyTriesError: There were too many of this name, or from this address.
         """
-        self._count(OF_AN_ADDRESS, "address", address)
+        self._count_try(OF_AN_ADDRESS, "address", address)
         if name is None:
             return
         name = name.strip().lower()[:200]
         if device is not None:
-            self._count(OF_A_NAME, "device", name, device)
+            self._count_try(OF_A_NAME, "device", name, device)
             return
-        self._count(OF_A_NAME, "name", name, address)
-        self._count(OF_A_NAME_BY_STRANGERS, "name", name)
+        self._count_try(OF_A_NAME, "name", name, address)
+        self._count_try(OF_A_NAME_BY_STRANGERS, "name", name)
 
     def count_code(self, name: str) -> None:
         """Count a code of a second factor.
@@ -63,7 +63,7 @@ class Tries:
         Raises:
             TooManyTriesError: There were too many of this name.
         """
-        self._count(CODES_OF_A_NAME, "code", name.strip().lower()[:200])
+        self._count_try(CODES_OF_A_NAME, "code", name.strip().lower()[:200])
 
     def count_token(self, address: str) -> None:
         """Count a token that is not valid; those that are count nothing.
@@ -71,7 +71,7 @@ class Tries:
         Raises:
             TooManyTriesError: There were too many from this address.
         """
-        self._count(TOKENS_OF_AN_ADDRESS, "token", address)
+        self._count_try(TOKENS_OF_AN_ADDRESS, "token", address)
 
     def count_challenge(self, address: str) -> None:
         """Count a challenge for a passkey.
@@ -79,9 +79,9 @@ class Tries:
         Raises:
             TooManyTriesError: There were too many from this address.
         """
-        self._count(CHALLENGES_OF_AN_ADDRESS, "challenge", address)
+        self._count_try(CHALLENGES_OF_AN_ADDRESS, "challenge", address)
 
-    def _count(self, limit: RateLimitItem, *key: str) -> None:
+    def _count_try(self, limit: RateLimitItem, *key: str) -> None:
         if self._shared is not None:
             wait = self._shared.hit("/".join(key), limit.amount, limit.get_expiry())
             if wait is not None:

@@ -48,7 +48,7 @@ def serve_with(count: int, part: Part, settings: Settings, listening: socket.soc
     """
     arguments = (part, settings, listening)
     with _stop_event() as stopping, _shared_metrics() as metrics:
-        running = [_start(*arguments) for _ in range(count)]
+        running = [_start_process(*arguments) for _ in range(count)]
         try:
             while not stopping.is_set():
                 wait([process.sentinel for process in running], timeout=POLL_SECONDS)
@@ -58,18 +58,18 @@ def serve_with(count: int, part: Part, settings: Settings, listening: socket.soc
                         # What it has counted stays counted; what it was at is over.
                         mark_process_dead(process.pid, metrics)  # type: ignore[no-untyped-call]
                         stopping.wait(AGAIN_SECONDS)
-                        running[place] = _start(*arguments)
+                        running[place] = _start_process(*arguments)
         finally:
-            _stop(running)
+            _stop_processes(running)
 
 
-def _start(part: Part, settings: Settings, listening: socket.socket) -> BaseProcess:
-    process = get_context("spawn").Process(target=_work, args=(part, settings, listening))
+def _start_process(part: Part, settings: Settings, listening: socket.socket) -> BaseProcess:
+    process = get_context("spawn").Process(target=_run_process, args=(part, settings, listening))
     process.start()
     return process
 
 
-def _stop(running: list[BaseProcess]) -> None:
+def _stop_processes(running: list[BaseProcess]) -> None:
     for process in running:
         process.terminate()
     for process in running:
@@ -109,7 +109,7 @@ def _stop_event() -> Iterator[Event]:
             signal.signal(number, handler)
 
 
-def _work(part: Part, settings: Settings, listening: socket.socket) -> None:
+def _run_process(part: Part, settings: Settings, listening: socket.socket) -> None:
     """One process."""
     Thread(target=_end_with_parent, daemon=True).start()
     try:

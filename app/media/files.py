@@ -30,7 +30,7 @@ JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."
 _ARCHIVES = Archives()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-"""Pixels as stored; ``_upright`` turns them as the header says, for OpenCV and browsers differ."""
+"""Pixels as stored; ``_turn_upright`` turns them as the header says, for OpenCV and browsers differ."""
 _CACHE_VERSION = 2
 """Raised when the picture made of the same file is another one. 2: EXIF orientation is applied, and
 frames of videos are found by their times."""
@@ -60,19 +60,19 @@ def read_frame(media: Media, width: int | None, flipped: bool, settings: Setting
     """
     _require_contained(media, settings)
     if media.frame is None and width is None and not flipped:
-        data, name = _source(media, settings), frame_name(media)
+        data, name = _read_source(media, settings), frame_name(media)
         if read_header(data, name).orientation == 1:
             # They are sent once they were seen to decode.
-            _pixels(data, settings, name)
+            _decode_pixels(data, settings, name)
             return data
     found = cached_frame(media, width, flipped, settings)
     if found is not None:
         return found
-    picture = _decode(media, settings)
+    picture = _decode_frame(media, settings)
     if flipped:
         picture = cv2.flip(picture, 1)
-    data = _encode(_narrowed(picture, width))
-    _keep(_place(media, width, flipped, settings), data)
+    data = _encode_jpeg(_shrink_to_width(picture, width))
+    _write_to_cache(_cache_path(media, width, flipped, settings), data)
     return data
 
 
@@ -97,16 +97,16 @@ def read_pixels(
         picture = _video_frame(media, settings)
         digest = digest_of(np.ascontiguousarray(picture).tobytes())
     else:
-        data, name = _source(media, settings), frame_name(media)
+        data, name = _read_source(media, settings), frame_name(media)
         digest = digest_of(data)
         if read_header(data, name).orientation != 1:
             # What was once read of the stored pixels, under the plain digest, is read again.
             digest = digest_of(f"{digest} upright".encode())
         if digest != known:
-            picture = _pixels(data, settings, name)
+            picture = _decode_pixels(data, settings, name)
     if digest == known:
         return digest, None
-    return digest, _as_annotated(picture, flipped)
+    return digest, _to_annotated_orientation(picture, flipped)
 
 
 def cached_frame(
@@ -118,7 +118,7 @@ def cached_frame(
         NotFoundError: The frame's file is not there.
     """
     with contextlib.suppress(OSError):
-        return _place(media, width, flipped, settings).read_bytes()
+        return _cache_path(media, width, flipped, settings).read_bytes()
     return None
 
 
@@ -132,7 +132,7 @@ def frame_stamp(media: Media) -> str:
     """
     if is_stored(media):
         return repr((media.path, media.member))
-    status = _stat(Path(media.path))
+    status = _require_regular_file(Path(media.path))
     place = (media.path, media.member, media.frame)
     return repr((*place, status.st_ino, status.st_mtime_ns, status.st_size))
 
@@ -158,7 +158,7 @@ def picture_header(media: Media) -> ImageHeader | None:
             return _video_header(Path(media.path))
         for count in _HEADS:
             with contextlib.suppress(ImageError):
-                return read_header(_head(media, count))
+                return read_header(_read_head(media, count))
     except (NotFoundError, ImageError, StorageError):
         pass
     return None
@@ -204,7 +204,7 @@ def video_length(media: Media) -> int:
         ImageError: It is no video that can be read.
     """
     path = Path(media.path)
-    _stat(path)
+    _require_regular_file(path)
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
@@ -237,7 +237,7 @@ def media_facts(media: Media) -> dict[str, int]:
     if is_stored(media):
         return {}
     try:
-        status = _stat(Path(media.path))
+        status = _require_regular_file(Path(media.path))
         if media.member is None:
             return {"bytes": status.st_size}
         size, crc = _ARCHIVES.facts(Path(media.path), media.member)
@@ -253,21 +253,21 @@ def has_member(media: Media, member: str) -> bool:
         NotFoundError, ImageError, StorageError: The archive is not there, damaged or unreadable.
     """
     path = Path(media.path)
-    _stat(path)
+    _require_regular_file(path)
     return _ARCHIVES.has(path, member)
 
 
-def _decode(media: Media, settings: Settings) -> Any:
+def _decode_frame(media: Media, settings: Settings) -> Any:
     if media.frame is not None:
         return _video_frame(media, settings)
-    return _pixels(_source(media, settings), settings, frame_name(media))
+    return _decode_pixels(_read_source(media, settings), settings, frame_name(media))
 
 
-def _source(media: Media, settings: Settings) -> bytes:
+def _read_source(media: Media, settings: Settings) -> bytes:
     if is_stored(media):
         return read_object(media, settings)
     path = Path(media.path)
-    size = _stat(path).st_size
+    size = _require_regular_file(path).st_size
     if media.member is not None:
         return _ARCHIVES.read(path, media.member, settings.max_file_bytes)
     if size > settings.max_file_bytes:
@@ -275,9 +275,9 @@ def _source(media: Media, settings: Settings) -> bytes:
     return _read_file(path, size)
 
 
-def _head(media: Media, count: int) -> bytes:
+def _read_head(media: Media, count: int) -> bytes:
     path = Path(media.path)
-    _stat(path)
+    _require_regular_file(path)
     if media.member is not None:
         return _ARCHIVES.head(path, media.member, count)
     return _read_file(path, count)
@@ -305,10 +305,10 @@ def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray
         TooLargeError: It is larger than the limits, in bytes, declared pixels or scans.
     """
     _require_contained(media, settings)
-    return _as_annotated(_decode(media, settings), flipped)
+    return _to_annotated_orientation(_decode_frame(media, settings), flipped)
 
 
-def _as_annotated(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
+def _to_annotated_orientation(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
     """Red green blue, and turned right where it is mirrored."""
     return np.ascontiguousarray((cv2.flip(picture, 1) if flipped else picture)[:, :, ::-1])
 
@@ -325,10 +325,10 @@ def decode_picture(data: bytes, settings: Settings, name: str) -> npt.NDArray[np
         ImageError: It is no image of these kinds, or damaged.
         TooLargeError: It declares more pixels than the limits allow, or has too many scans.
     """
-    return np.ascontiguousarray(_pixels(data, settings, name)[:, :, ::-1])
+    return np.ascontiguousarray(_decode_pixels(data, settings, name)[:, :, ::-1])
 
 
-def _pixels(data: bytes, settings: Settings, name: str) -> Any:
+def _decode_pixels(data: bytes, settings: Settings, name: str) -> Any:
     header = read_header(data, name)
     check_size(header, settings, name)
     if header.kind == JPEG:
@@ -342,12 +342,12 @@ def _pixels(data: bytes, settings: Settings, name: str) -> Any:
     if picture is None:
         _require_memory(header)
         raise ImageError(f"{name} is damaged")
-    picture = _upright(picture, header.orientation)
-    _require_declared(picture, header, name)
+    picture = _turn_upright(picture, header.orientation)
+    _require_declared_size(picture, header, name)
     return picture
 
 
-def _upright(picture: Any, orientation: int) -> Any:
+def _turn_upright(picture: Any, orientation: int) -> Any:
     """Stored pixels as people see them."""
     if orientation in SIDEWAYS:
         picture = cv2.transpose(picture)
@@ -367,7 +367,7 @@ def _require_memory(header: ImageHeader) -> None:
     np.empty((header.height, header.width, _DECODED_BYTES), np.uint8)
 
 
-def _require_declared(picture: Any, header: ImageHeader, name: str) -> None:
+def _require_declared_size(picture: Any, header: ImageHeader, name: str) -> None:
     height, width = picture.shape[:2]
     if (width, height) != (header.width, header.height):
         raise ImageError(f"{name} is not of the size that its header declares")
@@ -390,7 +390,7 @@ def _video_frame(media: Media, settings: Settings) -> Any:
 
 
 def _video_header(path: Path) -> ImageHeader:
-    _stat(path)
+    _require_regular_file(path)
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is no video that can be read")
@@ -401,7 +401,7 @@ def _video_header(path: Path) -> ImageHeader:
         )
 
 
-def _narrowed(picture: Any, width: int | None) -> Any:
+def _shrink_to_width(picture: Any, width: int | None) -> Any:
     height, present = picture.shape[:2]
     if width is None or width >= present:
         return picture
@@ -409,21 +409,21 @@ def _narrowed(picture: Any, width: int | None) -> Any:
     return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
-def _encode(picture: Any) -> bytes:
+def _encode_jpeg(picture: Any) -> bytes:
     done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     if not done:
         raise ImageError("the image cannot be encoded as JPEG")
     return bytes(data)
 
 
-def _place(media: Media, width: int | None, flipped: bool, settings: Settings) -> Path:
+def _cache_path(media: Media, width: int | None, flipped: bool, settings: Settings) -> Path:
     """Where what is made of a frame is kept."""
     key = repr((frame_stamp(media), width, flipped, JPEG_QUALITY, _CACHE_VERSION))
     name = hashlib.sha256(key.encode()).hexdigest()
     return settings.cache / "frames" / name[:2] / f"{name[2:34]}.jpg"
 
 
-def _stat(path: Path) -> os.stat_result:
+def _require_regular_file(path: Path) -> os.stat_result:
     try:
         status = path.lstat()
     except OSError as error:
@@ -449,7 +449,7 @@ def _require_contained(media: Media, settings: Settings) -> None:
             )
 
 
-def _keep(place: Path, data: bytes) -> None:
+def _write_to_cache(place: Path, data: bytes) -> None:
     """Write into the cache, whole or not at all; a full disk costs the cache and no picture."""
     with contextlib.suppress(OSError):
         place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -118,7 +118,7 @@ class Frames:
             NotFoundError: The file is not there.
             TooLargeError: It was tried before, and went beyond the limits.
         """
-        self._require_untried(media)
+        self._require_not_refused(media)
         data = cached_frame(media, width, flipped, self._settings)
         return None if data is None else SentPicture.of(JPEG, data)
 
@@ -131,7 +131,7 @@ class Frames:
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._fetch(media, bounded=True)
+        return self._submit_fetch(media, bounded=True)
 
     def ask(self, media: Media, width: int | None, flipped: bool) -> PoolTask:
         """Have a picture made; its future has it, or the errors of ``read_frame``.
@@ -139,17 +139,19 @@ class Frames:
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._submit(media, width, flipped, bounded=True)
+        return self._submit_picture(media, width, flipped, bounded=True)
 
     def read(self, media: Media, width: int | None, flipped: bool) -> SentPicture:
         """A picture, waited for however many others wait: for background work."""
         found = self.cached(media, width, flipped)
         if found is not None:
             return found
-        fetching = self._fetch(media, bounded=False)
+        fetching = self._submit_fetch(media, bounded=False)
         if fetching is not None:
             fetching.future.result()
-        made: SentPicture = self._submit(media, width, flipped, bounded=False).future.result()
+        made: SentPicture = self._submit_picture(
+            media, width, flipped, bounded=False
+        ).future.result()
         return made
 
     def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
@@ -184,7 +186,9 @@ class Frames:
         def explain(error: WorkerEnded) -> ReviewError:
             return refused_picture(frame_name(media), error)
 
-        return self._read(media, work, media, flipped, self._settings, *arguments, explain=explain)
+        return self._submit_read(
+            media, work, media, flipped, self._settings, *arguments, explain=explain
+        )
 
     def ask_to(self, media: Media | None, work: Callable[..., Any], *arguments: Any) -> PoolTask:
         """Have a function called that reads a frame itself, ``work(*arguments, settings)``.
@@ -199,9 +203,9 @@ class Frames:
         Raises:
             OverloadedError: Too many wait.
         """
-        return self._read(media, work, *arguments, self._settings)
+        return self._submit_read(media, work, *arguments, self._settings)
 
-    def _read(
+    def _submit_read(
         self,
         media: Media | None,
         work: Callable[..., Any],
@@ -242,7 +246,7 @@ class Frames:
         indexing.future.add_done_callback(go_on)
         return waiting
 
-    def _fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
+    def _submit_fetch(self, media: Media, *, bounded: bool) -> PoolTask | None:
         if media.frame is not None:
             return self._videos.ask(media, bounded=bounded)
         if not is_stored(media) or is_kept(media, self._settings):
@@ -255,11 +259,13 @@ class Frames:
             fetch_frame, media, self._settings, explain=explain, bounded=bounded
         )
 
-    def _submit(self, media: Media, width: int | None, flipped: bool, *, bounded: bool) -> PoolTask:
+    def _submit_picture(
+        self, media: Media, width: int | None, flipped: bool, *, bounded: bool
+    ) -> PoolTask:
         def explain(error: WorkerEnded) -> ReviewError:
             refusal = refused_picture(frame_name(media), error)
             if error.reason in REMEMBERED_SECONDS:
-                self._remember(media, refusal, REMEMBERED_SECONDS[error.reason])
+                self._remember_refusal(media, refusal, REMEMBERED_SECONDS[error.reason])
             return refusal
 
         work = self._videos.with_index(media, make_picture, media, width, flipped, self._settings)
@@ -267,18 +273,18 @@ class Frames:
             *work,
             explain=explain,
             # Other widths of it may have waited while it was tried.
-            begin=partial(self._require_untried, media),
+            begin=partial(self._require_not_refused, media),
             bounded=bounded,
         )
 
-    def _require_untried(self, media: Media) -> None:
+    def _require_not_refused(self, media: Media) -> None:
         """Raise the refusal of a frame that went beyond the limits, while it is remembered."""
         with self._lock:
             refusal, until = self._refused.get(frame_stamp(media), (None, 0.0))
         if refusal is not None and monotonic() < until:
             raise refusal
 
-    def _remember(self, media: Media, refusal: ReviewError, seconds: float) -> None:
+    def _remember_refusal(self, media: Media, refusal: ReviewError, seconds: float) -> None:
         with self._lock:
             self._refused[frame_stamp(media)] = (refusal, monotonic() + seconds)
             while len(self._refused) > REMEMBERED:
@@ -317,7 +323,7 @@ class VideoIndexer:
                     index_video, media, self._settings, explain=explain, bounded=bounded
                 )
                 self._running[media.path] = running
-        running.future.add_done_callback(partial(self._done, media.path))
+        running.future.add_done_callback(partial(self._forget_finished, media.path))
         # Who waits may leave; the index is made all the same, for it takes long and is needed again.
         waiting = PoolTask(explain)
         running.future.add_done_callback(partial(_forward_result, waiting.future))
@@ -368,7 +374,7 @@ class VideoIndexer:
         stamp, _ = self._unkept.get(media.path, ("", None))
         return stamp == video_stamp(media)
 
-    def _done(self, path: str, done: Future[Any]) -> None:
+    def _forget_finished(self, path: str, done: Future[Any]) -> None:
         if not done.cancelled() and done.exception() is None:
             stamp, unkept = done.result()
             if unkept is not None:

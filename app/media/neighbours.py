@@ -28,28 +28,28 @@ def neighbours(media: Media, group: str, static: bool, settings: Settings) -> di
         return {}
     try:
         if media.frame is not None:
-            return dict(_of_video(media, media.frame, len(video_times(media, settings))))
-        return dict(_of_files(media, group, static))
+            return dict(_neighbours_in_video(media, media.frame, len(video_times(media, settings))))
+        return dict(_neighbours_among_files(media, group, static))
     except (NotFoundError, ImageError, StorageError, TooLargeError):
         return {}
 
 
-def _offsets() -> Iterator[int]:
+def _neighbour_offsets() -> Iterator[int]:
     return (offset for offset in range(-FARTHEST, FARTHEST + 1) if offset)
 
 
-def _of_video(media: Media, frame: int, count: int) -> Iterator[tuple[int, Media]]:
-    for offset in _offsets():
+def _neighbours_in_video(media: Media, frame: int, count: int) -> Iterator[tuple[int, Media]]:
+    for offset in _neighbour_offsets():
         if 0 <= frame + offset < count:
             yield offset, replace(media, frame=frame + offset)
 
 
-def _of_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:
+def _neighbours_among_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:
     found = numbered(media, group, static)
     if found is None:
         return
     name, head, digits = found
-    for offset in _offsets():
+    for offset in _neighbour_offsets():
         number = int(digits) + offset
         # 100 may follow 099 or 99.
         for text in dict.fromkeys((f"{number:0{len(digits)}d}", str(number))):

@@ -60,7 +60,7 @@ class Archives:
 
     def head(self, path: _Place, member: str, count: int) -> bytes:
         """The first bytes of a member, so many at most; raises NotFoundError and ImageError."""
-        archive, name = self._find(path, member)
+        archive, name = self._find_member(path, member)
         try:
             # ZipFile locks its own file.
             with archive.open(name) as file:
@@ -74,7 +74,7 @@ class Archives:
 
     def facts(self, path: Path, member: str) -> tuple[int, int]:
         """Size and CRC-32 of a member, as the archive's directory says."""
-        archive, name = self._find(path, member)
+        archive, name = self._find_member(path, member)
         try:
             info = archive.getinfo(name)
         except KeyError as error:
@@ -83,7 +83,7 @@ class Archives:
 
     def has(self, path: Path, member: str) -> bool:
         """Whether the archive's directory lists a member of that name."""
-        archive, name = self._find(path, member)
+        archive, name = self._find_member(path, member)
         return name in archive.NameToInfo
 
     def close(self) -> None:
@@ -92,17 +92,17 @@ class Archives:
             while self._open:
                 self._open.popitem()[1].close()
 
-    def _find(self, path: _Place, member: str) -> tuple[zipfile.ZipFile, str]:
+    def _find_member(self, path: _Place, member: str) -> tuple[zipfile.ZipFile, str]:
         """The open archive that a member lies in, and its name there."""
-        key = _key(path)
-        archive = self._get(key, lambda: _open(path))
+        key = _archive_key(path)
+        archive = self._get_archive(key, lambda: _open_archive(path))
         if member in archive.NameToInfo or (nested := nested_name(archive, member)) is None:
             return archive, member
         outer, inner = nested
         info = archive.getinfo(outer)
-        return self._get((*key[:3], outer), lambda: _open_inside(path, info)), inner
+        return self._get_archive((*key[:3], outer), lambda: _open_nested_archive(path, info)), inner
 
-    def _get(self, key: _Key, open_it: Callable[[], zipfile.ZipFile]) -> zipfile.ZipFile:
+    def _get_archive(self, key: _Key, open_it: Callable[[], zipfile.ZipFile]) -> zipfile.ZipFile:
         with self._lock:
             if key not in self._open:
                 self._open[key] = open_it()
@@ -114,7 +114,7 @@ class Archives:
             return self._open[key]
 
 
-def _open(path: _Place) -> zipfile.ZipFile:
+def _open_archive(path: _Place) -> zipfile.ZipFile:
     try:
         return open_zip(path)
     except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
@@ -123,11 +123,11 @@ def _open(path: _Place) -> zipfile.ZipFile:
         raise StorageError(f"{path.name} cannot be read") from error
 
 
-def _open_inside(path: _Place, info: zipfile.ZipInfo) -> zipfile.ZipFile:
+def _open_nested_archive(path: _Place, info: zipfile.ZipInfo) -> zipfile.ZipFile:
     shown = f"{path.name}/{info.filename}"
     try:
         # Opened anew: one that is kept open may be closed for others' sake meanwhile.
-        with _open(path) as archive:
+        with _open_archive(path) as archive:
             return open_nested(archive, path, info)
     except OSError as error:
         raise StorageError(f"{shown} cannot be read") from error
@@ -135,7 +135,7 @@ def _open_inside(path: _Place, info: zipfile.ZipInfo) -> zipfile.ZipFile:
         raise ImageError(f"{shown} cannot be read: {error}") from error
 
 
-def _key(path: _Place) -> _Key:
+def _archive_key(path: _Place) -> _Key:
     if isinstance(path, StoredPath):
         return path.sealed(), 0, path.size, ""
     try:
@@ -188,24 +188,24 @@ def read_object(media: Media, settings: Settings) -> bytes:
     cache, name = _cache(settings), _name(media)
     data = cache.get(name)
     if data is None:
-        data = _fetched(media, settings)
+        data = _fetch_object(media, settings)
         cache.put(name, data)
     return data
 
 
-def _fetched(media: Media, settings: Settings) -> bytes:
+def _fetch_object(media: Media, settings: Settings) -> bytes:
     address, kind, value = unseal(media.path)
     store_name, key = split_address(address)
     store = open_store(settings, store_name)
     etag = f'"{value}"' if kind == "etag" else ""
     try:
-        data = _read(store, key, media.member, etag, settings)
+        data = _read_object_or_member(store, key, media.member, etag, settings)
     except ChangedObjectError:
         if etag:
             raise
         # The zip is another than that whose list is known here; its member may be the same.
-        _zip.cache_clear()
-        data = _read(store, key, media.member, etag, settings)
+        _stored_zip.cache_clear()
+        data = _read_object_or_member(store, key, media.member, etag, settings)
     if kind == "sha256" and hashlib.sha256(data).hexdigest() != value:
         raise ChangedObjectError(
             f"{_shown(address, media)} is not the frame that was meant: its SHA-256 is another",
@@ -214,11 +214,13 @@ def _fetched(media: Media, settings: Settings) -> bytes:
     return data
 
 
-def _read(store: ObjectStore, key: str, member: str | None, etag: str, settings: Settings) -> bytes:
+def _read_object_or_member(
+    store: ObjectStore, key: str, member: str | None, etag: str, settings: Settings
+) -> bytes:
     limit = settings.max_file_bytes
     if member is None:
         return store.read_whole(key, limit, etag)[0]
-    path = _zip(store, key, etag)
+    path = _stored_zip(store, key, etag)
     if etag and path.stored is not None and path.stored.etag != etag:
         raise ChangedObjectError(
             f"{path} was changed in its store since it was imported", hint=CHANGED_HINT
@@ -227,7 +229,7 @@ def _read(store: ObjectStore, key: str, member: str | None, etag: str, settings:
 
 
 @lru_cache(maxsize=256)
-def _zip(store: ObjectStore, key: str, _etag: str) -> StoredPath:
+def _stored_zip(store: ObjectStore, key: str, _etag: str) -> StoredPath:
     """A zip in a store, as it was when it was first asked for here."""
     return StoredPath(store.name, store.settings, key, store.head(key))
 

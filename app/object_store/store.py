@@ -66,7 +66,7 @@ class ObjectStore:
 
     def __init__(self, name: str, settings: StoreSettings, keys: tuple[str, ...] | None):
         self.name, self.settings = name, settings
-        self._engine = _engine()
+        self._engine = _load_library()
         self._store = self._connect(keys, settings.seconds)
         self._slow = self._connect(keys, PART_SECONDS)
 
@@ -113,7 +113,7 @@ class ObjectStore:
             StorageError: The store cannot be asked.
         """
         with self._translated(key):
-            return _stored(self._engine.head(self._store, key))
+            return _stored_from_metadata(self._engine.head(self._store, key))
 
     def read(self, key: str, start: int, end: int, etag: str) -> bytes:
         """Some bytes of an object, as long as it is the one that was meant.
@@ -143,7 +143,7 @@ class ObjectStore:
         """
         with self._translated(key):
             answer = self._engine.get(self._store, key, options={"if_match": etag} if etag else {})
-            found = _stored(answer.meta)
+            found = _stored_from_metadata(answer.meta)
             if found.size > limit:
                 raise TooLargeError(f"{self.address(key)} is larger than {limit:,} bytes")
             data = bytes(answer.bytes())
@@ -159,7 +159,7 @@ class ObjectStore:
         """
         with self._translated(folder):
             for some in self._engine.list(self._store, folder or None, chunk_size=LISTED):
-                yield from map(_stored, some)
+                yield from map(_stored_from_metadata, some)
 
     def folder(self, folder: str) -> tuple[list[str], list[Stored]]:
         """Names of folders in a folder, and the objects in it.
@@ -170,7 +170,7 @@ class ObjectStore:
         with self._translated(folder):
             found = self._engine.list_with_delimiter(self._store, folder or None)
         names = [prefix.rsplit("/", 1)[-1] for prefix in found["common_prefixes"]]
-        return names, [_stored(item) for item in found["objects"]]
+        return names, [_stored_from_metadata(item) for item in found["objects"]]
 
     def put(self, key: str, content: bytes) -> None:
         """Write an object, whole or not at all.
@@ -203,7 +203,7 @@ class ObjectStore:
                 max_concurrency=PARTS_AT_ONCE,
             )
         try:
-            yield cast(IO[bytes], _Written(file, lambda: self._translated(key)))
+            yield cast(IO[bytes], _ObjectWriter(file, lambda: self._translated(key)))
         except BaseException as error:
             # The parts that are there already are taken back, if the store can be asked.
             with suppress(OSError, self._engine.exceptions.BaseError):
@@ -226,7 +226,7 @@ class ObjectStore:
         return translated_errors(self.name, self.address(key), self._engine.exceptions)
 
 
-class _Written:
+class _ObjectWriter:
     """What is written to an object; nothing is sent but parts of their full size, and the last one."""
 
     def __init__(self, file: Any, translated: Callable[[], AbstractContextManager[None]]):
@@ -241,11 +241,11 @@ class _Written:
         """Nothing: a part that is too small would be refused."""
 
 
-def _stored(meta: Any) -> Stored:
+def _stored_from_metadata(meta: Any) -> Stored:
     return Stored(meta["path"], meta["size"], meta["e_tag"] or "")
 
 
-def _engine() -> Any:
+def _load_library() -> Any:
     """The library that speaks to stores; who has none configured needs it not."""
     try:
         for part in ("obstore.store", "obstore.exceptions"):
@@ -279,11 +279,13 @@ def open_configured(name: str, settings: StoreSettings) -> ObjectStore:
     Raises:
         StorageError: Its file of keys cannot be used, or the library is missing.
     """
-    return _open(name, settings, read_keys(settings))
+    return _open_with_keys(name, settings, read_keys(settings))
 
 
 @lru_cache(maxsize=64)
-def _open(name: str, settings: StoreSettings, keys: tuple[str, ...] | None) -> ObjectStore:
+def _open_with_keys(
+    name: str, settings: StoreSettings, keys: tuple[str, ...] | None
+) -> ObjectStore:
     return ObjectStore(name, settings, keys)
 
 
@@ -298,12 +300,12 @@ def read_keys(settings: StoreSettings) -> tuple[str, ...] | None:
     if settings.anonymous:
         return None
     if settings.key_file is not None:
-        return _keys_of_file(settings)
+        return _read_key_file(settings)
     given = (settings.key, settings.secret, settings.token)
     return tuple("" if value is None else value.get_secret_value() for value in given)
 
 
-def _keys_of_file(settings: StoreSettings) -> tuple[str, ...]:
+def _read_key_file(settings: StoreSettings) -> tuple[str, ...]:
     path, parser = settings.key_file, configparser.ConfigParser(interpolation=None)
     assert path is not None
     try:
@@ -348,12 +350,12 @@ def translated_errors(store: str, address: str, wrong: Any) -> Iterator[None]:
             hint="Import it again to take the new one, or put the old one back.",
         ) from error
     except (wrong.BaseError, OSError) as error:
-        raise _refusal(store, error, wrong) from error
+        raise _store_error(store, error, wrong) from error
     except ValueError as error:
         raise InputError(f"{address} cannot be the address of an object") from error
 
 
-def _refusal(name: str, error: Exception, wrong: Any) -> StorageError:
+def _store_error(name: str, error: Exception, wrong: Any) -> StorageError:
     """The error of a store that cannot be asked."""
     found = _CODE.search(str(error))
     code = f" ({found[1]})" if found else ""

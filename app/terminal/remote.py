@@ -157,16 +157,16 @@ def freeze_values(
     if dry_run:
         return dict(client.post(place, {**request, "dry_run": True}))
     job = follow(client, client.post(place, request), progress)
-    return _version(client.get(f"versions/{job['result']['version']}"))
+    return _version_values(client.get(f"versions/{job['result']['version']}"))
 
 
 def version_values(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``versions`` has them."""
     items = client.get(f"datasets/{part(dataset)}/versions")["items"]
-    return [_version(item) for item in items]
+    return [_version_values(item) for item in items]
 
 
-def _version(item: Mapping[str, Any]) -> dict[str, Any]:
+def _version_values(item: Mapping[str, Any]) -> dict[str, Any]:
     policy = {"policy": item["policy"]["name"], "policy_hash": item["policy"]["hash"]}
     return some({**item, **policy, "created": time_text(item["created"])}, *VERSION)
 
@@ -174,22 +174,22 @@ def _version(item: Mapping[str, Any]) -> dict[str, Any]:
 def batch_values(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``batch list`` has them."""
     items = client.get(f"datasets/{part(dataset)}/batches")["items"]
-    return [_batch(item) for item in items]
+    return [_batch_values(item) for item in items]
 
 
 def give_values(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
     """Let the server give a batch out; as ``batch give`` has it."""
-    return _batch(client.post(f"datasets/{part(dataset)}/batches", dict(body)))
+    return _batch_values(client.post(f"datasets/{part(dataset)}/batches", dict(body)))
 
 
 def one_batch(client: Client, number: int) -> dict[str, Any]:
     """As ``batch show`` has it."""
-    return _batch(client.get(f"batches/{number}"))
+    return _batch_values(client.get(f"batches/{number}"))
 
 
 def close_batch(client: Client, number: int) -> dict[str, Any]:
     """Let the server give nothing more out of a batch."""
-    return _batch(client.patch(f"batches/{number}", {"state": "closed"}))
+    return _batch_values(client.patch(f"batches/{number}", {"state": "closed"}))
 
 
 def choose_gold(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -199,10 +199,10 @@ def choose_gold(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[s
 
 def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str, Any]:
     """Let the server mix other many gold groups into a batch."""
-    return _batch(client.patch(f"batches/{number}", {"gold_every": gold_every}))
+    return _batch_values(client.patch(f"batches/{number}", {"gold_every": gold_every}))
 
 
-def _batch(item: Mapping[str, Any]) -> dict[str, Any]:
+def _batch_values(item: Mapping[str, Any]) -> dict[str, Any]:
     last = None if item["last"] is None else time_text(item["last"])
     own = {"query": item["q"], "created": time_text(item["created"]), "last": last}
     return some({**item, **own}, *BATCH)

@@ -75,11 +75,11 @@ def import_values(
         report, problem = error.job["result"], error.job["problem"]
         if not report or not problem:
             raise
-        return _report(report), (problem["detail"], problem["hint"])
-    return _report(report), None
+        return _import_report_values(report), (problem["detail"], problem["hint"])
+    return _import_report_values(report), None
 
 
-def _report(result: Mapping[str, Any]) -> dict[str, Any]:
+def _import_report_values(result: Mapping[str, Any]) -> dict[str, Any]:
     """As ``import`` has it; the server keeps names in their alphabetical order."""
     skipped = [some(item, "file", "record", "field", "problem") for item in result["skipped"]]
     return {**some(result, *IMPORT), "skipped": skipped}
@@ -94,7 +94,7 @@ def export_values(
     """
     if isinstance(out, str):
         job = follow(client, client.post("exports", {**request, "to": out}), progress)
-        report = _export_report(client.get(f"exports/{job['id']}"))
+        report = _export_report_values(client.get(f"exports/{job['id']}"))
         return {"out": out, "format": request["format"], **report}
     from app.formats.output import output_tree
 
@@ -104,10 +104,10 @@ def export_values(
         found = client.get(f"exports/{job['id']}")
         content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
         unpack(content, folder)
-    return {"out": str(out), "format": request["format"], **_export_report(found)}
+    return {"out": str(out), "format": request["format"], **_export_report_values(found)}
 
 
-def _export_report(found: Mapping[str, Any]) -> dict[str, Any]:
+def _export_report_values(found: Mapping[str, Any]) -> dict[str, Any]:
     return some(found, "counts", "left_out", "missing_images")
 
 
@@ -124,7 +124,9 @@ def evaluate(
     """
     named = {"predictions": request.predictions, "careful": request.careful}
     sets = {
-        name: _set(client, dataset, source) for name, source in named.items() if not source.is_empty
+        name: _prediction_set_values(client, dataset, source)
+        for name, source in named.items()
+        if not source.is_empty
     }
     found_sets = {name: found["id"] for name, found in sets.items()}
     body = {**vars(request.request), **found_sets, "version": request.version}
@@ -159,7 +161,7 @@ def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> No
     write_parts(out, values, client.pages(f"{place}/frames"), fetch)
 
 
-def _set(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any]:
+def _prediction_set_values(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any]:
     """The set of a source: of its files, which are read once, or of its name."""
     place = f"datasets/{part(dataset)}/predictions"
     path = source.path

@@ -136,7 +136,7 @@ def connected(server: ServerPlace) -> Iterator[Client]:
             _require_team(server, client)
             yield client
     except TouchlineError as error:
-        raise _explained(server, error) from error
+        raise _command_error(server, error) from error
 
 
 def _require_version(server: ServerPlace, client: Client) -> None:
@@ -172,7 +172,7 @@ def _require_team(server: ServerPlace, client: Client) -> None:
         )
 
 
-def _explained(server: ServerPlace, error: Exception) -> ReviewError:
+def _command_error(server: ServerPlace, error: Exception) -> ReviewError:
     """The same as an error of a command: what the server said, or why it said nothing."""
     message, hint = getattr(error, "message", str(error)), getattr(error, "hint", None)
     said_nothing = getattr(error, "status", None) == 0

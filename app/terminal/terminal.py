@@ -54,7 +54,7 @@ def show_progress(what: str) -> Iterator[ReportProgress]:
     )
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield _telling_lines(what)
+        yield _print_progress_lines(what)
         return
     with rich.Progress(*columns, console=console) as bar:
         task = bar.add_task(what, total=None)
@@ -70,7 +70,7 @@ def show_progress(what: str) -> Iterator[ReportProgress]:
         yield progress
 
 
-def _telling_lines(what: str) -> ReportProgress:
+def _print_progress_lines(what: str) -> ReportProgress:
     """Progress in plain lines; what is done within seconds tells none."""
     last = time.monotonic()
 
@@ -107,13 +107,13 @@ def held_interrupts() -> Iterator[Callable[[], bool]]:
 
 def allow_any_text() -> None:
     """Let no letter be too much for the terminal's encoding: it is spelt as JSON spells it."""
-    codecs.register_error("spelt", _spelt)
+    codecs.register_error("spelt", _escape_unencodable)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="spelt")
 
 
-def _spelt(error: UnicodeError) -> tuple[str, int]:
+def _escape_unencodable(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     text = error.object[error.start : error.end]
@@ -144,7 +144,7 @@ def print_values(values: Mapping[str, Any], as_json: bool) -> None:
         return
     width = max((len(name) for name in values), default=0)
     for name, value in values.items():
-        say(f"{name.replace('_', ' '):{width}}  {_text(value)}")
+        say(f"{name.replace('_', ' '):{width}}  {_value_text(value)}")
 
 
 def print_rows(
@@ -191,13 +191,13 @@ def print_export(values: Mapping[str, Any], as_json: bool) -> None:
         say(f"  and {len(missing) - MAX_MISSING} more; --json names them all")
 
 
-def _text(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float) and math.isfinite(value):
         return f"{value:.4g}"
     if isinstance(value, dict):
-        return ", ".join(f"{name} {_text(item)}" for name, item in value.items()) or "none"
+        return ", ".join(f"{name} {_value_text(item)}" for name, item in value.items()) or "none"
     if isinstance(value, (list, tuple)):
         return str(len(value))
     return "none" if finite(value) is None else str(value)

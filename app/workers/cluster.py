@@ -181,11 +181,11 @@ class Cluster(Executor):
 
     def __init__(self, place: SchedulerPlace):
         self._place, self._build = place, build()
-        self._under_way: dict[Future[Any], _Task] = {}
+        self._under_way: dict[Future[Any], _SentTask] = {}
         self._lock = threading.Lock()
         self._ended, self._lost = threading.Event(), threading.Event()
-        self._client, self._workers = self._joined()
-        self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
+        self._client, self._workers = self._join_scheduler()
+        self._watcher = threading.Thread(target=self._watch_tasks, name="cluster", daemon=True)
         self._watcher.start()
 
     @property
@@ -199,8 +199,8 @@ class Cluster(Executor):
             raise TypeError("named arguments cannot be sent to a worker")
         future: Future[R] = Future()
         with self._lock:
-            self._under_way[future] = task = _Task(work, arguments)
-            self._send(future, task)
+            self._under_way[future] = task = _SentTask(work, arguments)
+            self._send_task(future, task)
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -208,9 +208,9 @@ class Cluster(Executor):
         self._ended.set()
         self._lost.set()
         self._watcher.join()
-        _leave(self._client)
+        _close_client(self._client)
 
-    def _send(self, future: Future[Any], task: _Task) -> None:
+    def _send_task(self, future: Future[Any], task: _SentTask) -> None:
         """Send a task with the client of now; under the lock."""
         try:
             sent = self._client.submit(
@@ -221,9 +221,9 @@ class Cluster(Executor):
             self._lost.set()
             return
         task.sent = sent
-        sent.add_done_callback(lambda done: self._arrived(future, done))
+        sent.add_done_callback(lambda done: self._pass_on_result(future, done))
 
-    def _arrived(self, future: Future[Any], done: Any) -> None:
+    def _pass_on_result(self, future: Future[Any], done: Any) -> None:
         """Pass on what came of a task; on a thread of Dask's."""
         with self._lock:
             task = self._under_way.get(future)
@@ -243,11 +243,11 @@ class Cluster(Executor):
                 self._lost.set()
             else:
                 # Also a result that cannot be read, which would be none better a second time.
-                self._end(future, error=_explained(error))
+                self._end_future(future, error=_explained_error(error))
         else:
-            self._end(future, value=value)
+            self._end_future(future, value=value)
 
-    def _end(
+    def _end_future(
         self, future: Future[Any], *, value: Any = None, error: BaseException | None = None
     ) -> None:
         with self._lock:
@@ -260,7 +260,7 @@ class Cluster(Executor):
         else:
             future.set_exception(error)
 
-    def _watch(self) -> None:
+    def _watch_tasks(self) -> None:
         """Send what was lost again, and give up where nobody is left who could do it."""
         seen = looked = time.monotonic()
         while not self._ended.is_set():
@@ -274,18 +274,18 @@ class Cluster(Executor):
             if time.monotonic() - looked < _COUNT_S:
                 continue
             looked = time.monotonic()
-            if _workers_of(self._client) or not self._under_way:
+            if _count_workers(self._client) or not self._under_way:
                 seen = looked
             elif looked - seen > PATIENCE_S:
-                self._give_up(_no_worker(self._place))
+                self._give_up(_no_worker_error(self._place))
 
     def _send_again(self) -> None:
         """Join the scheduler anew, and send it all that is under way."""
         deadline = time.monotonic() + PATIENCE_S
-        _leave(self._client)
+        _close_client(self._client)
         while not self._ended.is_set():
             try:
-                client, self._workers = self._joined()
+                client, self._workers = self._join_scheduler()
             except ClusterError as error:
                 if time.monotonic() > deadline:
                     self._give_up(error)
@@ -295,7 +295,7 @@ class Cluster(Executor):
             with self._lock:
                 self._client = client
                 for future, task in self._under_way.items():
-                    self._send(future, task)
+                    self._send_task(future, task)
             return
 
     def _forget_cancelled(self) -> None:
@@ -309,28 +309,28 @@ class Cluster(Executor):
         with self._lock:
             left = list(self._under_way)
         for future in left:
-            self._end(future, error=error)
+            self._end_future(future, error=error)
 
-    def _joined(self) -> tuple[Any, int]:
+    def _join_scheduler(self) -> tuple[Any, int]:
         """A client, and how many workers there are, all of this version."""
-        client = _connect(self._place)
+        client = _connect_client(self._place)
         try:
             client.wait_for_workers(1, timeout=_WORKERS_S)
             found = client.run(build)
             for where, one in found.items():
                 require_same(self._build, one, where)
         except ClusterError:
-            _leave(client)
+            _close_client(client)
             raise
         except Exception as error:
             # A worker, or the scheduler, that went while it was asked.
-            _leave(client)
-            raise _no_worker(self._place) from error
+            _close_client(client)
+            raise _no_worker_error(self._place) from error
         return client, len(found)
 
 
 @dataclass(eq=False)
-class _Task:
+class _SentTask:
     """What is to be called, and what Dask knows it as since it was sent last."""
 
     work: Callable[..., Any]
@@ -338,20 +338,20 @@ class _Task:
     sent: Any = None
 
 
-def _no_worker(place: SchedulerPlace) -> ClusterError:
+def _no_worker_error(place: SchedulerPlace) -> ClusterError:
     return ClusterError(
         f"no worker is at {place.address}", hint=f"Start one: touchline worker {place.address}"
     )
 
 
-def _workers_of(client: Any) -> int:
+def _count_workers(client: Any) -> int:
     """How many workers a scheduler has, as far as it was heard."""
     with suppress(Exception):
         return len(client.scheduler_info(n_workers=-1)["workers"])
     return 0
 
 
-def _connect(place: SchedulerPlace) -> Any:
+def _connect_client(place: SchedulerPlace) -> Any:
     from distributed import Client
 
     hush()
@@ -374,7 +374,7 @@ def hush() -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-def _leave(client: Any) -> None:
+def _close_client(client: Any) -> None:
     try:
         client.close(timeout=_LEAVE_S)
     except Exception:
@@ -383,7 +383,7 @@ def _leave(client: Any) -> None:
         client.status = "closed"
 
 
-def _explained(error: BaseException) -> BaseException:
+def _explained_error(error: BaseException) -> BaseException:
     """The same error, or, where its workers died over a task, a sentence."""
     from distributed.scheduler import KilledWorker
 

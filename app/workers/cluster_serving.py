@@ -35,7 +35,7 @@ def run_scheduler(place: SchedulerPlace, say: Say) -> None:
     Raises:
         ClusterError: It cannot listen there.
     """
-    _run(_schedule(place, say))
+    _run_event_loop(_run_scheduler(place, say))
 
 
 def run_workers(place: SchedulerPlace, count: int, memory: int | None, say: Say) -> None:
@@ -48,10 +48,10 @@ def run_workers(place: SchedulerPlace, count: int, memory: int | None, say: Say)
         say: Told when they begin.
     """
     with TemporaryDirectory(prefix="touchline-worker-") as folder:
-        _run(_work(place, count, memory, folder, say))
+        _run_event_loop(_run_workers(place, count, memory, folder, say))
 
 
-def _run(program: Coroutine[Any, Any, None]) -> None:
+def _run_event_loop(program: Coroutine[Any, Any, None]) -> None:
     import dask
     import distributed.scheduler  # noqa: F401  # so that its log is known
 
@@ -60,7 +60,7 @@ def _run(program: Coroutine[Any, Any, None]) -> None:
         asyncio.run(program)
 
 
-async def _schedule(place: SchedulerPlace, say: Say) -> None:
+async def _run_scheduler(place: SchedulerPlace, say: Say) -> None:
     from distributed import Scheduler
 
     end = _stop_event()
@@ -80,7 +80,7 @@ async def _schedule(place: SchedulerPlace, say: Say) -> None:
         await end.wait()
 
 
-async def _work(
+async def _run_workers(
     place: SchedulerPlace, count: int, memory: int | None, folder: str, say: Say
 ) -> None:
     end = _stop_event()

@@ -30,7 +30,7 @@ LOOK_S = 0.2
 """Seconds between two looks whether to stop."""
 
 
-def _never() -> bool:
+def _never_stop() -> bool:
     return False
 
 
@@ -38,7 +38,7 @@ def fan_out(
     work: Callable[[T], R],
     tasks: Iterable[T],
     executor: Executor | None,
-    stop: Callable[[], bool] = _never,
+    stop: Callable[[], bool] = _never_stop,
 ) -> Iterator[R]:
     """Results as they come; without an executor here, one after the other.
 

@@ -38,7 +38,7 @@ def join(home: Path, name: str, role: Role) -> None:
 
     def come(store: Store) -> None:
         _, link = invite(store, name, role, actor="local")
-        links.use(store, link.token, SECRET)
+        links.use_link(store, link.token, SECRET)
 
     in_store(home, come)
 

@@ -250,7 +250,7 @@ class TestSessions:
         assert by_threads == ["require_allowed", "missing"]
         with team.store.read_without_waiting():
             assert team.ask("GET", address, role="reviewer").status == 200
-        assert by_threads == ["require_allowed", "missing", "_look_up"]
+        assert by_threads == ["require_allowed", "missing", "_find_login"]
         assert team.ask("GET", address, Cookie="touchline-session=nobody").status == 401
 
     def test_the_log_says_who_asked_and_from_where(self, team: Team) -> None:
@@ -316,7 +316,7 @@ class TestSessions:
         late = Devices(team.store, lambda: datetime.now(UTC) + LASTS + timedelta(seconds=1))
         assert late.recognise("guessed", token) is None
         _, link = renew_link(team.store, find_person(team.store, "guessed").id, actor="local")
-        links.use(team.store, link.token, "three other words")
+        links.use_link(team.store, link.token, "three other words")
         assert devices.recognise("guessed", token) is None, "it ends with its password"
 
     def test_a_link_sets_a_password_once_and_logs_in(self, team: Team) -> None:
@@ -338,7 +338,7 @@ class TestSessions:
         one, two = (json.loads(answer.body)["link"] for answer in answers)
         assert one != two
         with pytest.raises(Exception, match="no longer valid"):
-            links.look(team.store, one.partition("#")[2])
+            links.find_link_holder(team.store, one.partition("#")[2])
 
 
 class TestWhoActs:

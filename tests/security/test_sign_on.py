@@ -70,7 +70,7 @@ class TestComingIn:
         assert_refused(door.enter(), word="no person here is linked")
 
     def test_the_first_admin_may_come_by_it(self, door: ClassLimiter, monkeypatch: Any) -> None:
-        monkeypatch.setattr("app.features.people.links.count_able", lambda *_: 0)
+        monkeypatch.setattr("app.features.people.links.count_people_who_can_log_in", lambda *_: 0)
         link = make_first_link(door.team.store, actor="local")
         assert link is not None
         door.provider.who = {"sub": "s-root"}

@@ -224,7 +224,7 @@ class TestRun:
     def test_one_that_dies_before_it_is_ready_says_nothing_of_its_task(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.worker_process._serve", be_killed_at_start)
+        monkeypatch.setattr("app.worker_process._serve_tasks", be_killed_at_start)
         with pytest.raises(OverloadedError, match="no process could be started"):
             WorkerProcess(WorkerLimits(300 * MEBI, 10.0, 60.0)).run(worker_pid)
 

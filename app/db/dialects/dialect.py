@@ -203,15 +203,15 @@ def dialect_of(settings: Settings) -> Dialect:
             hint="Set TOUCHLINE_DATABASE_URL to postgresql://USER:PASSWORD@HOST/DATABASE, or leave"
             " it unset.",
         )
-    return _named(_MODULES[kind])
+    return _dialect_by_name(_MODULES[kind])
 
 
 def dialect_in(session: Session) -> Dialect:
     """How the database of a session is spoken to."""
-    return _named(session.dialect.name)
+    return _dialect_by_name(session.dialect.name)
 
 
-def _named(name: str) -> Dialect:
+def _dialect_by_name(name: str) -> Dialect:
     # Only the one that is used is imported: a driver takes its time.
     return cast(Dialect, import_module(f"app.db.dialects.{name}").DIALECT)
 

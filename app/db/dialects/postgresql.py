@@ -130,7 +130,7 @@ def trigger(
     elif body == "SELECT RAISE(IGNORE)":
         body = "RETURN NULL"
     if when is not None:
-        body = f"IF {_distinct(when)} THEN {body}; END IF"
+        body = f"IF {_is_distinct_condition(when)} THEN {body}; END IF"
     made = (
         f"CREATE FUNCTION {name}() RETURNS trigger LANGUAGE plpgsql AS"
         f" $$ BEGIN {body}; RETURN {row}; END $$;"
@@ -148,7 +148,7 @@ def trigger(
     return made
 
 
-def _distinct(condition: str) -> str:
+def _is_distinct_condition(condition: str) -> str:
     """SQLite's IS NOT between values."""
     return re.sub(r"IS NOT (?=NEW\.|OLD\.)", "IS DISTINCT FROM ", condition)
 
@@ -194,7 +194,7 @@ class PostgreSQL:
         """See ``Dialect``."""
         try:
             engine = create_engine(
-                _address(settings.database),
+                _psycopg_url(settings.database),
                 # A server that was started again is found again.
                 pool_pre_ping=True,
                 # One at a time writes what need not last.
@@ -212,9 +212,9 @@ class PostgreSQL:
         dialect.statement_compiler = Statements
         dialect.ddl_compiler = Columns
         dialect.type_compiler_instance = Types(dialect)
-        event.listen(engine, "connect", partial(_set_up, lasting))
-        event.listen(engine, "begin", _begin)
-        _close_late_ones(engine)
+        event.listen(engine, "connect", partial(_set_up_connection, lasting))
+        event.listen(engine, "begin", _begin_transaction)
+        _close_connections_after_disposal(engine)
         return engine
 
     def reading(self, engine: Engine) -> Engine:
@@ -323,7 +323,7 @@ class PostgreSQL:
 DIALECT = PostgreSQL()
 
 
-def _address(url: str) -> URL:
+def _psycopg_url(url: str) -> URL:
     """The URL for psycopg.
 
     Raises:
@@ -341,7 +341,7 @@ def _address(url: str) -> URL:
     )
 
 
-def _set_up(lasting: bool, connection: Any, _record: object) -> None:
+def _set_up_connection(lasting: bool, connection: Any, _record: object) -> None:
     from psycopg.types.numeric import FloatLoader
 
     # Sums of whole numbers are numeric, and Decimal in Python; SQLite's are int.
@@ -359,7 +359,7 @@ def _set_up(lasting: bool, connection: Any, _record: object) -> None:
     connection.autocommit = was
 
 
-def _close_late_ones(engine: Engine) -> None:
+def _close_connections_after_disposal(engine: Engine) -> None:
     """Close what a thread gives back after the engine was disposed of: no pool would."""
     disposals = 0
 
@@ -379,7 +379,7 @@ def _close_late_ones(engine: Engine) -> None:
     event.listen(engine, "checkin", returned)
 
 
-def _begin(connection: Connection) -> None:
+def _begin_transaction(connection: Connection) -> None:
     """Wait for the write lock: only then the first statement of a writer takes its snapshot."""
     if connection.get_execution_options().get("touchline_write", False):
         connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({WRITE_LOCK})")

@@ -56,7 +56,7 @@ class ServerSharing:
         with self._lock, self._reported():
             if name in self._held or self._closing.is_set():
                 return False
-            if not self._ask("SELECT pg_try_advisory_lock(:key)", name):
+            if not self._query_claim("SELECT pg_try_advisory_lock(:key)", name):
                 return False
             self._held.add(name)
             return True
@@ -68,7 +68,7 @@ class ServerSharing:
                 return False
             try:
                 with self._reported():
-                    self._ask("SELECT :key", name)
+                    self._query_claim("SELECT :key", name)
             except StorageError:
                 return False
             return name in self._held
@@ -80,7 +80,7 @@ class ServerSharing:
                 self._held.discard(name)
                 try:
                     with self._reported():
-                        self._ask("SELECT pg_advisory_unlock(:key)", name)
+                        self._query_claim("SELECT pg_advisory_unlock(:key)", name)
                 except StorageError as error:
                     # With the connection the claim is gone, too.
                     log.warning("a claim ended with its connection", error=error.message)
@@ -98,7 +98,9 @@ class ServerSharing:
     def listen(self) -> None:
         """See ``Sharing``."""
         if self._thread is None:
-            self._thread = threading.Thread(target=self._listen, name="listener", daemon=True)
+            self._thread = threading.Thread(
+                target=self._listen_until_closed, name="listener", daemon=True
+            )
             self._thread.start()
 
     def close(self) -> None:
@@ -107,9 +109,9 @@ class ServerSharing:
         if self._thread is not None:
             self._thread.join()
         with self._lock:
-            self._drop()
+            self._close_claiming_connection()
 
-    def _ask(self, statement: str, name: str) -> Any:
+    def _query_claim(self, statement: str, name: str) -> Any:
         """What the connection with the claims answers; a broken one takes them along."""
         try:
             if self._claiming is None:
@@ -117,12 +119,12 @@ class ServerSharing:
                 # A machine that vanished lets go of its claims within half a minute.
                 for setting in ("idle = 15", "interval = 5", "count = 3"):
                     self._claiming.execute(text(f"SET tcp_keepalives_{setting}"))
-            return self._claiming.execute(text(statement), {"key": _number(name)}).scalar()
+            return self._claiming.execute(text(statement), {"key": _lock_number(name)}).scalar()
         except DBAPIError:
-            self._drop()
+            self._close_claiming_connection()
             raise
 
-    def _drop(self) -> None:
+    def _close_claiming_connection(self) -> None:
         connection, self._claiming = self._claiming, None
         self._held.clear()
         if connection is not None:
@@ -130,7 +132,7 @@ class ServerSharing:
             connection.invalidate()
             connection.close()
 
-    def _listen(self) -> None:
+    def _listen_until_closed(self) -> None:
         while not self._closing.is_set():
             try:
                 with self._engine.connect() as connection:
@@ -145,20 +147,20 @@ class ServerSharing:
     def _reconnect_loop(self, connection: Connection) -> None:
         try:
             connection.execute(text(f"LISTEN {CHANNEL}"))
-            self._hear(AGAIN)
+            self._notify_hearers(AGAIN)
             driver: Any = connection.connection.driver_connection
             while not self._closing.is_set():
                 for notice in driver.notifies(timeout=POLL_SECONDS):
                     origin, _, word = notice.payload.partition(" ")
                     if origin != self._origin:
-                        self._hear(word)
+                        self._notify_hearers(word)
                     if self._closing.is_set():
                         return
         finally:
             # Nobody else shall get a connection that listens.
             connection.invalidate()
 
-    def _hear(self, word: str) -> None:
+    def _notify_hearers(self, word: str) -> None:
         for hearer in self._hearers:
             try:
                 hearer(word)
@@ -169,6 +171,6 @@ class ServerSharing:
 _NOTIFY = text("SELECT pg_notify(:channel, :said)")
 
 
-def _number(name: str) -> int:
+def _lock_number(name: str) -> int:
     """The lock of a name, 64 bits with a sign."""
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], signed=True)

@@ -83,7 +83,7 @@ class SQLite:
     def nonblocking_engine(self, settings: Settings) -> Engine:
         """See ``Dialect``; readers of a write-ahead log wait for nobody, but while it is recovered."""
         engine = _make_engine(settings, True, pool_size=1, max_overflow=0, pool_timeout=0)
-        event.listen(engine, "connect", _wait_for_nobody)
+        event.listen(engine, "connect", _disable_waiting)
         return engine.execution_options(**AUTOCOMMIT)
 
     def sharing(
@@ -144,7 +144,7 @@ class SQLite:
 DIALECT = SQLite()
 
 
-class _Hinted(SQLiteCompiler):
+class _HintedStatement(SQLiteCompiler):
     """Writes hints on a table (INDEXED BY), which SQLAlchemy leaves out for SQLite."""
 
     def get_from_hint_text(self, table: FromClause, text: str | None) -> str | None:
@@ -156,10 +156,10 @@ def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
     if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
         raise StorageError(f"SQLite {pysqlite3.dbapi2.sqlite_version} can corrupt its file")
     engine = create_engine(settings.database, module=pysqlite3.dbapi2, **pool)
-    engine.dialect.statement_compiler = _Hinted
+    engine.dialect.statement_compiler = _HintedStatement
     event.listen(engine, "connect", partial(_set_pragmas, lasting))
-    event.listen(engine, "begin", _begin)
-    event.listen(engine, "commit", _count)
+    event.listen(engine, "begin", _begin_transaction)
+    event.listen(engine, "commit", _count_write)
     event.listen(engine, "before_cursor_execute", _refuse_null_characters)
     return engine
 
@@ -174,7 +174,7 @@ def _refuse_null_characters(
                 raise unstorable_text_error()
 
 
-def _wait_for_nobody(connection: Any, _record: object) -> None:
+def _disable_waiting(connection: Any, _record: object) -> None:
     connection.execute(_WAIT_NOT)
 
 
@@ -191,23 +191,23 @@ def _set_pragmas(lasting: bool, connection: Any, _record: object) -> None:
     cursor.close()
 
 
-def _begin(connection: Connection) -> None:
+def _begin_transaction(connection: Connection) -> None:
     if connection.get_execution_options().get("touchline_glance", False):
         return
-    if not _writes(connection):
+    if not _is_write_connection(connection):
         connection.exec_driver_sql("BEGIN")
         return
-    driver, until = _driver(connection), monotonic() + BUSY_SECONDS
+    driver, until = _driver_connection(connection), monotonic() + BUSY_SECONDS
     driver.execute(_WAIT_NOT)
     try:
-        while not _could_begin(connection, last=monotonic() >= until):
+        while not _try_to_begin_write(connection, last=monotonic() >= until):
             sleep(AGAIN_S)
     finally:
         driver.execute(_WAIT)
     connection.info[_BEFORE] = driver.total_changes
 
 
-def _could_begin(connection: Connection, *, last: bool) -> bool:
+def _try_to_begin_write(connection: Connection, *, last: bool) -> bool:
     """Whether a write could begin; the last time that it could not is an error."""
     try:
         connection.exec_driver_sql("BEGIN IMMEDIATE")
@@ -218,17 +218,17 @@ def _could_begin(connection: Connection, *, last: bool) -> bool:
     return True
 
 
-def _count(connection: Connection) -> None:
+def _count_write(connection: Connection) -> None:
     """Count a write in the first page, by which a write-ahead log knows its database (``wal``)."""
-    driver = _driver(connection)
-    if _writes(connection) and driver.total_changes != connection.info[_BEFORE]:
+    driver = _driver_connection(connection)
+    if _is_write_connection(connection) and driver.total_changes != connection.info[_BEFORE]:
         (count,) = driver.execute("PRAGMA user_version").fetchone()
         driver.execute(f"PRAGMA user_version = {(count + 1) % 2**31}")
 
 
-def _writes(connection: Connection) -> bool:
+def _is_write_connection(connection: Connection) -> bool:
     return bool(connection.get_execution_options().get("touchline_write", False))
 
 
-def _driver(connection: Connection) -> Any:
+def _driver_connection(connection: Connection) -> Any:
     return connection.connection.dbapi_connection

@@ -115,12 +115,12 @@ class DeferReferences(Executable, ClauseElement):
 @compiles(_Numbers)
 @compiles(_Items)
 @compiles(_Values)
-def _json_each(element: Any, compiler: Any, **kw: Any) -> str:
+def _compile_json_each(element: Any, compiler: Any, **kw: Any) -> str:
     return f"json_each({compiler.process(element.clauses, **kw)})"
 
 
 @compiles(_Numbers, "postgresql")
-def _numbers(element: Any, compiler: Any, **kw: Any) -> str:
+def _compile_numbers(element: Any, compiler: Any, **kw: Any) -> str:
     json = compiler.process(element.clauses, **kw)
     return (
         "(SELECT CAST(item AS BIGINT) AS value"
@@ -129,7 +129,7 @@ def _numbers(element: Any, compiler: Any, **kw: Any) -> str:
 
 
 @compiles(_Items, "postgresql")
-def _items(element: Any, compiler: Any, **kw: Any) -> str:
+def _compile_items(element: Any, compiler: Any, **kw: Any) -> str:
     json = compiler.process(element.clauses, **kw)
     return (
         "LATERAL (SELECT place - 1 AS key, item AS value"
@@ -139,19 +139,19 @@ def _items(element: Any, compiler: Any, **kw: Any) -> str:
 
 
 @compiles(_Values, "postgresql")
-def _values(element: Any, compiler: Any, **kw: Any) -> str:
+def _compile_values(element: Any, compiler: Any, **kw: Any) -> str:
     json = compiler.process(element.clauses, **kw)
     return f"LATERAL (SELECT pair.value FROM jsonb_each_text(CAST({json} AS JSONB)) AS pair)"
 
 
 @compiles(member, "postgresql")
-def _member(element: Any, compiler: Any, **kw: Any) -> str:
+def _compile_member(element: Any, compiler: Any, **kw: Any) -> str:
     column, path = element.clauses
     column, path = compiler.process(column, **kw), compiler.process(path, **kw)
     return f"(CAST({column} AS JSONB) ->> substr({path}, 3))"
 
 
-def _written(kind: type[ClauseElement], form: str, *engine: str) -> None:
+def _compile_as(kind: type[ClauseElement], form: str, *engine: str) -> None:
     """Have an element written in a form, whose ``{}`` are its arguments."""
 
     @compiles(kind, *engine)
@@ -159,20 +159,20 @@ def _written(kind: type[ClauseElement], form: str, *engine: str) -> None:
         return form.format(compiler.process(element.clauses, **kw))
 
 
-_written(member, "json_extract({})")
-_written(larger, "max({})")
-_written(larger, "greatest({})", "postgresql")
-_written(any_of, "min({})")
-_written(any_of, "(array_agg({}))[1]", "postgresql")
-_written(pairs_of, "json_group_array(json_array({}))")
-_written(pairs_of, "CAST(coalesce(json_agg(json_build_array({})), '[]') AS TEXT)", "postgresql")
+_compile_as(member, "json_extract({})")
+_compile_as(larger, "max({})")
+_compile_as(larger, "greatest({})", "postgresql")
+_compile_as(any_of, "min({})")
+_compile_as(any_of, "(array_agg({}))[1]", "postgresql")
+_compile_as(pairs_of, "json_group_array(json_array({}))")
+_compile_as(pairs_of, "CAST(coalesce(json_agg(json_build_array({})), '[]') AS TEXT)", "postgresql")
 
 
 @compiles(DeferReferences)
-def _defer(_element: Any, _compiler: Any, **_: Any) -> str:
+def _compile_deferral_for_sqlite(_element: Any, _compiler: Any, **_: Any) -> str:
     return "PRAGMA defer_foreign_keys = ON"
 
 
 @compiles(DeferReferences, "postgresql")
-def _set_constraints(_element: Any, _compiler: Any, **_: Any) -> str:
+def _compile_deferral_for_postgresql(_element: Any, _compiler: Any, **_: Any) -> str:
     return "SET CONSTRAINTS ALL DEFERRED"

@@ -73,12 +73,12 @@ def read_anchor(database: Path) -> Anchor | None:
         DamagedError: The file is not one of ours.
     """
     with suppress(DamagedError):
-        return _read(database)
+        return _read_anchor_file(database)
     time.sleep(AGAIN_SECONDS)
-    return _read(database)
+    return _read_anchor_file(database)
 
 
-def _read(database: Path) -> Anchor | None:
+def _read_anchor_file(database: Path) -> Anchor | None:
     path = anchor_file(database)
     try:
         return Anchor(**json.loads(path.read_bytes()))
@@ -159,11 +159,15 @@ def renew_anchor(engine: Engine, settings: Settings, *, alone: bool) -> None:
     stored = read_anchor(settings.database_file)
     if anchor is None or anchor == stored:
         return
-    if alone or stored is None or _without_end(stored) != _without_end(anchor):
+    if (
+        alone
+        or stored is None
+        or _anchor_without_log_end(stored) != _anchor_without_log_end(anchor)
+    ):
         make_anchor(settings.database_file, anchor)
 
 
-def _without_end(anchor: Anchor) -> Anchor:
+def _anchor_without_log_end(anchor: Anchor) -> Anchor:
     return replace(anchor, entries=0, hash="")
 
 

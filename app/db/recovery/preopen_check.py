@@ -41,8 +41,8 @@ def require_sound(settings: Settings) -> None:
     """
     database = settings.database_file
     try:
-        if not _size(database):
-            _require_new(settings)
+        if not _file_size(database):
+            _require_unused_home(settings)
             return
         header = read_header(database)
         log = read_log(log_file(database))
@@ -58,9 +58,9 @@ def require_sound(settings: Settings) -> None:
         )
     _require_whole(database, header, log)
     if read_anchor(database) is None:
-        _require_ours(database)
-    if _size(log_file(database)):
-        _require_all(settings)
+        _require_no_foreign_tables(database)
+    if _file_size(log_file(database)):
+        _require_log_end_of_anchor(settings)
 
 
 def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -> None:
@@ -71,7 +71,7 @@ def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -
             hint="If a backup was copied here, run touchline restore with it; "
             f"touchline restore {database} goes on without the log. Both keep all files.",
         )
-    size, expected = _size(database), header.pages * header.page_bytes
+    size, expected = _file_size(database), header.pages * header.page_bytes
     if not log.commits and size < expected:
         raise DamagedError(
             f"{database} is cut short: {size:,} of {expected:,} bytes are there",
@@ -79,7 +79,7 @@ def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -
         )
 
 
-def _require_all(settings: Settings) -> None:
+def _require_log_end_of_anchor(settings: Settings) -> None:
     """Raise DamagedError where database and log together are not what the home knows.
 
     A connection that only reads leaves both as they are when it is closed.
@@ -95,10 +95,10 @@ def _require_all(settings: Settings) -> None:
         engine.dispose()
 
 
-def _require_ours(database: Path) -> None:
+def _require_no_foreign_tables(database: Path) -> None:
     """Raise StorageError where a file that would get our tables has those of another program."""
     # Where its log is empty, SQLite need not make files for it either.
-    alone = "" if _size(log_file(database)) else "&immutable=1"
+    alone = "" if _file_size(log_file(database)) else "&immutable=1"
     file = f"file:{quote(str(database))}?mode=ro{alone}"
     question = "SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name"
     try:
@@ -115,7 +115,7 @@ def _require_ours(database: Path) -> None:
         )
 
 
-def _require_new(settings: Settings) -> None:
+def _require_unused_home(settings: Settings) -> None:
     """Raise DamagedError where a home without a database has had one."""
     database = settings.database_file
     if signs := signs_of_use(settings):
@@ -135,23 +135,23 @@ def signs_of_use(settings: Settings) -> list[str]:
     aside = next(settings.home.glob(f"{ASIDE}*/{database.name}"), None)
     signs = [
         None if anchor is None else f"home.json knows {anchor.entries:,} entries of its log",
-        f"{log.name} holds changes" if _size(log) else None,
-        _filled(settings.uploads, "*/upload.json"),
-        _filled(settings.exports, "*.json"),
-        _filled(settings.home / "backups", "*.zip"),
-        *(_filled(settings.home / name, "*") for name in ("sample", "practice")),
+        f"{log.name} holds changes" if _file_size(log) else None,
+        _count_files_sentence(settings.uploads, "*/upload.json"),
+        _count_files_sentence(settings.exports, "*.json"),
+        _count_files_sentence(settings.home / "backups", "*.zip"),
+        *(_count_files_sentence(settings.home / name, "*") for name in ("sample", "practice")),
         *(f"{name} is there" for name in KEYS if (settings.home / name).exists()),
         None if aside is None else f"{aside.parent.name}/ holds its database",
     ]
     return [sign for sign in signs if sign is not None]
 
 
-def _filled(folder: Path, pattern: str) -> str | None:
+def _count_files_sentence(folder: Path, pattern: str) -> str | None:
     count = sum(1 for _ in folder.glob(pattern))
     return f"{folder.name}/ holds {count:,}" if count else None
 
 
-def _size(path: Path) -> int:
+def _file_size(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
 
 
@@ -167,11 +167,11 @@ class OpenedFile:
 
     def __init__(self, database: Path):
         self._database, self._log = database, log_file(database)
-        self._opened = _identity(database)
+        self._opened = _file_identity(database)
 
     def require_there(self) -> None:
         """Raise DamagedError where another file lies in the database's place, or none."""
-        found = _identity(self._database)
+        found = _file_identity(self._database)
         if found is None:
             raise DamagedError(
                 f"{self._database.name} was moved or deleted while it was open", hint=MOVED
@@ -192,7 +192,7 @@ class OpenedFile:
             )
 
 
-def _identity(file: Path) -> tuple[int, int] | None:
+def _file_identity(file: Path) -> tuple[int, int] | None:
     """What tells a file from all others at its place; None where there is none to be seen."""
     try:
         found = file.stat()

@@ -107,7 +107,7 @@ def read_log(path: Path) -> WriteAheadLog:
     """The log of a path; an empty one where there is none, or nothing whole in it."""
     try:
         with path.open("rb") as file:
-            return _read(file)
+            return _read_transactions(file)
     except FileNotFoundError:
         return WriteAheadLog()
 
@@ -116,7 +116,7 @@ def _is_page_size(value: int) -> bool:
     return 512 <= value <= 65536 and value & (value - 1) == 0
 
 
-def _read(file: IO[bytes]) -> WriteAheadLog:
+def _read_transactions(file: IO[bytes]) -> WriteAheadLog:
     """Whole transactions, up to the first frame that SQLite would not believe."""
     start = file.read(_LOG_HEADER.size)
     if len(start) < _LOG_HEADER.size:

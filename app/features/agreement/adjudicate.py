@@ -13,7 +13,7 @@ from app.features.agreement.service import settle, submitted_annotations
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved
-from app.features.groups.view_paint import PaintUpdater
+from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.return_work import return_annotation
@@ -97,7 +97,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
     own = person_of(actor) in {annotation.person for annotation in annotations}
     refused = None
     if own and (others := _possible_judges(store, original.dataset_id, annotations)):
-        refused = f"you annotated this group yourself; {_named(others)} can decide"
+        refused = f"you annotated this group yourself; {_join_names(others)} can decide"
     return Case(
         original,
         row.batch_id or None,
@@ -115,7 +115,7 @@ def decide(
     *,
     as_start: bool = False,
     actor: str,
-    paint: PaintUpdater | None = None,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     """Take one of the annotations, or begin a third one from it.
 
@@ -154,7 +154,7 @@ def adopt_into_group(
     annotation: IndependentAnnotation,
     *,
     actor: str,
-    paint: PaintUpdater | None = None,
+    paint: PaintFollower | None = None,
 ) -> GroupState:
     """Take an annotation and its verdict over into the group; where it waits for a decision, this is it.
 
@@ -213,7 +213,7 @@ def _possible_judges(
     ]
 
 
-def _named(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     most = 3
     if len(names) > most:
         return f"{', '.join(names[:most])} or another reviewer"

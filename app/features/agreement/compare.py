@@ -78,7 +78,7 @@ def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Com
             )
         verdicts = (_verdict_of(first), _verdict_of(second))
         pairs.append(AnnotationPair(a, b, distance, disagreements(distance, verdicts, limits)))
-    pairs.sort(key=lambda pair: (-_weight(pair.disagreements), -len(pair.disagreements)))
+    pairs.sort(key=lambda pair: (-_largest_weight(pair.disagreements), -len(pair.disagreements)))
     return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
 
 
@@ -87,7 +87,7 @@ def _verdict_of(state: GroupState) -> str | None:
     return None if verdict == "unreviewed" else verdict
 
 
-def _weight(found: Sequence[Disagreement]) -> float:
+def _largest_weight(found: Sequence[Disagreement]) -> float:
     return max((item.weight for item in found), default=0.0)
 
 
@@ -98,7 +98,7 @@ def _worst_views(states: Sequence[GroupState], pairs: Sequence[AnnotationPair]) 
         for view in pair.distance.views:
             in_view = [item for item in pair.disagreements if item.view == view.view]
             weight, apart = order.get(view.view, (0.0, 0.0))
-            order[view.view] = (max(weight, _weight(in_view)), max(apart, view.largest_px))
+            order[view.view] = (max(weight, _largest_weight(in_view)), max(apart, view.largest_px))
     return tuple(sorted(order, key=lambda key: [-value for value in order[key]]))
 
 

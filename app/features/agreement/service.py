@@ -32,7 +32,7 @@ from app.features.batches.own_annotations import adopt_submitted
 from app.features.batches.service import get_batch
 from app.features.groups.state import GroupState
 from app.features.groups.submit import solve_and_keep
-from app.features.groups.view_paint import PaintUpdater
+from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations.adopt import adopt_annotation, give_verdict_of
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
@@ -70,7 +70,7 @@ class StoredComparison:
     pairs: tuple[AnnotationComparison, ...]
 
 
-def after_submission(store: Store, copy_id: int, paint: PaintUpdater | None = None) -> str | None:
+def after_submission(store: Store, copy_id: int, paint: PaintFollower | None = None) -> str | None:
     """What follows from a copy that was submitted: where nobody else annotates the group it is taken
     over, else the group is weighed; None where there is nothing to weigh yet.
 
@@ -94,7 +94,7 @@ def after_submission(store: Store, copy_id: int, paint: PaintUpdater | None = No
 
 
 def compare_submitted(
-    store: Store, group_id: int, batch_id: int | None, paint: PaintUpdater | None = None
+    store: Store, group_id: int, batch_id: int | None, paint: PaintFollower | None = None
 ) -> str | None:
     """Compare what was submitted of a group; where it agrees, the first annotation is taken over.
 
@@ -115,7 +115,7 @@ def compare_submitted(
     found = compare_states(
         [solve_and_keep(store, annotation.copy_id) for annotation in annotations], limits
     )
-    values = _values(original, annotations, found)
+    values = _agreement_columns(original, annotations, found)
     if not any(pair.disagreements for pair in found.pairs):
         try:
             settle(
@@ -138,7 +138,7 @@ def compare_submitted(
     return OPEN if _open_case(store, annotations, values) else None
 
 
-def compare_left(store: Store, paint: PaintUpdater | None = None) -> int:
+def compare_left(store: Store, paint: PaintFollower | None = None) -> int:
     """Compare what was submitted before a server was stopped, and was not compared any more; and
     take over what waits for that.
 
@@ -183,7 +183,7 @@ def settle(
     *,
     outcome: str,
     actor: str,
-    paint: PaintUpdater | None = None,
+    paint: PaintFollower | None = None,
     judge: bool = False,
     found: Mapping[str, Any] | None = None,
 ) -> GroupState:
@@ -243,11 +243,11 @@ def _open_case(
             return False
         put_agreement(session, values)
         if known is None or known.takes != values["takes"]:
-            _announce(session, annotations, values)
+            _announce_disagreement(session, annotations, values)
     return True
 
 
-def _announce(
+def _announce_disagreement(
     session: Session, annotations: Sequence[IndependentAnnotation], values: Mapping[str, Any]
 ) -> None:
     at, group_id = values["found"], values["group_id"]
@@ -268,7 +268,7 @@ def _announce(
     )
 
 
-def _values(
+def _agreement_columns(
     original: GroupState, annotations: Sequence[IndependentAnnotation], found: Comparison
 ) -> dict[str, Any]:
     """What is kept of a comparison, as a row that waits for a decision."""

@@ -91,7 +91,7 @@ class Agreement:
 
 
 @dataclass(frozen=True)
-class _Read:
+class _ComparedGroup:
     """A row with its pairs as they were kept."""
 
     row: Any
@@ -118,20 +118,26 @@ def agreement_of(store: Store, dataset: str | int, batch: int | None = None) -> 
     with store.read() as session:
         rows = agreements_of(session, number, batch_id=batch)
         limits = read_limits(session, number)
-    read = [_Read(row, from_json(StoredComparison, unpack(row.pairs)).pairs) for row in rows]
+    read = [
+        _ComparedGroup(row, from_json(StoredComparison, unpack(row.pairs)).pairs) for row in rows
+    ]
     states = [row.state for row in rows]
     people = sorted({name for one in read for name in one.verdicts})
     judged = [[one.verdicts.get(name) for name in people] for one in read]
-    pairs = [found for two in combinations(people, 2) if (found := _of_two(two, read)) is not None]
+    pairs = [
+        found
+        for two in combinations(people, 2)
+        if (found := _agreement_of_two(two, read)) is not None
+    ]
     return Agreement(
         states.count(AGREED),
         states.count(OPEN),
         states.count(DECIDED),
         limits,
         krippendorff_alpha(judged),
-        _of_all(people, read),
+        _agreement_of_all(people, read),
         sorted(pairs, key=lambda one: (-one.groups, one.people)),
-        [_group(one) for one in read],
+        [_group_agreement(one) for one in read],
     )
 
 
@@ -168,7 +174,9 @@ def agreement_csv(found: Agreement) -> str:
     return "".join(lines)
 
 
-def _of_two(two: tuple[str, str], read: Sequence[_Read]) -> PeopleAgreement | None:
+def _agreement_of_two(
+    two: tuple[str, str], read: Sequence[_ComparedGroup]
+) -> PeopleAgreement | None:
     found = [pair for one in read for pair in one.pairs if tuple(sorted(pair.people)) == two]
     if not found:
         return None
@@ -179,19 +187,19 @@ def _of_two(two: tuple[str, str], read: Sequence[_Read]) -> PeopleAgreement | No
     return PeopleAgreement(two, len(found), kappa, spreads(pair.distance for pair in found))
 
 
-def _of_all(people: Sequence[str], read: Sequence[_Read]) -> PeopleAgreement:
+def _agreement_of_all(people: Sequence[str], read: Sequence[_ComparedGroup]) -> PeopleAgreement:
     verdicts = [[value for value in one.verdicts.values() if value is not None] for one in read]
     verdicts = [values for values in verdicts if len(values) > 1]
     equal = len({len(values) for values in verdicts}) == 1
     kappa = fleiss_kappa(verdicts) if equal else None
-    return PeopleAgreement(tuple(people), len(read), kappa, spreads(_distances(read)))
+    return PeopleAgreement(tuple(people), len(read), kappa, spreads(_group_distances(read)))
 
 
-def _distances(read: Sequence[_Read]) -> Iterator[GroupDistance]:
+def _group_distances(read: Sequence[_ComparedGroup]) -> Iterator[GroupDistance]:
     return (pair.distance for one in read for pair in one.pairs)
 
 
-def _group(one: _Read) -> GroupAgreement:
+def _group_agreement(one: _ComparedGroup) -> GroupAgreement:
     row = one.row
     people: dict[int, str] = defaultdict(str)
     for pair in one.pairs:

@@ -77,21 +77,21 @@ def audit_rows(
         )
         .outerjoin(DatasetModel, DatasetModel.id == LogModel.dataset_id)
         .outerjoin(GroupModel, GroupModel.id == LogModel.group_id)
-        .where(*_where(query, visibility, before))
+        .where(*_query_conditions(query, visibility, before))
         .order_by(LogModel.id.desc())
         .limit(limit)
     )
     rows: Sequence[Any] = session.execute(statement).all()
-    return [_row(row) for row in rows]
+    return [_audit_row(row) for row in rows]
 
 
-def _row(row: Any) -> AuditRow:
+def _audit_row(row: Any) -> AuditRow:
     values = dict(row._mapping)
     key = values.pop("key")
     return AuditRow(**{**values, "label": row.label or key, "body": unpack(row.body)})
 
 
-def _where(
+def _query_conditions(
     query: AuditQuery, visibility: Visibility, before: int | None
 ) -> list[ColumnElement[bool]]:
     where: list[ColumnElement[bool]] = []

@@ -61,12 +61,12 @@ def audit_query(
         group,
         person or None,
         None if family is None else KINDS[family],
-        _text(since),
-        _text(until),
+        _time_text(since),
+        _time_text(until),
     )
 
 
-def _text(at: datetime | None) -> str | None:
+def _time_text(at: datetime | None) -> str | None:
     if at is None:
         return None
     try:
@@ -123,13 +123,13 @@ def export_audit(
 ) -> StreamingResponse:
     """The same, all of it, as a table (no cell of which is a formula) or as JSON Lines."""
     found = audit.every_entry(store, query, led, search)
-    lines = _csv(found) if ending == "csv" else _json_lines(found)
+    lines = _csv_lines(found) if ending == "csv" else _json_lines(found)
     kind = "text/csv; charset=utf-8" if ending == "csv" else "application/x-ndjson"
     saved = {"Content-Disposition": f'attachment; filename="touchline-audit.{ending}"'}
     return StreamingResponse(lines, media_type=kind, headers=saved)
 
 
-def _csv(found: Iterator[AuditEntry]) -> Iterator[str]:
+def _csv_lines(found: Iterator[AuditEntry]) -> Iterator[str]:
     yield csv_line(COLUMNS)
     for entry in found:
         yield csv_line(getattr(entry, name) for name in COLUMNS)

@@ -119,8 +119,8 @@ def read_audit(
         while looked < MOST_LOOKED_AT:
             rows = audit_rows(session, query, visibility, before, batch)
             for row in rows:
-                entry = _entry(row)
-                if _holds(entry, words):
+                entry = _audit_entry(row)
+                if _contains_words(entry, words):
                     if len(found) == limit:
                         return AuditPage(found, before)
                     found.append(entry)
@@ -158,7 +158,7 @@ def every_entry(
     return entries(page_after(None))
 
 
-def _holds(entry: AuditEntry, words: list[str]) -> bool:
+def _contains_words(entry: AuditEntry, words: list[str]) -> bool:
     if not words:
         return True
     parts = (entry.actor, entry.kind, entry.sentence, entry.dataset, entry.group, entry.network)
@@ -166,7 +166,7 @@ def _holds(entry: AuditEntry, words: list[str]) -> bool:
     return all(word in text for word in words)
 
 
-def _entry(row: AuditRow) -> AuditEntry:
+def _audit_entry(row: AuditRow) -> AuditEntry:
     body = row.body if isinstance(row.body, dict) else {}
     network = body.get("address") if row.kind == "person" else None
     return AuditEntry(
@@ -175,17 +175,17 @@ def _entry(row: AuditRow) -> AuditEntry:
         actor=row.actor,
         family=_FAMILIES.get(row.kind, Family.OTHER),
         kind=row.kind,
-        sentence=_SENTENCES.get(row.kind, _plain)(row, body),
+        sentence=_SENTENCES.get(row.kind, _plain_sentence)(row, body),
         dataset=row.dataset,
         group_id=row.group_id if row.label is not None else None,
         group=row.label,
         network=network or None,
-        address=_address(row, body),
+        address=_page_address(row, body),
         hash=row.hash,
     )
 
 
-def _address(row: AuditRow, body: Mapping[str, Any]) -> str | None:
+def _page_address(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     if row.label is not None and row.group_id is not None:
         if row.kind == "comment":
             return f"/review/{row.group_id}?thread={body.get('thread')}"
@@ -200,18 +200,18 @@ def _address(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     return f"/datasets/{row.dataset}{pages.get(row.kind, '')}"
 
 
-def _plain(row: AuditRow, _body: Mapping[str, Any]) -> str:
+def _plain_sentence(row: AuditRow, _body: Mapping[str, Any]) -> str:
     return row.kind.replace("_", " ")
 
 
-def _edit(row: AuditRow, body: Mapping[str, Any]) -> str:
+def _edit_sentence(row: AuditRow, body: Mapping[str, Any]) -> str:
     edit = body.get("edit")
     edits = edit if isinstance(edit, dict) else body
     verb = {"undo": "undid: ", "redo": "redid: "}.get(row.kind.removeprefix("station_"), "")
-    return verb + "; ".join(_one_edit(row, one) for one in single_edits(edits))
+    return verb + "; ".join(_single_edit_sentence(row, one) for one in single_edits(edits))
 
 
-def _one_edit(row: AuditRow, edit: Mapping[str, Any]) -> str:
+def _single_edit_sentence(row: AuditRow, edit: Mapping[str, Any]) -> str:
     name = str(edit.get("edit", row.kind))
     view = f" of view {edit['view']}" if edit.get("view") else ""
     lines = edit.get("lines")
@@ -223,7 +223,7 @@ def _one_edit(row: AuditRow, edit: Mapping[str, Any]) -> str:
     return f"{what}{view}{names}"
 
 
-def _dismissal(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _dismissal_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = "dismissed the finding" if body.get("dismissed") else "opened the finding again"
     kind = str(body.get("kind")).replace("_", " ")
     place = f" in {body['view']}" if body.get("view") else ""
@@ -231,7 +231,7 @@ def _dismissal(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{did} {kind}{place}{why}"
 
 
-def _verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _verdict_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     parts = [str(body.get("state"))]
     if body.get("reason"):
         parts.append(f"because of {str(body['reason']).replace('_', ' ')}")
@@ -240,13 +240,13 @@ def _verdict(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return " ".join(parts) + (f": {body['note']}" if body.get("note") else "")
 
 
-def _bulk(row: AuditRow, body: Mapping[str, Any]) -> str:
+def _bulk_verdict_sentence(row: AuditRow, body: Mapping[str, Any]) -> str:
     verb = "undid verdicts on" if row.kind.endswith("undo") else f"{body.get('state', 'changed')}"
     count = body.get("changed", body.get("groups"))
     return f"{verb} {plural(count, 'group') if isinstance(count, int) else 'many groups'} at once"
 
 
-def _comment(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _comment_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = {"said": "commented", "edited": "changed a comment", "deleted": "deleted a comment"}
     did |= {"resolved": "resolved a thread", "reopened": "reopened a thread"}
     verb = did.get(str(body.get("did")), "commented")
@@ -256,7 +256,7 @@ def _comment(_row: AuditRow, body: Mapping[str, Any]) -> str:
 _WAYS = {"passkey": " by passkey", "sign_on": " by single sign-on"}
 
 
-def _person(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _person_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     did = "password chosen" if body.get("did") == "password" else body.get("did")
     token = f" “{body['token']}”" if isinstance(body.get("token"), str) else ""
     way = _WAYS.get(str(body.get("way")), "")
@@ -264,7 +264,7 @@ def _person(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{body.get('person')}: {did}{way}{token}{role}"
 
 
-def _job(_row: AuditRow, body: Mapping[str, Any]) -> str:
+def _job_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"requested: {body.get('title')}"
 
 
@@ -314,7 +314,7 @@ def _own_work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str | None:
     return sentences.get((row.kind, str(did)))
 
 
-def _work(row: AuditRow, body: Mapping[str, Any]) -> str:
+def _work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str:
     sentence = _own_work_sentence(row, body)
     if sentence is not None:
         return sentence
@@ -323,7 +323,7 @@ def _work(row: AuditRow, body: Mapping[str, Any]) -> str:
     return f"{row.kind} {body.get('did', 'written')}" + (f": {', '.join(about)}" if about else "")
 
 
-def _named(verb: str) -> Callable[[AuditRow, Mapping[str, Any]], str]:
+def _sentence_with_name(verb: str) -> Callable[[AuditRow, Mapping[str, Any]], str]:
     def sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
         return f"{verb} {body['name']}" if isinstance(body.get("name"), str) else verb
 
@@ -331,22 +331,22 @@ def _named(verb: str) -> Callable[[AuditRow, Mapping[str, Any]], str]:
 
 
 _SENTENCES: Mapping[str, Callable[[AuditRow, Mapping[str, Any]], str]] = {
-    **dict.fromkeys(KINDS[Family.EDIT], _edit),
-    **dict.fromkeys(KINDS[Family.WORK], _work),
-    "verdict": _verdict,
-    "dismissal": _dismissal,
-    "verdict_batch": _bulk,
-    "verdict_batch_undo": _bulk,
-    "comment": _comment,
-    "person": _person,
-    "job": _job,
+    **dict.fromkeys(KINDS[Family.EDIT], _edit_sentence),
+    **dict.fromkeys(KINDS[Family.WORK], _work_sentence),
+    "verdict": _verdict_sentence,
+    "dismissal": _dismissal_sentence,
+    "verdict_batch": _bulk_verdict_sentence,
+    "verdict_batch_undo": _bulk_verdict_sentence,
+    "comment": _comment_sentence,
+    "person": _person_sentence,
+    "job": _job_sentence,
     "deed": _event_sentence,
-    "policy": _named("set the policy"),
-    "freeze": _named("froze the version"),
-    "dataset": _named("made the dataset"),
-    "dataset_deleted": _named("deleted the dataset"),
-    "import": _named("imported"),
-    "station": _named("imported a static camera"),
-    "camera": _named("imported a camera"),
-    "spare": _named("imported frames without a ball"),
+    "policy": _sentence_with_name("set the policy"),
+    "freeze": _sentence_with_name("froze the version"),
+    "dataset": _sentence_with_name("made the dataset"),
+    "dataset_deleted": _sentence_with_name("deleted the dataset"),
+    "import": _sentence_with_name("imported"),
+    "station": _sentence_with_name("imported a static camera"),
+    "camera": _sentence_with_name("imported a camera"),
+    "spare": _sentence_with_name("imported frames without a ball"),
 }

@@ -23,10 +23,10 @@ def examine_threads(store: Store) -> Check:
     When a thread began and whom it mentions stands in the tables alone.
     """
     with store.read() as session:
-        return _examine(session, dialect_in(session).restoring)
+        return _compare_with_log(session, dialect_in(session).restoring)
 
 
-def _examine(session: Session, restore: str) -> Check:
+def _compare_with_log(session: Session, restore: str) -> Check:
     try:
         with as_written():
             logged = logged_threads(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
@@ -47,14 +47,14 @@ def logged_threads(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
     threads: dict[int, ThreadRecord] = {}
     for entry in entries:
         if entry.kind == COMMENT:
-            _apply(threads, entry)
+            _apply_entry(threads, entry)
         else:
             gone = entry.dataset_id
             threads = {key: one for key, one in threads.items() if one.dataset_id != gone}
     return threads
 
 
-def _apply(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
+def _apply_entry(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
     body, number = entry.body, entry.body["thread"]
     if number not in threads:
         threads[number] = _new_thread(entry)

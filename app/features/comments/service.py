@@ -59,7 +59,7 @@ def list_threads(store: Store, group_id: int) -> list[StoredThread]:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        _need_group(session, group_id)
+        _require_group(session, group_id)
         return read_threads(session, group_id)
 
 
@@ -70,8 +70,8 @@ def people_of(store: Store, group_id: int) -> list[str]:
         NotFoundError: There is no such group.
     """
     with store.read() as session:
-        group = _need_group(session, group_id)
-        return [row.name for row in members(session, group.dataset_id) if _can_read(row)]
+        group = _require_group(session, group_id)
+        return [row.name for row in members(session, group.dataset_id) if _can_read_dataset(row)]
 
 
 def begin_thread(
@@ -89,17 +89,17 @@ def begin_thread(
         NotFoundError: There is no such group.
         InputError: It has no such view, there is no text, or it is too long.
     """
-    text = _checked(text)
+    text = _checked_comment(text)
     if at is not None and view is None:
         raise InputError("a place in a picture needs the view that it is in", pointer="/view")
     with store.write() as session:
-        group = _need_group(session, group_id)
+        group = _require_group(session, group_id)
         if view is not None and view not in group.views:
             raise InputError(f'the group has no view "{view}"', pointer="/view")
         thread_id = insert_thread(session, group, view, at, now())
         where = {"view": view, "at": None if at is None else [*at]}
         _insert_comment(session, group, thread_id, text, actor, (), **where)
-        return _answered(session, group_id, thread_id)
+        return _respond_with_thread(session, group_id, thread_id)
 
 
 def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str) -> StoredThread:
@@ -110,16 +110,19 @@ def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str)
         InputError: There is no text, or it is too long.
         ConflictError: The thread is full.
     """
-    text = _checked(text)
+    text = _checked_comment(text)
     with store.write() as session:
-        group, thread = _need_group(session, group_id), _need_thread(session, group_id, thread_id)
+        group, thread = (
+            _require_group(session, group_id),
+            _require_thread(session, group_id, thread_id),
+        )
         if len(thread.comments) >= MOST:
             raise ConflictError(
                 f"a thread has at most {MOST} comments", hint="Begin another one on this group."
             )
         before = {person_of(one.actor) for one in thread.comments if one.text is not None}
         _insert_comment(session, group, thread_id, text, actor, sorted(before))
-        return _answered(session, group_id, thread_id)
+        return _respond_with_thread(session, group_id, thread_id)
 
 
 def resolve(
@@ -131,13 +134,16 @@ def resolve(
         NotFoundError: There is no such thread of that group.
     """
     with store.write() as session:
-        group, thread = _need_group(session, group_id), _need_thread(session, group_id, thread_id)
+        group, thread = (
+            _require_group(session, group_id),
+            _require_thread(session, group_id, thread_id),
+        )
         if (thread.resolved is not None) != resolved:
             time = now()
             set_resolved(session, thread_id, *((time, actor) if resolved else (None, None)))
             did = "resolved" if resolved else "reopened"
-            _log(session, group, actor, time, did=did, thread=thread_id)
-        return _answered(session, group_id, thread_id)
+            _log_comment(session, group, actor, time, did=did, thread=thread_id)
+        return _respond_with_thread(session, group_id, thread_id)
 
 
 def change(
@@ -152,20 +158,20 @@ def change(
         ForbiddenError: It is somebody else's.
         InputError: There is no text, or it is too long.
     """
-    text = _checked(text)
+    text = _checked_comment(text)
     with store.write() as session:
-        group = _need_group(session, group_id)
-        comment = _need_own(session, group_id, thread_id, comment_id, actor)
+        group = _require_group(session, group_id)
+        comment = _require_own_comment(session, group_id, thread_id, comment_id, actor)
         if text != comment.text:
             time = now()
             change_comment(session, comment_id, text, time)
             people = _ids_of_readers(session, group, names_in(text))
             set_mentions(session, comment_id, people.values())
             entry = {"comment": comment_id, "text": text}
-            _log(session, group, actor, time, did="edited", thread=thread_id, **entry)
+            _log_comment(session, group, actor, time, did="edited", thread=thread_id, **entry)
             new = [name for name in people if name not in comment.mentions]
             _notify(session, group, thread_id, actor, new, ())
-        return _answered(session, group_id, thread_id)
+        return _respond_with_thread(session, group_id, thread_id)
 
 
 def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, actor: str) -> None:
@@ -176,12 +182,14 @@ def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, acto
         ForbiddenError: It is somebody else's.
     """
     with store.write() as session:
-        group = _need_group(session, group_id)
-        _need_own(session, group_id, thread_id, comment_id, actor)
+        group = _require_group(session, group_id)
+        _require_own_comment(session, group_id, thread_id, comment_id, actor)
         time = now()
         change_comment(session, comment_id, None, time)
-        _log(session, group, actor, time, did="deleted", thread=thread_id, comment=comment_id)
-        thread = _need_thread(session, group_id, thread_id)
+        _log_comment(
+            session, group, actor, time, did="deleted", thread=thread_id, comment=comment_id
+        )
+        thread = _require_thread(session, group_id, thread_id)
         if all(one.text is None for one in thread.comments):
             delete_thread(session, thread_id)
         session.respond(None)
@@ -201,7 +209,7 @@ def _insert_comment(
     people = _ids_of_readers(session, group, names_in(text))
     set_mentions(session, comment_id, people.values())
     entry = {"comment": comment_id, "text": text, **where}
-    _log(session, group, actor, time, did="said", thread=thread_id, **entry)
+    _log_comment(session, group, actor, time, did="said", thread=thread_id, **entry)
     _notify(session, group, thread_id, actor, people, before)
 
 
@@ -242,17 +250,19 @@ def _ids_of_readers(session: Session, group: ThreadGroup, names: Iterable[str]) 
     return found
 
 
-def _can_read(row: Any) -> bool:
+def _can_read_dataset(row: Any) -> bool:
     here = row.everywhere if row.role is None or row.everywhere == Role.ADMIN else row.role
     return bool(here != Role.NONE)
 
 
-def _log(session: Session, group: ThreadGroup, actor: str, time: str, **fields: Any) -> None:
+def _log_comment(
+    session: Session, group: ThreadGroup, actor: str, time: str, **fields: Any
+) -> None:
     body = {name: value for name, value in fields.items() if value is not None}
     append(session, [Entry(COMMENT, actor, time, body, group.dataset_id, group.group_id)])
 
 
-def _checked(text: str) -> str:
+def _checked_comment(text: str) -> str:
     text = text.strip()
     if not text:
         raise InputError("a comment says something", pointer="/text")
@@ -261,31 +271,31 @@ def _checked(text: str) -> str:
     return text
 
 
-def _need_group(session: Session, group_id: int) -> ThreadGroup:
+def _require_group(session: Session, group_id: int) -> ThreadGroup:
     group = find_group(session, group_id)
     if group is None:
         raise NotFoundError.group(group_id)
     return group
 
 
-def _answered(session: Session, group_id: int, thread_id: int) -> StoredThread:
+def _respond_with_thread(session: Session, group_id: int, thread_id: int) -> StoredThread:
     """Answer the request with a thread as it is by now."""
-    thread = _need_thread(session, group_id, thread_id)
+    thread = _require_thread(session, group_id, thread_id)
     session.respond(thread)
     return thread
 
 
-def _need_thread(session: Session, group_id: int, thread_id: int) -> StoredThread:
+def _require_thread(session: Session, group_id: int, thread_id: int) -> StoredThread:
     found = read_threads(session, group_id, thread_id)
     if not found:
         raise NotFoundError(f"group {group_id} has no thread {thread_id}")
     return found[0]
 
 
-def _need_own(
+def _require_own_comment(
     session: Session, group_id: int, thread_id: int, comment_id: int, actor: str
 ) -> StoredComment:
-    thread = _need_thread(session, group_id, thread_id)
+    thread = _require_thread(session, group_id, thread_id)
     for comment in thread.comments:
         if comment.id == comment_id and comment.text is not None:
             if not is_of(comment.actor, person_of(actor)):

@@ -19,7 +19,7 @@ commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
 def list_(json_: Json = False) -> None:
     """List every dataset with its progress."""
     server = given_server()
-    values = _values() if server is None else _values_at(server)
+    values = _read_local_datasets() if server is None else _read_remote_datasets(server)
     if json_:
         print_json(values)
         return
@@ -30,7 +30,7 @@ def list_(json_: Json = False) -> None:
         )
 
 
-def _values() -> list[dict[str, Any]]:
+def _read_local_datasets() -> list[dict[str, Any]]:
     from app.features.datasets.service import list_datasets
 
     with opened_store() as store:
@@ -41,7 +41,7 @@ def _values() -> list[dict[str, Any]]:
     ]
 
 
-def _values_at(server: ServerPlace) -> list[dict[str, Any]]:
+def _read_remote_datasets(server: ServerPlace) -> list[dict[str, Any]]:
     from app.terminal.remote import dataset_values
 
     with connected(server) as client:
@@ -63,12 +63,12 @@ def delete(
 
     with opened_store() as store:
         contents = read_contents(store, name)
-        typed = contents.name if yes else _ask(contents.name, contents.counts)
+        typed = contents.name if yes else _ask_for_name(contents.name, contents.counts)
         contents = delete_dataset(store, contents.id, confirm=typed, actor=acting())
     print_values({"deleted": contents.name, **contents.counts}, json_)
 
 
-def _ask(name: str, counts: dict[str, int]) -> str:
+def _ask_for_name(name: str, counts: dict[str, int]) -> str:
     """The name, typed once more by somebody who has read what goes."""
     there = ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "nothing"
     say_what = f'"{name}" holds {there.replace("_", " ")}. Type its name to delete it for good'

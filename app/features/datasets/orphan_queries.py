@@ -56,7 +56,7 @@ def _has_unsolved(session: Session) -> bool:
 def unread_uploads(session: Session, settings: Settings) -> list[str]:
     """Ids of uploads that are kept for their frames, though no view has its frame there and none is a
     recording."""
-    folders = {folder for path in _paths(session) for folder in path.parents}
+    folders = {folder for path in _paths_in_use(session) for folder in path.parents}
     return [
         upload.id
         for upload in list_uploads(settings)
@@ -66,7 +66,7 @@ def unread_uploads(session: Session, settings: Settings) -> list[str]:
 
 def unused_frames(session: Session, settings: Settings) -> list[str]:
     """Folders and files of the home's recordings that no view and no recording uses."""
-    used = {path.parent.name for path in _paths(session)}
+    used = {path.parent.name for path in _paths_in_use(session)}
     cameras = ShotCamerasModel
     for column in (RecordingModel.sha256, cameras.digest, cameras.before):
         used |= {sha256 for sha256 in session.scalars(select(column)) if sha256}
@@ -79,7 +79,7 @@ def unused_frames(session: Session, settings: Settings) -> list[str]:
     )
 
 
-def _paths(session: Session) -> list[Path]:
+def _paths_in_use(session: Session) -> list[Path]:
     """Where frames of views and recordings lie on this disk."""
     statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
     found = [*session.scalars(statement), *session.scalars(select(RecordingModel.path))]

@@ -94,7 +94,7 @@ def insert_dataset_row(
 ) -> int:
     """Insert a dataset, one of ``copies`` if so; returns its id."""
     identity = next_dataset_id(session, copies=copies)
-    values = {"id": identity, "name": name, "created": at, **_policy_values(policy)}
+    values = {"id": identity, "name": name, "created": at, **_policy_columns(policy)}
     session.execute(insert(DatasetModel), [values])
     return identity
 
@@ -102,7 +102,7 @@ def insert_dataset_row(
 def update_policy(session: Session, dataset_id: int, policy: Policy) -> None:
     """Judge a dataset by another policy; the queue is the caller's to refresh."""
     mine = DatasetModel.id == dataset_id
-    session.execute(update(DatasetModel).where(mine).values(_policy_values(policy)))
+    session.execute(update(DatasetModel).where(mine).values(_policy_columns(policy)))
 
 
 def group_ids(
@@ -139,7 +139,7 @@ def dataset_names(session: Session) -> dict[int, str]:
     return {row.id: row.name for row in session.execute(statement)}
 
 
-def _policy_values(policy: Policy) -> dict[str, str]:
+def _policy_columns(policy: Policy) -> dict[str, str]:
     return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}
 
 
@@ -209,14 +209,16 @@ def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
     counts = {}
     for word, name in _COUNTED.items():
         table = _TABLES[name]
-        statement = select(func.count()).select_from(table).where(_belongs(table, dataset_id))
+        statement = (
+            select(func.count()).select_from(table).where(_belongs_to_dataset(table, dataset_id))
+        )
         counts[word] = session.scalar(statement) or 0
     return counts
 
 
 def solutions_of(session: Session, dataset_id: int) -> list[int]:
     """Ids of the solutions of a dataset's groups."""
-    mine = SolutionModel.group_id.in_(_groups(dataset_id))
+    mine = SolutionModel.group_id.in_(_group_ids_statement(dataset_id))
     return list(session.scalars(select(SolutionModel.id).where(mine)))
 
 
@@ -266,28 +268,28 @@ def delete_rows(session: Session, dataset_id: int) -> None:
     # The database lets verdicts and dismissals go while their group still tells whose they are.
     judged = [_TABLES[model.__tablename__] for model in (VerdictModel, DismissalModel)]
     for table in judged:
-        session.execute(delete(table).where(_belongs(table, dataset_id)))
-    for table in filter(_hangs_on, reversed(Base.metadata.sorted_tables)):
+        session.execute(delete(table).where(_belongs_to_dataset(table, dataset_id)))
+    for table in filter(_must_be_deleted_first, reversed(Base.metadata.sorted_tables)):
         if table not in (dataset, groups, *judged):
-            session.execute(delete(table).where(_belongs(table, dataset_id)))
-    session.execute(delete(groups).where(_belongs(groups, dataset_id)))
+            session.execute(delete(table).where(_belongs_to_dataset(table, dataset_id)))
+    session.execute(delete(groups).where(_belongs_to_dataset(groups, dataset_id)))
     session.execute(delete(dataset).where(dataset.c.id == dataset_id))
 
 
-def _belongs(table: Table, dataset_id: int) -> ColumnElement[bool]:
+def _belongs_to_dataset(table: Table, dataset_id: int) -> ColumnElement[bool]:
     """Whether a row belongs to the dataset: by its own column, its group's or its station's."""
     if "dataset_id" in table.c:
         return table.c.dataset_id == dataset_id
     stations = select(StationModel.id).where(StationModel.dataset_id == dataset_id)
-    owners = {"group_id": _groups(dataset_id), "station_id": stations}
+    owners = {"group_id": _group_ids_statement(dataset_id), "station_id": stations}
     return or_(*(table.c[name].in_(ids) for name, ids in owners.items() if name in table.c))
 
 
-def _groups(dataset_id: int) -> Select[int]:
+def _group_ids_statement(dataset_id: int) -> Select[int]:
     return select(GroupModel.id).where(GroupModel.dataset_id == dataset_id)
 
 
-def _hangs_on(table: Table) -> bool:
+def _must_be_deleted_first(table: Table) -> bool:
     """Whether rows refer to a dataset or a group and do not go with it by themselves."""
     return any(
         key.column.table.name in (DatasetModel.__tablename__, GroupModel.__tablename__)

@@ -74,7 +74,7 @@ def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> 
     return request_solve(services.jobs, services.store, found, actor=actor)
 
 
-def _deleted(gone: DatasetContents, dry_run: bool) -> Response:
+def _deleted_response(gone: DatasetContents, dry_run: bool) -> Response:
     return document(DeletedDocument(dry_run=dry_run, **vars(gone)))
 
 
@@ -85,7 +85,7 @@ def _deleted(gone: DatasetContents, dry_run: bool) -> Response:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ADMINISTER, dataset=OwnedKind.DATASET)
-@responds(_deleted, "dry_run")
+@responds(_deleted_response, "dry_run")
 def delete_dataset(
     dataset: DatasetPath,
     request: DatasetDeletion,

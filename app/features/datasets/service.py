@@ -192,7 +192,7 @@ def list_datasets(
     with store.read() as session:
         hidden = frozenset(own) - copy_dataset_ids(session) if own else frozenset[int]()
         rows = [row for row in dataset_rows(session) if row.id <= COPIES or row.id in hidden]
-        return _datasets(session, [row for row in rows if visibility.sees(row.id)])
+        return _datasets_with_counts(session, [row for row in rows if visibility.sees(row.id)])
 
 
 def get_dataset(store: Store, dataset: str | int) -> Dataset:
@@ -202,7 +202,7 @@ def get_dataset(store: Store, dataset: str | int) -> Dataset:
         NotFoundError: There is none.
     """
     with store.read() as session:
-        return _datasets(session, [_need(session, dataset)])[0]
+        return _datasets_with_counts(session, [_require_dataset_row(session, dataset)])[0]
 
 
 def get_dataset_head(store: Store, dataset: str | int) -> DatasetHead:
@@ -225,12 +225,12 @@ def no_dataset(store: Store, dataset: str | int) -> NotFoundError:
 
 def need_dataset(session: Session, dataset: str | int) -> int:
     """``dataset_id`` within a session."""
-    return int(_need(session, dataset).id)
+    return int(_require_dataset_row(session, dataset).id)
 
 
 def read_dataset_head(session: Session, dataset: str | int) -> DatasetHead:
     """A dataset within a session, uncounted; raises NotFoundError when there is none."""
-    row = _need(session, dataset)
+    row = _require_dataset_row(session, dataset)
     return DatasetHead(row.id, row.name, row.created, policy_of(row.policy))
 
 
@@ -257,22 +257,22 @@ def save_policy(session: Session, dataset_id: int, policy: Policy, actor: str) -
     refresh_queue(session, group_ids(session, dataset_id))
 
 
-def _need(session: Session, dataset: str | int) -> Any:
+def _require_dataset_row(session: Session, dataset: str | int) -> Any:
     row = find_dataset(session, dataset)
     if row is None:
         raise NotFoundError.dataset(dataset, dataset_names(session))
     return row
 
 
-def _datasets(session: Session, rows: Sequence[Any]) -> list[Dataset]:
+def _datasets_with_counts(session: Session, rows: Sequence[Any]) -> list[Dataset]:
     states: dict[int, Counter[str]] = {}
     for row in count_states(session, [row.id for row in rows]):
         counts = states.setdefault(row.dataset_id, Counter())
         counts.update({row.status: row.groups, "groups": row.groups, "solved": int(row.solved)})
-    return [_dataset(row, states.get(row.id, Counter())) for row in rows]
+    return [_dataset_with_counts(row, states.get(row.id, Counter())) for row in rows]
 
 
-def _dataset(row: Any, counts: Counter[str]) -> Dataset:
+def _dataset_with_counts(row: Any, counts: Counter[str]) -> Dataset:
     return Dataset(
         id=row.id,
         name=row.name,
@@ -290,7 +290,7 @@ def _dataset(row: Any, counts: Counter[str]) -> Dataset:
 
 def licence_of(match: str) -> str:
     """The terms of the source that a match is from."""
-    return LICENCES.get(_origin(match), UNKNOWN_LICENCE)
+    return LICENCES.get(_source_of_match(match), UNKNOWN_LICENCE)
 
 
 def licence_text(matches: Iterable[str]) -> str:
@@ -298,7 +298,7 @@ def licence_text(matches: Iterable[str]) -> str:
     return " ".join(sorted({licence_of(match) for match in matches})) or UNKNOWN_LICENCE
 
 
-def _origin(match: str) -> str:
+def _source_of_match(match: str) -> str:
     parts = match.split("/")
     if parts[0] in LEAGUES:
         return "sample"
@@ -349,7 +349,7 @@ def read_contents(store: Store, dataset: str | int) -> DatasetContents:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return _contents(session, read_dataset_head(session, dataset).id)
+        return _read_contents_in(session, read_dataset_head(session, dataset).id)
 
 
 def delete_dataset(
@@ -387,7 +387,7 @@ def delete_dataset(
             delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)
     _delete_solutions(store, identity)
     with store.write() as session:
-        contents = _contents(session, identity)
+        contents = _read_contents_in(session, identity)
         removal.keep_used_ids(session)
         heir = None if afresh is None else removal.move_access(session, identity)
         body = {"name": contents.name, "counts": contents.counts, "heir": heir}
@@ -400,7 +400,7 @@ def delete_dataset(
     return contents
 
 
-def _contents(session: Session, identity: int) -> DatasetContents:
+def _read_contents_in(session: Session, identity: int) -> DatasetContents:
     name = read_dataset_head(session, identity).name
     return DatasetContents(identity, name, removal.count_contents(session, identity))
 

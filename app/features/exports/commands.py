@@ -154,7 +154,7 @@ def import_(
     from app.features.imports.sources import Source, import_source
 
     settings = read_settings()
-    root = _root(settings, path)
+    root = _resolve_source(settings, path)
     source = Source(
         format_,
         root,
@@ -163,7 +163,7 @@ def import_(
         calibration=calibration,
         frame_offset=parse_frame_offset(frame_offset),
         flipped=parse_cameras(flip),
-        frames=None if frames is None else _root(settings, frames),
+        frames=None if frames is None else _resolve_source(settings, frames),
         ball_category=ball_category,
         grouping=group_by,
         propose=propose,
@@ -184,10 +184,10 @@ def import_(
             f"Given cameras may contradict each other: touchline rig --dataset {dataset} says how far."
         )
     if format_ == "frames" and propose and not dry_run:
-        _propose(dataset, settings, silent=json_)
+        _propose_cameras(dataset, settings, silent=json_)
 
 
-def _propose(dataset: str, settings: Settings, *, silent: bool) -> None:
+def _propose_cameras(dataset: str, settings: Settings, *, silent: bool) -> None:
     """Propose cameras for pictures that were imported; Ctrl+C keeps what was found until then."""
     from app.features.jobs.endings import ending_sentence
     from app.features.paint.proposals import propose_views
@@ -203,7 +203,7 @@ def _usual_policy(format_: str) -> str | None:
     return None if format_ in ("cameras", "touchline") else "paper"
 
 
-def _root(settings: Settings, text: str) -> Path | StoredPath:
+def _resolve_source(settings: Settings, text: str) -> Path | StoredPath:
     return find_path(settings, text) if is_address(text) else Path(text).resolve()
 
 

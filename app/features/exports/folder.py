@@ -70,12 +70,12 @@ class ExportFolder:
         alone, for another server may have begun with it anew.
         """
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        self._clear(f"{name}.zip")
+        self._delete_partial_files(f"{name}.zip")
         beside = self.folder / f"{name}.zip.{secrets.token_hex(4)}"
         try:
             yield beside
         finally:
-            self._clear(beside.name)
+            self._delete_partial_files(beside.name)
 
     def keep(self, name: str, request: Mapping[str, Any], report: ExportReport) -> ExportEntry:
         """Record an export whose zip is written; only then it can be found.
@@ -98,14 +98,14 @@ class ExportFolder:
             bytes=self.content(name).stat().st_size if stored is None else stored.size,
             stored=None if stored is None else stored.sealed(),
         )
-        self._write(entry)
+        self._write_record(entry)
         return entry
 
     def find(self, name: str) -> ExportEntry | None:
         """The finished export of that id, or None."""
-        if not _ID.fullmatch(name) or not self._record(name).is_file():
+        if not _ID.fullmatch(name) or not self._record_path(name).is_file():
             return None
-        return ExportEntry(**json.loads(self._record(name).read_bytes()))
+        return ExportEntry(**json.loads(self._record_path(name).read_bytes()))
 
     def get(self, name: str) -> ExportEntry:
         """The finished export of that id.
@@ -128,7 +128,7 @@ class ExportFolder:
         One that lies in an object store was delivered there, and stays.
         """
         if _ID.fullmatch(name):
-            self._record(name).unlink(missing_ok=True)
+            self._record_path(name).unlink(missing_ok=True)
             self.content(name).unlink(missing_ok=True)
 
     def expire(self, days: int) -> int:
@@ -149,7 +149,7 @@ class ExportFolder:
             if expires is not None and expires < at:
                 # The record first: what is listed as ready has a file.
                 entry = replace(entry, expired=True)
-                self._write(entry)
+                self._write_record(entry)
                 gone += 1
             if entry.expired:
                 self.content(name).unlink(missing_ok=True)
@@ -163,18 +163,18 @@ class ExportFolder:
         gone = 0
         for path in self.folder.glob("*.zip"):
             name, written = path.name.removesuffix(".zip"), last_written(path)
-            known = not _ID.fullmatch(name) or self._record(name).exists()
+            known = not _ID.fullmatch(name) or self._record_path(name).exists()
             if not known and written is not None and written < time.time() - DAY:
                 path.unlink(missing_ok=True)
                 gone += 1
         return gone
 
-    def _write(self, entry: ExportEntry) -> None:
-        replace_file(self._record(entry.id), json_text(asdict(entry), ascii_=True).encode())
+    def _write_record(self, entry: ExportEntry) -> None:
+        replace_file(self._record_path(entry.id), json_text(asdict(entry), ascii_=True).encode())
 
-    def _clear(self, name: str) -> None:
+    def _delete_partial_files(self, name: str) -> None:
         for path in self.folder.glob(f".{name}.*{PARTIAL}"):
             clear(path)
 
-    def _record(self, name: str) -> Path:
+    def _record_path(self, name: str) -> Path:
         return self.folder / f"{name}.json"

@@ -23,7 +23,7 @@ _SUFFIXES = {"image/jpeg": ".jpg", "image/png": ".png", "image/webp": ".webp"}
 
 
 @dataclass(frozen=True)
-class _Written:
+class _WrittenPicture:
     """A picture that was placed: its path in the export, its frame, its group and view."""
 
     path: str
@@ -50,7 +50,7 @@ class ExportImages:
         self._layout = layout
         self._splits: Mapping[str, str] = {}
         self._names: Mapping[str, str] = {}
-        self._written: dict[str, _Written] = {}
+        self._written: dict[str, _WrittenPicture] = {}
 
     def add(
         self,
@@ -71,12 +71,12 @@ class ExportImages:
         self.placed, self._splits, self._names = {}, splits or {}, names or {}
         for view in group.views:
             if view.media is None:
-                self._miss(group, view, "no picture came with it")
+                self._note_missing(group, view, "no picture came with it")
             else:
                 then = None if frozen is None else frozen.get(view.key, {})
-                self._add(group, view, view.media, then)
+                self._add_view(group, view, view.media, then)
 
-    def _add(
+    def _add_view(
         self, group: Group, view: View, media: Media, frozen: Mapping[str, int] | None
     ) -> None:
         facts = media_facts(media) if frozen is None else frozen
@@ -90,34 +90,34 @@ class ExportImages:
         if self._images == "none":
             return
         if frozen and frozen != media_facts(media):
-            self._miss(group, view, "not the file that was frozen")
+            self._note_missing(group, view, "not the file that was frozen")
             return
         try:
-            self._place(group, view, media)
+            self._place_picture(group, view, media)
         except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
-            self._miss(group, view, error.message)
+            self._note_missing(group, view, error.message)
 
     @property
     def present(self) -> int:
         """How many pictures lie in the export, looked up there."""
         return sum((self._root / item.path).is_file() for item in self._written.values())
 
-    def _miss(self, group: Group, view: View, why: str) -> None:
+    def _note_missing(self, group: Group, view: View, why: str) -> None:
         """Name a frame that was wanted and cannot be had."""
         if self._images != "none":
             self.missing.append(f"{group.key}, {view.key}: {why}")
 
-    def _place(self, group: Group, view: View, media: Media) -> None:
+    def _place_picture(self, group: Group, view: View, media: Media) -> None:
         is_file = media.member is None and media.frame is None and not is_address(media.path)
         if self._images == "link" and is_file and self._is_upright(view, media):
             if not Path(media.path).is_file():
                 raise NotFoundError(f"{PurePosixPath(media.path).name} is not there")
-            target = self._target(group, view, PurePosixPath(media.path).suffix.lower())
+            target = self._picture_path(group, view, PurePosixPath(media.path).suffix.lower())
             if target is not None:
                 target.symlink_to(media.path)
             return
         picture = self._read(media, None, view.station.flipped)
-        target = self._target(group, view, _SUFFIXES[picture.kind])
+        target = self._picture_path(group, view, _SUFFIXES[picture.kind])
         if target is not None:
             target.write_bytes(picture.data)
 
@@ -127,7 +127,7 @@ class ExportImages:
         header = picture_header(media)
         return not view.station.flipped and (header is None or header.orientation == 1)
 
-    def _target(self, group: Group, view: View, suffix: str) -> Path | None:
+    def _picture_path(self, group: Group, view: View, suffix: str) -> Path | None:
         """Where a frame goes, in folders that are there; None where it lies there already.
 
         Raises:
@@ -146,6 +146,8 @@ class ExportImages:
         if first is not None:
             return None
         target = resolve_inside(self._root, path)
-        self._written[fold_file_name(path)] = _Written(path, frame_identity(group, view), whose)
+        self._written[fold_file_name(path)] = _WrittenPicture(
+            path, frame_identity(group, view), whose
+        )
         target.parent.mkdir(parents=True, exist_ok=True)
         return target

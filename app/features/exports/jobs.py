@@ -56,7 +56,7 @@ def request_export(
     found = get_dataset_head(store, request["dataset"])
     version = request.get("version")
     if request.get("to") is not None:
-        require_absent(_target(store, request["to"]))
+        require_absent(_target_in_store(store, request["to"]))
     require_possible(
         store,
         found.id,
@@ -95,9 +95,9 @@ def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: Jo
             store,
             "exports",
             "the export",
-            _export,
+            _export_in_worker,
             progress.dataset_id,
-            content if to is None else _target(store, to),
+            content if to is None else _target_in_store(store, to),
             beside,
             request,
             dataset_id=progress.dataset_id,
@@ -119,7 +119,7 @@ def export_work(store: Store, folder: ExportFolder, frames: Frames, progress: Jo
     }
 
 
-def _export(
+def _export_in_worker(
     store: Store,
     dataset_id: int,
     out: Root,
@@ -154,7 +154,7 @@ def _export(
     )
 
 
-def _target(store: Store, address: str) -> StoredPath:
+def _target_in_store(store: Store, address: str) -> StoredPath:
     """Where in a store an export goes.
 
     Raises:

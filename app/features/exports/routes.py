@@ -77,7 +77,7 @@ def list_formats(
     )
 
 
-def _export_answer(job: Job) -> Response:
+def _export_job_response(job: Job) -> Response:
     started = ExportJobDocument.of_export(JobDocument.model_validate(job))
     return document(started, 202, job_address(job))
 
@@ -90,7 +90,7 @@ def _export_answer(job: Job) -> Response:
     responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
 )
 @may(Action.EXPORT, body={"dataset": OwnedKind.DATASET}, whole=True)
-@responds(_export_answer)
+@responds(_export_job_response)
 def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> Job:
     """Write accepted groups, or all of them, to a zip; 400 when there is nothing to write."""
     return request_export(
@@ -131,7 +131,7 @@ def list_exports(
 @may(Action.READ, export=OwnedKind.EXPORT)
 def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     """What was asked for, how far it is, and what came of it."""
-    return _document(services, export)
+    return _export_document(services, export)
 
 
 @router.delete(
@@ -145,9 +145,9 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
 @responds(no_content)
 def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None:
     """Delete the file of an export, or one that failed altogether; 409 while it is being written."""
-    document = _document(services, export)
+    document = _export_document(services, export)
     if document.state in ("waiting", "running"):
-        raise _not_ready(document)
+        raise _not_ready_error(document)
     if document.state == "gone":
         raise NotFoundError("there is no such export")
     if document.state in ("failed", "cancelled"):
@@ -159,7 +159,7 @@ def delete_export(export: ExportId, services: AppServices, actor: Actor) -> None
 async def written(export: ExportId, services: AppServices) -> str:
     """The id of an export, once that is no longer under way or patience is at its end."""
     end = time.monotonic() + PATIENCE
-    number = int(export) if _is_id(export) else 0
+    number = int(export) if _may_be_job_id(export) else 0
     while services.jobs.is_open(number, KIND) and time.monotonic() < end:
         await asyncio.sleep(0.05)
     return export
@@ -181,7 +181,7 @@ def get_content(
     409 when it is not ready by then, or its writing failed. One that lies in an object store comes
     through this server, or from an address of the store that is good for a minute.
     """
-    document = _document(services, export)
+    document = _export_document(services, export)
     entry = services.exports.find(export)
     if entry is not None and entry.stored is not None:
         return stored_file(services.settings, entry.stored, _file_name(document), request)
@@ -197,7 +197,7 @@ def get_content(
     if document.state == "gone" or (document.state == "done" and not path.is_file()):
         raise NotFoundError("the file of this export is gone", hint="Make the export again.")
     if document.state != "done":
-        raise _not_ready(document)
+        raise _not_ready_error(document)
     return FileResponse(
         path,
         media_type="application/zip",
@@ -210,7 +210,7 @@ def _file_name(document: ExportDocument) -> str:
     return f"touchline-{document.request.format}-{document.id[:8]}.zip"
 
 
-def _document(services: Services, export: str) -> ExportDocument:
+def _export_document(services: Services, export: str) -> ExportDocument:
     """The document of an export that is ready or under way.
 
     Raises:
@@ -219,19 +219,19 @@ def _document(services: Services, export: str) -> ExportDocument:
     entry, days = services.exports.find(export), services.settings.export_days
     if entry is not None:
         return ExportDocument.of(entry, days)
-    if _is_id(export):
+    if _may_be_job_id(export):
         job = services.jobs.get(int(export))
         if job.kind == KIND:
             return ExportDocument.of_job(job, None, days)
     raise NotFoundError("there is no such export")
 
 
-def _is_id(export: str) -> bool:
+def _may_be_job_id(export: str) -> bool:
     """Whether it may be the id of a job; those of exports that were made before there were jobs are none."""
     return export.isascii() and export.isdigit() and len(export) < 19
 
 
-def _not_ready(document: ExportDocument) -> ConflictError:
+def _not_ready_error(document: ExportDocument) -> ConflictError:
     if document.state in ("waiting", "running"):
         return ConflictError(
             "the export is still being written",

@@ -95,7 +95,7 @@ class FormatAnswer:
 
 
 @dataclass(frozen=True)
-class _Options:
+class _ExportOptions:
     format: str
     everything: bool
     boxes: str = "optimized"
@@ -109,7 +109,7 @@ class _Options:
 
     def require_used(self) -> None:
         """Raises InputError where an option is given that the format does not use."""
-        usual = _Options(self.format, self.everything)
+        usual = _ExportOptions(self.format, self.everything)
         for name, formats in USERS.items():
             if self.format not in formats and getattr(self, name) != getattr(usual, name):
                 raise InputError(
@@ -179,25 +179,25 @@ def export(
         InputError: Nothing to export, the format does not use an option, or the groups do not fit it.
         StorageError: The disk refuses.
     """
-    options = _Options(format, everything, boxes, images, views)
+    options = _ExportOptions(format, everything, boxes, images, views)
     options.check(out)
-    _require_plain(format, everything, version)
+    _require_no_version_conflict(format, everything, version)
     if format == CARRY:
         counts = export_edits(store, dataset, out, progress, beside)
         return ExportReport(out, CARRY, counts["groups"], counts)
     with store.read() as session:
-        source = _source(session, store, dataset, options, version)
+        source = _open_source(session, store, dataset, options, version)
         with output_anywhere(out, store.settings.exports, beside, progress) as root:
             frames = ExportImages(root, images, read or _local_reader(store), frame_layout(format))
             names = export_names(format, source.outlines())
-            run = _Run(source, options, frames, names, progress)
+            run = _ExportRun(source, options, frames, names, progress)
             # A version is the same every time; unassigned frames are the dataset's as it is.
-            run.tracks = _tracks(session, source, options)
+            run.tracks = _open_track_source(session, source, options)
             if format == "parquet" and source.tracks:
                 run.kept = frozen_records(_frozen(session, source))
             if format == "issia" and isinstance(source, LiveSource):
                 run.unassigned = unassigned_persons(session, dataset)
-            with _view_files(root, out) as put:
+            with _open_view_files(root, out) as put:
                 counts = run.write(root, put)
             _require_content(source.dataset, format, counts)
             if images != "none" and "images_missing" not in counts:
@@ -208,7 +208,7 @@ def export(
 
 
 @contextmanager
-def _view_files(root: Path, out: Root) -> Iterator[PutText | None]:
+def _open_view_files(root: Path, out: Root) -> Iterator[PutText | None]:
     """Where the files of single views go: on their way into a zip they wait together."""
     if out.suffix.lower() != ".zip":
         yield None
@@ -238,7 +238,7 @@ def require_possible(
         InputError: Nothing to export, none of the images that are wanted is there, the format does
             not use an option, or the groups do not fit it; then the hint names those that they fit.
     """
-    options = _Options(format, everything, boxes, images, views)
+    options = _ExportOptions(format, everything, boxes, images, views)
     options.require_used()
     try:
         _require_format(store, dataset, options, version)
@@ -261,7 +261,7 @@ def possible_formats(
     """
     answers = []
     for format in FORMATS:  # noqa: A001
-        options = _Options(format, version is None, "optimized", "none", "all")
+        options = _ExportOptions(format, version is None, "optimized", "none", "all")
         try:
             _require_format(store, dataset, options, version)
         except InputError as error:
@@ -272,13 +272,13 @@ def possible_formats(
 
 
 def _require_format(
-    store: Store, dataset: str | int, options: _Options, version: str | None
+    store: Store, dataset: str | int, options: _ExportOptions, version: str | None
 ) -> None:
     """``require_possible`` of one format."""
     format, everything = options.format, options.everything  # noqa: A001
-    _require_plain(format, everything, version)
+    _require_no_version_conflict(format, everything, version)
     with store.read() as session, TemporaryDirectory(prefix="touchline-") as folder:
-        whole = _source(
+        whole = _open_source(
             session,
             store,
             dataset,
@@ -292,8 +292,8 @@ def _require_format(
         with ViewFiles(Path(folder)) as small:
             try:
                 names = export_names(format, source.outlines())
-                run = _Run(source, options, frames, names, None)
-                run.tracks = _tracks(session, source, options, try_only=True)
+                run = _ExportRun(source, options, frames, names, None)
+                run.tracks = _open_track_source(session, source, options, try_only=True)
                 counts = run.write(Path(folder), small.put)
             except InputError as error:
                 raise _UnrepresentableError(error.message, hint=error.hint) from error
@@ -314,7 +314,7 @@ def _require_frames(dataset: str, files: Iterable[str]) -> None:
         )
 
 
-def _require_plain(format: str, everything: bool, version: str | None) -> None:  # noqa: A002
+def _require_no_version_conflict(format: str, everything: bool, version: str | None) -> None:  # noqa: A002
     """Raises InputError where a version is asked for together with what it cannot be."""
     if version is None:
         return
@@ -358,8 +358,8 @@ def _local_reader(store: Store) -> ReadPicture:
     return lambda media, width, flipped: make_picture(media, width, flipped, store.settings)
 
 
-def _source(
-    session: Session, store: Store, dataset: str | int, options: _Options, version: str | None
+def _open_source(
+    session: Session, store: Store, dataset: str | int, options: _ExportOptions, version: str | None
 ) -> LiveSource | VersionSource:
     found = read_dataset_head(session, dataset)
     if version is not None:
@@ -370,10 +370,10 @@ def _source(
     return source
 
 
-def _tracks(
+def _open_track_source(
     session: Session,
     source: LiveSource | VersionSource | _SampleSource,
-    options: _Options,
+    options: _ExportOptions,
     *,
     try_only: bool = False,
 ) -> TrackSource | None:
@@ -395,13 +395,13 @@ def _frozen(
     return {key: json_of(bodies[name]) for key, name in names.items()}
 
 
-class _Run:
+class _ExportRun:
     """One export under way: streams records to a writer and notes what the manifest says."""
 
     def __init__(
         self,
         source: ExportSource,
-        options: _Options,
+        options: _ExportOptions,
         images: ExportImages,
         names: ExportNames,
         progress: ReportProgress | None,
@@ -474,12 +474,12 @@ class _Run:
                 self._licences.add(licence_of(record.group.match))
                 names = self._names.of(record.group, record.splits)
                 self._images.add(record.group, facts, record.splits, names)
-                self._note(record)
+                self._note_verdict(record)
                 yield replace(record, frames=self._images.placed, names=names)
             if self._progress is not None:
                 self._progress(place, self._source.count)
 
-    def _note(self, record: ExportRecord) -> None:
+    def _note_verdict(self, record: ExportRecord) -> None:
         """What the manifest says of a verdict."""
         self._verdicts[record.verdict] += 1
         if record.override is not None and record.verdict == "accepted":

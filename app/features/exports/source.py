@@ -124,12 +124,12 @@ class LiveSource:
         for start in range(0, self.count, BATCH):
             views = view_file_fields(self._session, self._ids[start : start + BATCH])
             for _, run in groupby(views, key=lambda view: view.group_id):
-                yield _outline(list(run)), {}
+                yield _outline_of_views(list(run)), {}
 
     def require_some(self) -> None:
         """Raise InputError where there is nothing to export."""
         if not self.count:
-            raise _nothing_to_export(self._found, self.left_out, self._groups != "accepted")
+            raise _nothing_to_export_error(self._found, self.left_out, self._groups != "accepted")
 
 
 class VersionSource:
@@ -157,9 +157,9 @@ class VersionSource:
         for row in read_rows(self._session, self._version.id, members=True):
             batch.append(row)
             if len(batch) == BATCH:
-                yield from self._thawed(batch)
+                yield from self._thaw_rows(batch)
                 batch = []
-        yield from self._thawed(batch)
+        yield from self._thaw_rows(batch)
 
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
@@ -169,7 +169,7 @@ class VersionSource:
             for row, group in zip(batch, groups, strict=True):
                 yield replace(group, split=row.split), row.splits or {}
 
-    def _thawed(self, rows: list[VersionGroup]) -> Iterator[Item]:
+    def _thaw_rows(self, rows: list[VersionGroup]) -> Iterator[Item]:
         for item in thaw(self._session, self._version, rows):
             frames = item.row.frames or {}
             facts = {key: frame["facts"] for key, frame in frames.items() if "facts" in frame}
@@ -194,7 +194,7 @@ def frozen_record(item: FrozenGroup) -> ExportRecord:
     )
 
 
-def _outline(views: list[ViewFileFields]) -> Group:
+def _outline_of_views(views: list[ViewFileFields]) -> Group:
     """A group of views without lines and balls."""
     first = views[0]
     return Group(
@@ -213,13 +213,13 @@ def _live_record(state: GroupState) -> ExportRecord:
     return ExportRecord(
         group=state.group,
         solution=state.solution,
-        verdict=_verdict(verdict),
+        verdict=_verdict_text(verdict),
         reason=verdict_reason(verdict.state, verdict.reason, verdict.note, verdict.override),
         override=verdict.override,
     )
 
 
-def _verdict(verdict: VerdictState) -> str:
+def _verdict_text(verdict: VerdictState) -> str:
     """The verdict; an accepted group that changed since says so, as it is not accepted now."""
     stale = verdict.stale and verdict.state == "accepted"
     return f"{verdict.state} (stale)" if stale else verdict.state
@@ -236,7 +236,7 @@ def verdict_reason(
     return None
 
 
-def _nothing_to_export(
+def _nothing_to_export_error(
     dataset: DatasetHead, left_out: Mapping[str, int], everything: bool
 ) -> InputError:
     if everything:

@@ -143,13 +143,13 @@ def calibrate_files(
                 )
             )  # fmt: skip
         frames = gather(jobs, len(files))
-    frames = [_in_picture(frame, geometry, size) for frame in frames]
-    summary = _summary(frames, report, time.perf_counter() - began)
+    frames = [_frame_in_picture(frame, geometry, size) for frame in frames]
+    summary = _make_summary(frames, report, time.perf_counter() - began)
     if sharing:
         summary["matches"] = groups
     if picture_summary is not None:
         summary["picture"] = picture_summary
-    _write(out, frames, summary, with_leave_one_out)
+    _write_results(out, frames, summary, with_leave_one_out)
     return summary
 
 
@@ -172,7 +172,7 @@ def share_chunk(
     """The same frames once more, each with what the others of its match say."""
     warm_up()
     return [
-        _share_file(file, frame, share.others, size, policy, with_leave_one_out)
+        _calibrate_with_shared_position(file, frame, share.others, size, policy, with_leave_one_out)
         for file, frame, share in zip(files, frames, shares, strict=True)
     ]
 
@@ -187,10 +187,10 @@ def _calibrate_file(
     lone = look_alone(calibration, file.lines, Pitch(), size, policy)
     milliseconds += 1000 * (time.thread_time() - began)
     left_out = leave_one_out(file.lines, Pitch(), size, policy) if with_leave_one_out else ()
-    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out), lone)
+    return _make_frame(file.stem, calibration, size, milliseconds, tuple(left_out), lone)
 
 
-def _share_file(
+def _calibrate_with_shared_position(
     file: LineFile,
     frame: CalibratedFrame,
     others: Places,
@@ -205,10 +205,10 @@ def _share_file(
     left_out = leave_one_out(file.lines, pitch, size, policy, others) if with_leave_one_out else ()
     if calibration is frame.alone:
         return replace(frame, milliseconds=milliseconds, left_out=tuple(left_out))
-    return _frame(file.stem, calibration, size, milliseconds, tuple(left_out))
+    return _make_frame(file.stem, calibration, size, milliseconds, tuple(left_out))
 
 
-def _frame(
+def _make_frame(
     stem: str,
     calibration: Calibration,
     size: ImageSize,
@@ -235,7 +235,7 @@ def _frame(
     )
 
 
-def _in_picture(
+def _frame_in_picture(
     frame: CalibratedFrame, picture: PictureGeometry | None, size: ImageSize
 ) -> CalibratedFrame:
     """The frame with the camera of the picture as it is; it was found in the one that was taken."""
@@ -246,7 +246,7 @@ def _in_picture(
     return replace(frame, camera=camera_file_text(picture.done(camera, size), known, size))
 
 
-def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:
+def _make_summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:
     times = [frame.milliseconds for frame in frames]
     failed = [
         {"frame": frame.stem, "reason": frame.reason} for frame in frames if frame.camera is None
@@ -267,27 +267,27 @@ def _summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> d
     }
 
 
-def _write(
+def _write_results(
     out: Path, frames: list[CalibratedFrame], summary: dict[str, Any], with_leave_one_out: bool
 ) -> None:
     texts = {camera_file_name(frame.stem): frame.camera for frame in frames if frame.camera}
     findings = [
         {"frame": frame.stem, **asdict(finding)} for frame in frames for finding in frame.findings
     ]
-    texts["findings.json"] = _text(findings)
+    texts["findings.json"] = _json_file_text(findings)
     if with_leave_one_out:
         rows = [
             {"frame": frame.stem, "marking": marking, "error_px": error}
             for frame in frames
             for marking, error in frame.left_out
         ]
-        texts["leave_one_out.json"] = _text(rows)
+        texts["leave_one_out.json"] = _json_file_text(rows)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for stale in _own_files(out) - set(texts):
+        for stale in _files_of_earlier_run(out) - set(texts):
             (out / stale).unlink()
         # calibrate.json says what the folder holds, so it comes last.
-        for name, text in chain(texts.items(), [("calibrate.json", _text(summary))]):
+        for name, text in chain(texts.items(), [("calibrate.json", _json_file_text(summary))]):
             file = out / name
             file.parent.mkdir(parents=True, exist_ok=True)
             replace_file(file, text.encode(), durable=False, private=False)
@@ -295,7 +295,7 @@ def _write(
         raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
 
 
-def _own_files(out: Path) -> set[str]:
+def _files_of_earlier_run(out: Path) -> set[str]:
     """Files of an earlier run; none where no run ended, so nothing foreign is removed."""
     if not (out / "calibrate.json").is_file():
         return set()
@@ -303,5 +303,5 @@ def _own_files(out: Path) -> set[str]:
     return names | ({"leave_one_out.json"} if (out / "leave_one_out.json").is_file() else set())
 
 
-def _text(value: Any) -> str:
+def _json_file_text(value: Any) -> str:
     return json_text(value, indent=1) + "\n"

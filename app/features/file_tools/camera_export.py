@@ -82,7 +82,7 @@ def _write_samples(
     sizes: Mapping[int, ImageSize],
     size: ImageSize | None,
 ) -> None:
-    rows = _tracked(source)
+    rows = _read_track_rows(source)
     times = {frame: row["time"] for frame, row in rows.items() if _is_number(row.get("time"))}
     rate = frame_rate(times)
     width = len(str(max(cameras)))
@@ -111,7 +111,7 @@ def _write_samples(
         replace_file(out / name, (json_text(sample, indent=1) + "\n").encode())
 
 
-def _tracked(source: Path) -> dict[int, dict[str, Any]]:
+def _read_track_rows(source: Path) -> dict[int, dict[str, Any]]:
     """The rows of ``track.json`` by frame; none where there is no such file."""
     path = source / "track.json"
     if not path.is_file():

@@ -87,7 +87,7 @@ def calibrate(
     from app.features.file_tools.calibrate import calibrate_files
     from app.workers.executors import process_pool
 
-    named, shape = _file(matches, "--matches"), _file(picture, "--picture")
+    named, shape = _file_of_option(matches, "--matches"), _file_of_option(picture, "--picture")
     pool = process_pool(workers or read_settings().workers)
     with pool as executor, show_progress("Calibrating") as progress:
         result = calibrate_files(
@@ -122,7 +122,7 @@ def _print_problems(problems: list[str]) -> None:
         print_error(f"... and {len(problems) - PROBLEMS} more problems; --json names all")
 
 
-def _file(text: str | None, option: str) -> Path | None:
+def _file_of_option(text: str | None, option: str) -> Path | None:
     """The file that an option names; None without the option and for ``auto``."""
     if text in (None, "auto"):
         return None

@@ -51,11 +51,11 @@ def link_files(
     report = Report()
     made = find_time_map(_read_view(live, report), _read_view(replay, report), hints)
     result = {
-        **_values(made),
+        **_link_values(made),
         "reason": made.reason,
         "found_by": None if made.reason else "instants" if made.by_hand else "ball",
         "pieces": [
-            {"first_s": piece.first, "last_s": piece.last, **_values(piece)}
+            {"first_s": piece.first, "last_s": piece.last, **_link_values(piece)}
             for piece in made.pieces
         ],
         "problems": [problem.message for problem in report.problems],
@@ -77,7 +77,7 @@ def parse_hint(text: str) -> tuple[float, float]:
     return float(found.group(1)), float(found.group(2))
 
 
-def _values(made: TimeMap) -> dict[str, Any]:
+def _link_values(made: TimeMap) -> dict[str, Any]:
     linked = made.reason is None
     sigma: Sequence[float | None] = (None, None)
     if linked and made.covariance is not None:
@@ -151,7 +151,7 @@ def read_ball(
         if is_missing(row.get("x")) and is_missing(row.get("y")):
             continue
         try:
-            frame, time, x, y = (_number(row, column, name, line) for column in _COLUMNS)
+            frame, time, x, y = (_parse_number(row, column, name, line) for column in _COLUMNS)
             if not frame.is_integer():
                 raise DatasetFormatError(name, f"line {line}", "frame", "is no whole number")
             if frame in frames:
@@ -166,7 +166,7 @@ def read_ball(
     return found
 
 
-def _number(row: Mapping[str, str], column: str, name: str, line: int) -> float:
+def _parse_number(row: Mapping[str, str], column: str, name: str, line: int) -> float:
     text = row.get(column)
     try:
         value = float(text or "")

@@ -120,8 +120,8 @@ def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any
     files = list(read_line_files(source, size, report))
     if not files:
         raise report.refusal(f"{source} holds no line files")
-    found = _estimated(files, size)
-    values = _values(found)
+    found = _estimate_picture(files, size)
+    values = _picture_values(found)
     return {**values, "problems": [problem.message for problem in report.problems]}
 
 
@@ -140,10 +140,10 @@ def picture_for(
         picture = read_picture(given)
         return picture, {"aspect": picture.aspect, "shift": [*picture.shift]}
     try:
-        found = _estimated(files, size)
+        found = _estimate_picture(files, size)
     except GeometryError as error:
         return None, {"problem": error.message}
-    return found.proposal, _values(found)
+    return found.proposal, _picture_values(found)
 
 
 def read_picture(path: Path) -> PictureGeometry:
@@ -174,12 +174,12 @@ def as_taken(files: Sequence[LineFile], picture: PictureGeometry | None) -> list
     return [replace(file, lines=picture.undone(file.lines, file.size)) for file in files]
 
 
-def _estimated(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:
+def _estimate_picture(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:
     frames = [PictureFrame(file.lines, size) for file in files]
     return estimate_match_picture(frames, CLICKED)
 
 
-def _values(found: PictureEstimate) -> dict[str, Any]:
+def _picture_values(found: PictureEstimate) -> dict[str, Any]:
     return {
         "aspect": found.picture.aspect,
         "shift": [*found.picture.shift],

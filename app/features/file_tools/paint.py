@@ -160,13 +160,13 @@ def snap_files(
         InputError: No picture has a line file, or ``out`` cannot be written.
     """
     report = Report()
-    values = _line_values(lines, settings, report)
-    match = _Match(values, images, settings)
+    values = _read_line_values(lines, settings, report)
+    match = _FileByPicture(values, images, settings)
     rows: list[dict[str, Any]] = []
     drawn: list[DrawnFrame] = []
     for picture, frame, key in match.pictures(report):
         row, text, snapped = _snap_picture(picture, frame, values[key], report)
-        _keep(out, frame, text, snapped)
+        _write_snapped_camera(out, frame, text, snapped)
         rows.append(row)
         if snapped is not None:
             size = ImageSize(snapped.size[1], snapped.size[0])
@@ -176,7 +176,7 @@ def snap_files(
     if not rows:
         raise report.refusal(f"no picture has a line file of its name in {lines}")
     share_tripods(drawn, tripod, rows, out)
-    _write(out / "snap.json", rows)
+    _write_rows(out / "snap.json", rows)
     return rows
 
 
@@ -200,7 +200,7 @@ def agree_files(
     """
     report = Report()
     found = read_cameras(cameras, report)
-    match = _Match(found, images, settings)
+    match = _FileByPicture(found, images, settings)
     rows: list[dict[str, Any]] = []
     for picture, frame, key in match.pictures(report):
         rows.append(_agree_picture(picture, frame, found[key]))
@@ -211,7 +211,7 @@ def agree_files(
     return rows
 
 
-class _Match:
+class _FileByPicture:
     """Which line file or camera belongs to a picture.
 
     The one of its whole name; else the one of its bare stem, where that stem is unique among
@@ -230,11 +230,11 @@ class _Match:
         """Each picture that has a file, with the name of its frame and the key of its file."""
         names = UniqueNames()
         for picture in read_pictures(self._images, self._settings, report):
-            key = self._key(picture.stem)
+            key = self._find_key(picture.stem)
             if key is not None:
                 yield picture, names.name(picture.stem), key
 
-    def _key(self, stem: str) -> str | None:
+    def _find_key(self, stem: str) -> str | None:
         if stem in self._keys:
             return stem
         bare = PurePosixPath(stem).name
@@ -242,7 +242,7 @@ class _Match:
         return keys[0] if len(keys) == 1 and self._stems[bare] == 1 else None
 
 
-def _line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
+def _read_line_values(lines: Path, settings: Settings, report: Report) -> dict[str, Any]:
     """The lines of each image, by stem with folders; an error where they cannot be read."""
     values: dict[str, Any] = {}
     with opened_tree(lines, report, Limits.of(settings)) as tree:
@@ -271,34 +271,34 @@ def _snap_picture(
 ) -> tuple[dict[str, Any], str | None, SnappedCamera | None]:
     """The row of a picture, the text of its camera's file, and how it lies on the paint."""
     if picture.image is None:
-        return _row(frame, NOTHING, reason=picture.problem), None, None
+        return _result_row(frame, NOTHING, reason=picture.problem), None, None
     if isinstance(value, ReviewError):
-        return _row(frame, NOTHING, reason=value.message), None, None
+        return _result_row(frame, NOTHING, reason=value.message), None, None
     if (small := why_too_small(picture.image)) is not None:
-        return _row(frame, NOTHING, reason=small), None, None
+        return _result_row(frame, NOTHING, reason=small), None, None
     height, width = picture.image.shape[:2]
     size = ImageSize(width, height)
     try:
         lines, _ = lines_from_json(value, size, picture.stem, report)
     except ReviewError as error:
-        return _row(frame, NOTHING, reason=error.message), None, None
+        return _result_row(frame, NOTHING, reason=error.message), None, None
     began = time.thread_time()
     clicked = calibrate(lines, Pitch(), size, CLICKED)
     if clicked.camera is None:
-        return _row(frame, NOTHING, reason=clicked.reason), None, None
+        return _result_row(frame, NOTHING, reason=clicked.reason), None, None
     kept = camera_file_text(clicked.camera, clicked.known_covariance, size)
     field = field_of_play(picture.image)
     reason = why_no_field(picture.image, field)
     if reason is not None:
-        return _row(frame, UNSURE, reason=f"no_paint: {reason}"), kept, None
+        return _result_row(frame, UNSURE, reason=f"no_paint: {reason}"), kept, None
     try:
-        snapped = _snapped(picture, field, clicked)
+        snapped = _snap_to_paint(picture, field, clicked)
     except (GeometryError, np.linalg.LinAlgError) as error:
         broken = f"the paint cannot be solved ({error}): the camera of the clicks stays"
-        return _row(frame, UNSURE, reason=broken), kept, None
+        return _result_row(frame, UNSURE, reason=broken), kept, None
     spent = 1000 * (time.thread_time() - began)
     seen = agreement(snapped.camera, field, line_like(picture.image, field))
-    row = _row(
+    row = _result_row(
         frame,
         UNSURE if snapped.reason else PROPOSED,
         supported=seen.supported,
@@ -315,7 +315,7 @@ def _snap_picture(
     return row, camera_file_text(snapped.camera, row_by_row(known), size), snapped
 
 
-def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> SnappedCamera:
+def _snap_to_paint(picture: PictureFile, field: Any, clicked: Calibration) -> SnappedCamera:
     assert picture.image is not None and clicked.camera is not None
     known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
     return snap(picture.image, field, clicked.camera, start_covariance=known)
@@ -323,17 +323,17 @@ def _snapped(picture: PictureFile, field: Any, clicked: Calibration) -> SnappedC
 
 def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str, Any]:
     if picture.image is None:
-        return _row(frame, NOTHING, reason=picture.problem)
+        return _result_row(frame, NOTHING, reason=picture.problem)
     if camera.lens != BROWN_CONRADY:
         other = "the paint is read with lenses of one radial term; this camera has another"
-        return _row(frame, NOTHING, reason=other)
+        return _result_row(frame, NOTHING, reason=other)
     began = time.thread_time()
     field = field_of_play(picture.image)
     reason = why_no_field(picture.image, field)
     if reason is not None:
-        return _row(frame, NOTHING, reason=reason)
+        return _result_row(frame, NOTHING, reason=reason)
     seen = agreement(camera, field, line_like(picture.image, field))
-    return _row(
+    return _result_row(
         frame,
         "measured",
         supported=seen.supported,
@@ -343,13 +343,15 @@ def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str
     )
 
 
-def _row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
+def _result_row(frame: str, outcome: str, **known: Any) -> dict[str, Any]:
     names = ("supported", "explained", "points", "error_px", "runner_up", "ms", "moved_px")
     empty: Mapping[str, Any] = dict.fromkeys((*names, "reason"))
     return {"frame": frame, "outcome": outcome, **empty, "points": 0, **known}
 
 
-def _keep(out: Path, stem: str, text: str | None, snapped: SnappedCamera | None) -> None:
+def _write_snapped_camera(
+    out: Path, stem: str, text: str | None, snapped: SnappedCamera | None
+) -> None:
     """Write the camera of a frame and the points that were snapped; what an earlier run left
     there goes where there is nothing to write."""
     old = resolve_inside(out, camera_file_name(stem))
@@ -372,7 +374,7 @@ def _keep(out: Path, stem: str, text: str | None, snapped: SnappedCamera | None)
         raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
 
 
-def _write(path: Path, rows: list[dict[str, Any]]) -> None:
+def _write_rows(path: Path, rows: list[dict[str, Any]]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         text = json_text(rows, indent=1) + "\n"

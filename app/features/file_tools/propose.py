@@ -66,10 +66,10 @@ def propose_files(
         InputError: There is no picture, no known camera, or ``out`` cannot hold the result.
     """
     report = Report()
-    cameras = _known(known)
+    cameras = _read_known_cameras(known)
     rows: list[dict[str, Any]] = []
     names = UniqueNames()
-    seen: list[_Proposed | None] = []
+    seen: list[_ProposedCamera | None] = []
     for picture in read_pictures(sources, settings, report):
         frame = names.name(picture.stem)
         row, proposed = _propose_one(picture, frame, out, cameras, size, Pitch())
@@ -80,7 +80,7 @@ def propose_files(
     if not rows:
         why = f": {report.problems[0].message}" if report.problems else ""
         raise InputError(f"there are no pictures (jpg, png or webp) to read{why}")
-    pitches = _other_pitches(seen)
+    pitches = _pitches_shown_by_films(seen)
     if pitches:
         for at, picture in enumerate(read_pictures(sources, settings, Report())):
             if at in pitches:
@@ -88,12 +88,12 @@ def propose_files(
                 seen[at] = again or seen[at]
     drawn = [one.drawn for one in seen if one is not None and one.drawn is not None]
     share_tripods(drawn, tripod, rows, out)
-    _write(out / RESULT, json_text(rows, indent=1) + "\n")
+    _write_camera_file(out / RESULT, json_text(rows, indent=1) + "\n")
     return rows
 
 
 @dataclass(frozen=True)
-class _Proposed:
+class _ProposedCamera:
     """A camera, proposed or nearly so, and the paint beside it; an unsure one agrees by nothing."""
 
     camera: Camera
@@ -102,7 +102,7 @@ class _Proposed:
     drawn: DrawnFrame | None = None
 
 
-def _other_pitches(seen: Sequence[_Proposed | None]) -> dict[int, Pitch]:
+def _pitches_shown_by_films(seen: Sequence[_ProposedCamera | None]) -> dict[int, Pitch]:
     """The pitch of each frame whose film certainly shows another size, by its index."""
     cameras = [None if one is None else one.camera for one in seen]
     sizes = [None if one is None else one.frame.size for one in seen]
@@ -121,9 +121,9 @@ def _propose_again(
     at: int,
     out: Path,
     pitch: Pitch,
-    before: _Proposed | None,
+    before: _ProposedCamera | None,
     size: ImageSize | None,
-) -> _Proposed | None:
+) -> _ProposedCamera | None:
     """A frame once more on the pitch that its film shows; kept where the paint agrees no less."""
     frame = rows[at]["frame"]
     if picture.image is None or before is None:
@@ -148,7 +148,7 @@ def _propose_one(
     size: ImageSize | None,
     pitch: Pitch,
     least: float | None = None,
-) -> tuple[dict[str, Any], _Proposed | None]:
+) -> tuple[dict[str, Any], _ProposedCamera | None]:
     """Propose and write the camera of one frame; below a least agreement nothing is changed."""
     began = time.perf_counter()
     if picture.image is None:
@@ -159,7 +159,10 @@ def _propose_one(
         except (GeometryError, np.linalg.LinAlgError) as error:
             found = FrameProposal("nothing", f"the picture cannot be solved ({error})")
     milliseconds = 1000 * (time.perf_counter() - began)
-    file, row = resolve_inside(out, camera_file_name(frame)), _row(frame, found, milliseconds)
+    file, row = (
+        resolve_inside(out, camera_file_name(frame)),
+        _result_row(frame, found, milliseconds),
+    )
     if pitch != Pitch():
         row["pitch"] = {"length": pitch.length, "width": pitch.width}
     agrees = 0.0 if found.agreement is None else found.agreement.product
@@ -173,26 +176,26 @@ def _propose_one(
         spread = None if found.snapped is None else found.snapped.covariance
         covariance = None if spread is None else row_by_row(spread)
         shape = size or ImageSize(width, height)
-        _write(file, camera_file_text(camera, covariance, shape))
+        _write_camera_file(file, camera_file_text(camera, covariance, shape))
         known_to = pitch_frame(picture.image, found.camera, pitch)
         drawn = (
             DrawnFrame(frame, found.snapped, camera, shape, pitch)
             if found.snapped is not None and found.snapped.reason is None
             else None
         )
-        return row, _Proposed(found.camera, agrees, known_to, drawn)
+        return row, _ProposedCamera(found.camera, agrees, known_to, drawn)
     file.unlink(missing_ok=True)
-    if found.camera is None or picture.image is None or not _is_likely(found):
+    if found.camera is None or picture.image is None or not _may_fit_another_pitch(found):
         return row, None
-    return row, _Proposed(found.camera, 0.0, pitch_frame(picture.image, found.camera, pitch))
+    return row, _ProposedCamera(found.camera, 0.0, pitch_frame(picture.image, found.camera, pitch))
 
 
-def _is_likely(found: FrameProposal) -> bool:
+def _may_fit_another_pitch(found: FrameProposal) -> bool:
     """Whether an unsure camera may lie on its paint but for markings of another pitch."""
     return found.agreement is not None and found.agreement.supported >= LIKELY
 
 
-def _row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any]:
+def _result_row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any]:
     agreement, snapped = found.agreement, found.snapped
     return {
         "frame": frame,
@@ -207,7 +210,7 @@ def _row(frame: str, found: FrameProposal, milliseconds: float) -> dict[str, Any
     }
 
 
-def _known(paths: Sequence[Path]) -> list[Camera]:
+def _read_known_cameras(paths: Sequence[Path]) -> list[Camera]:
     report = Report()
     cameras = [camera for path in paths for camera in read_cameras(path, report).values()]
     if paths and not cameras:
@@ -216,7 +219,7 @@ def _known(paths: Sequence[Path]) -> list[Camera]:
     return cameras
 
 
-def _write(file: Path, text: str) -> None:
+def _write_camera_file(file: Path, text: str) -> None:
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         replace_file(file, text.encode(), durable=False, private=False)

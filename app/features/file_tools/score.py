@@ -42,7 +42,7 @@ def score_files(
         InputError: There is no line file, or no camera at all.
     """
     report, camera_report = Report(), Report()
-    found = _by_frame(read_cameras(cameras, camera_report))
+    found = _cameras_by_frame(read_cameras(cameras, camera_report))
     if not found:
         raise camera_report.refusal(f"{cameras} holds no camera files")
     dropped = _wrong_labels(without) if without is not None else set()
@@ -80,12 +80,12 @@ def score_files(
         "fs5": total.challenge,
         "error_median_px": total.error_median_px,
         "error_p95_px": total.error_p95_px,
-        **_times(cameras),
+        **_read_milliseconds(cameras),
         "problems": [item.message for item in (*report.problems, *camera_report.problems)],
     }
 
 
-def _by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
+def _cameras_by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
     """Cameras by key, and by the bare name of the frame where only one has it."""
     names = Counter(key.rsplit("/", 1)[-1] for key in cameras)
     bare = {key.rsplit("/", 1)[-1]: camera for key, camera in cameras.items()}
@@ -101,7 +101,7 @@ def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
     return {(str(item.get("frame")), str(item.get("marking"))) for item in rows}
 
 
-def _times(cameras: Path) -> dict[str, Any]:
+def _read_milliseconds(cameras: Path) -> dict[str, Any]:
     """Milliseconds a frame from the ``calibrate.json`` beside the cameras, or null."""
     beside = cameras / "calibrate.json"
     value = read_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}

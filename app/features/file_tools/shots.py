@@ -55,7 +55,7 @@ def shots_file(
         except WorkerEnded as error:
             kind = ImageError if error.reason == "crash" else TooLargeError
             raise kind(f"{recording.name} {error}") from error
-    document = _document(found)
+    document = _shots_document(found)
     try:
         out.mkdir(parents=True, exist_ok=True)
         content = (json_text(document, indent=1) + "\n").encode()
@@ -65,16 +65,16 @@ def shots_file(
     return document
 
 
-def _document(found: RecordingShots) -> dict[str, Any]:
+def _shots_document(found: RecordingShots) -> dict[str, Any]:
     return {
         "frames": found.frames,
         "fps": found.fps,
         "variable": found.variable,
-        "shots": [_row(shot) for shot in found.shots],
+        "shots": [_shot_row(shot) for shot in found.shots],
     }
 
 
-def _row(shot: Shot) -> dict[str, Any]:
+def _shot_row(shot: Shot) -> dict[str, Any]:
     return {
         "first": shot.first,
         "last": shot.last,

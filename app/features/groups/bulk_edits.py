@@ -30,7 +30,7 @@ from app.features.groups.edit_codec import REQUEST_POINTS
 from app.features.groups.queries import StoredGroup, find_views, read_groups
 from app.features.groups.state import GroupState, read_etags, require_etag
 from app.features.groups.submit import Then, combine_edits, current_etag, require_open, submit_all
-from app.features.groups.view_paint import PaintUpdater
+from app.features.groups.view_paint import PaintFollower
 from app.features.solutions.service import Solve, solve_encoded
 
 MAX_ITEMS = 200
@@ -120,7 +120,7 @@ def edit_views(
     items: Sequence[ViewEdits],
     *,
     actor: str,
-    paint: PaintUpdater | None = None,
+    paint: PaintFollower | None = None,
     solve: Solve = solve_encoded,
 ) -> BulkEditReport:
     """Edit the groups of many views, one after the other; one that was killed goes on.

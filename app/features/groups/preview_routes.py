@@ -18,7 +18,7 @@ from app.features.groups.large_edit_routes import LargeGroupSolver
 from app.features.groups.schemas import points_by_marking
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, preview
-from app.features.groups.view_paint import PaintUpdater, WithoutPictures
+from app.features.groups.view_paint import PaintFollower, WithoutPictures
 from app.http.request_limits import PREVIEWS, is_large
 from app.log import log_to_stderr
 from app.soccer.group import Group
@@ -77,7 +77,7 @@ class PreviewSolver:
     """
 
     def __init__(
-        self, settings: Settings, store: Store, paint: PaintUpdater, large: LargeGroupSolver
+        self, settings: Settings, store: Store, paint: PaintFollower, large: LargeGroupSolver
     ):
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
         places = PREVIEWS.apart if settings.solves_apart else None
@@ -147,7 +147,7 @@ def _solve_preview(
     store: Store,
     group_id: int,
     changes: PreviewRequest,
-    paint: PaintUpdater,
+    paint: PaintFollower,
     solve: Solver = solve,
 ) -> bytes:
     def edits(found: Group) -> Sequence[Edit]:

@@ -34,7 +34,7 @@ from app.features.groups.state import (
     require_content,
     require_unchanged,
 )
-from app.features.groups.view_paint import PaintUpdater
+from app.features.groups.view_paint import PaintFollower
 from app.features.independent_annotations import submission_queries as submissions
 from app.features.independent_annotations.queries import annotation_of_copy
 from app.features.paint.queries import FOLLOWS, PAINT, insert_readings
@@ -125,7 +125,7 @@ class EditOptions(TypedDict):
     if_match: str
     actor: str
     then: NotRequired[Then]
-    paint: NotRequired[PaintUpdater | None]
+    paint: NotRequired[PaintFollower | None]
     solve: NotRequired[Solve]
 
 
@@ -216,7 +216,7 @@ def preview(
     store: Store,
     group_id: int,
     edits_of: Callable[[Group], Sequence[Edit]],
-    paint: PaintUpdater | None = None,
+    paint: PaintFollower | None = None,
     solve: Solver = solve,
 ) -> tuple[Group, Solution]:
     """The group and its solution as they would be after the edits that ``edits_of`` makes for it.
@@ -311,7 +311,7 @@ def submit_change(
     if_match: str,
     actor: str,
     then: Then = Session.respond,
-    paint: PaintUpdater | None = None,
+    paint: PaintFollower | None = None,
     solve: Solve = solve_encoded,
 ) -> GroupState:
     """Save a step of a group (an edit, an undo, a redo) and answer with the group as it is then.

@@ -179,7 +179,7 @@ SECONDS = 5.0
 """Longer nobody waits for a frame; it is then read when paint is read again."""
 
 
-class PaintUpdater:
+class PaintFollower:
     """Reads the paint of an edited group again, in the processes that make pictures."""
 
     def __init__(self, frames: Frames):
@@ -223,7 +223,7 @@ class PaintUpdater:
                 yield task.view.key, reading
 
 
-class WithoutPictures(PaintUpdater):
+class WithoutPictures(PaintFollower):
     """Where no picture can be read: ``missed`` says that one would have been.
 
     A camera of clicks alone would be another answer than the one that is asked for.

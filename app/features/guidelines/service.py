@@ -79,7 +79,9 @@ def read_guidelines(store: Store, dataset: str | int, number: int | None = None)
         NotFoundError: There is no such dataset or version.
     """
     with store.read() as session:
-        return _read(session, guidelines_dataset(session, need_dataset(session, dataset)), number)
+        return _read_version(
+            session, guidelines_dataset(session, need_dataset(session, dataset)), number
+        )
 
 
 def write_guidelines(
@@ -116,7 +118,7 @@ def write_guidelines(
             digest = hashlib.sha256(text.encode()).hexdigest()
             body = {"number": newest + 1, "digest": digest}
             append(session, [Entry(GUIDELINE, actor, now(), body, dataset_id)])
-        written = _read(session, dataset_id)
+        written = _read_version(session, dataset_id)
         session.respond(written)
         return written
 
@@ -161,7 +163,7 @@ def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePict
     return GuidelinePicture(digest, row.type, row.body)
 
 
-def _read(session: Session, dataset_id: int, number: int | None = None) -> Guidelines:
+def _read_version(session: Session, dataset_id: int, number: int | None = None) -> Guidelines:
     """A version of the guidelines of the dataset whose they are; None: the newest."""
     versions = tuple(
         GuidelineVersion(**row._mapping) for row in guideline_heads(session, dataset_id)

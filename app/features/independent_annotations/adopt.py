@@ -26,9 +26,9 @@ from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.state import GroupState, need_group
 from app.features.groups.submit import current_etag, solved_state, submit
-from app.features.groups.view_paint import PaintUpdater
+from app.features.groups.view_paint import PaintFollower
 from app.features.groups.view_queries import groups_of_station, save_station
-from app.features.independent_annotations.copying import aligned
+from app.features.independent_annotations.copying import rename_views_as_original
 from app.features.independent_annotations.queries import (
     GOLD,
     IndependentAnnotation,
@@ -51,7 +51,7 @@ def adopt_annotation(
     annotation_id: int,
     *,
     actor: str,
-    paint: PaintUpdater | None = None,
+    paint: PaintFollower | None = None,
     also: Callable[[Session], None] | None = None,
 ) -> GroupState:
     """Take a person's annotation and verdict over into the original, in one transaction.
@@ -72,7 +72,7 @@ def adopt_annotation(
     with store.read() as session:
         copy = need_group(session, annotation.copy_id)
         original = need_group(session, annotation.group_id)
-    copy = replace(copy, group=aligned(original.group, copy.group))
+    copy = replace(copy, group=rename_views_as_original(original.group, copy.group))
     edit = CompositeEdit(tuple(edits_between(original.group, copy.group)))
     after: list[GroupState] = []
 

@@ -52,12 +52,12 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     Frames are named, not copied; lines, balls, given cameras, what is known of the match and what
     was read of the paint are the copy's own from then on.
     """
-    dataset_id = _dataset_of(session, order)
+    dataset_id = _dataset_of_copies(session, order)
     # Static cameras that a copy is there of already are as their person left them.
     own = {item.station.key: item.station for item in shared_stations(session, dataset_id)}
-    group = replace(start, views=tuple(_own_view(view, own) for view in start.views))
+    group = replace(start, views=tuple(_view_with_own_station(view, own) for view in start.views))
     if order.name is not None:
-        group = _nameless(group, order.name)
+        group = _hide_names(group, order.name)
     insert_readings(session, dataset_id, group.paint.values())
     shared = SharedStations(session, dataset_id, SOURCE, order.person)
     shared.insert_or_update(view.station for view in group.views if view.station.key not in own)
@@ -69,7 +69,7 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
 def gold_start_of(session: Session, stored: StoredGroup) -> Group:
     """A gold group as its own start says, before it is stripped as all copies of the batch are."""
     if gold_start(session, stored.id) == IMPORTED:
-        return _imported(session, stored)
+        return _group_as_imported(session, stored)
     return stored.group
 
 
@@ -80,7 +80,7 @@ def without_extras(group: Group, start: str) -> Group:
     tells what it is of.
     """
     bare = start == BARE
-    group = replace(group, views=tuple(_stripped(view, start) for view in group.views))
+    group = replace(group, views=tuple(_view_at_start(view, start) for view in group.views))
     if start == IMPORTED:
         return replace(group, paint={}, positions={})
     return replace(group, paint={} if bare else group.paint)
@@ -95,11 +95,11 @@ def start_of(session: Session, stored: StoredGroup, since: str) -> Group:
         if entry.kind == "import":
             break
         if entry.kind in _BACK:
-            group = _without(session, entry, group)
+            group = _undo_entry(session, entry, group)
     return group
 
 
-def _without(session: Session, entry: LogEntry, group: Group) -> Group:
+def _undo_entry(session: Session, entry: LogEntry, group: Group) -> Group:
     inverse = entry.body["inverse"]
     if inverse["edit"] == "set_paint":
         read = read_readings(session, inverse["paint"].values())
@@ -107,7 +107,7 @@ def _without(session: Session, entry: LogEntry, group: Group) -> Group:
     return edit_from_json(inverse).apply(group)
 
 
-def _imported(session: Session, stored: StoredGroup) -> Group:
+def _group_as_imported(session: Session, stored: StoredGroup) -> Group:
     """The group as its dataset brought it last, without what people said since.
 
     Static cameras are as they are: the labels of one picture are not theirs alone.
@@ -127,30 +127,30 @@ def _imported(session: Session, stored: StoredGroup) -> Group:
     return replace(stored.group, views=tuple(views))
 
 
-def _stripped(view: View, start: str) -> View:
+def _view_at_start(view: View, start: str) -> View:
     station = view.station
     if start == BARE and not station.shared:
         station = replace(station, lines={}, proposed=(), not_visible=())
     return replace(view, station=station, balls=view.balls if start == IMPORTED else ())
 
 
-def _own_view(view: View, own: dict[str, Station]) -> View:
+def _view_with_own_station(view: View, own: dict[str, Station]) -> View:
     station = own.get(view.station.key) if view.station.shared else None
     return view if station is None else replace(view, station=station)
 
 
-def aligned(original: Group, copy: Group) -> Group:
+def rename_views_as_original(original: Group, copy: Group) -> Group:
     """A copy under the names that its views have in the original; they are in the same order."""
     if all(original.view(view.key) is not None for view in copy.views):
         return copy
     names = [view.key for view in original.views]
-    return _renamed(copy, dict(zip((view.key for view in copy.views), names, strict=False)))
+    return _rename_views(copy, dict(zip((view.key for view in copy.views), names, strict=False)))
 
 
-def _nameless(group: Group, name: str) -> Group:
+def _hide_names(group: Group, name: str) -> Group:
     """A group that does not say which one it is: names of views hold that of their group."""
     names = {view.key: f"view {place}" for place, view in enumerate(group.views, 1)}
-    group = _renamed(group, names)
+    group = _rename_views(group, names)
     views = tuple(
         view
         if view.station.shared
@@ -161,7 +161,7 @@ def _nameless(group: Group, name: str) -> Group:
     return replace(group, key=name, label=label, match="", split="", views=views)
 
 
-def _renamed(group: Group, names: Mapping[str, str]) -> Group:
+def _rename_views(group: Group, names: Mapping[str, str]) -> Group:
     """A group whose views have other keys."""
     return replace(
         group,
@@ -171,7 +171,7 @@ def _renamed(group: Group, names: Mapping[str, str]) -> Group:
     )
 
 
-def _dataset_of(session: Session, order: CopyRequest) -> int:
+def _dataset_of_copies(session: Session, order: CopyRequest) -> int:
     """Id of the dataset of somebody's copies, which the first of them makes."""
     stored = order.original
     copies = CopiesOf(stored.dataset_id, order.batch_id or 0, order.person)

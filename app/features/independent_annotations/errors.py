@@ -37,7 +37,7 @@ class DistanceFromTruth:
     ball_m: float | None
 
 
-def error_of(
+def distance_from_truth(
     truth: Group, annotated: Group, ball: Point3 | None, own: Point3 | None
 ) -> DistanceFromTruth:
     """The error of an annotation; views are those of the truth that the annotation has, too.
@@ -53,7 +53,7 @@ def error_of(
     ]
     lines = [distance for view, other in pairs for distance in _line_distances(view, other)]
     missing = sum(len({*view.station.lines} - {*other.station.lines}) for view, other in pairs)
-    centers = [(_center(view), _center(other)) for view, other in pairs]
+    centers = [(_ball_center(view), _ball_center(other)) for view, other in pairs]
     balls = [float(np.hypot(a.x - b.x, a.y - b.y)) for a, b in centers if a and b]
     return DistanceFromTruth(
         line_px=float(np.median(lines)) if lines else None,
@@ -103,7 +103,7 @@ def world_error(
         projected = project_markings(known.camera, truth.pitch, other.size)
         measured = measure_markings(projected, other.station.lines).values()
         lines += [float(one.distances.mean()) for one in measured if one.distances.size]
-    centers = [(_center(other), known.center) for _, other, known in seen]
+    centers = [(_ball_center(other), known.center) for _, other, known in seen]
     balls = [float(np.hypot(a.x - b.x, a.y - b.y)) for a, b in centers if a is not None]
     return DistanceFromTruth(
         line_px=float(np.median(lines)) if lines else None,
@@ -112,13 +112,14 @@ def world_error(
         ),
         ball_px=max(balls) if balls else None,
         balls_missing=sum(
-            _center(view) is not None and _center(other) is None for view, other, _ in seen
+            _ball_center(view) is not None and _ball_center(other) is None
+            for view, other, _ in seen
         ),
         ball_m=None if own is None else float(np.linalg.norm(np.subtract(ball, own))),
     )
 
 
-def _center(view: View) -> ImagePoint | None:
+def _ball_center(view: View) -> ImagePoint | None:
     return next((center for ball in view.balls if (center := ball.center) is not None), None)
 
 
@@ -134,10 +135,12 @@ def polyline_distance(one: tuple[ImagePoint, ...], other: tuple[ImagePoint, ...]
     Both ways, so that neither a short piece of a long line nor the long line is nearer.
     """
     a, b = (np.array([(p.x, p.y) for p in points], dtype=float) for points in (one, other))
-    return float(np.concatenate([_to_polyline(a, b), _to_polyline(b, a)]).mean())
+    return float(
+        np.concatenate([_distances_from_polyline(a, b), _distances_from_polyline(b, a)]).mean()
+    )
 
 
-def _to_polyline(points: FloatArray, line: FloatArray) -> FloatArray:
+def _distances_from_polyline(points: FloatArray, line: FloatArray) -> FloatArray:
     """Distance of points (n, 2) from a polyline (m, 2); one point is a polyline, too."""
     if len(line) == 1:
         alone: FloatArray = np.linalg.norm(points - line, axis=1)

@@ -18,11 +18,11 @@ from app.features.groups.codecs import group_from_json, group_to_json
 from app.features.groups.state import GroupState, need_group, read_states
 from app.features.groups.submit import load_solved
 from app.features.groups.view_queries import group_dataset
-from app.features.independent_annotations.copying import aligned
+from app.features.independent_annotations.copying import rename_views_as_original
 from app.features.independent_annotations.errors import (
     DistanceFromTruth,
     TrueView,
-    error_of,
+    distance_from_truth,
     world_error,
 )
 from app.features.independent_annotations.gold_queries import (
@@ -160,11 +160,11 @@ def mark(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
     with store.write() as session:
         if is_copy(session, state.dataset_id):
             raise ConflictError("a person's own annotation cannot be a gold group")
-        mark_gold(session, group_id, state.dataset_id, start, _truth(state), actor)
+        mark_gold(session, group_id, state.dataset_id, start, _truth_values(state), actor)
         # Not an entry of the group: everybody who sees it reads its history.
         body = {"group": group_id, "did": "marked", "start": start}
         append(session, [Entry(KIND, actor, now(), body, state.dataset_id)])
-        _, marked = _need_gold(session, group_id)
+        _, marked = _require_gold(session, group_id)
         session.respond(marked)
     return marked
 
@@ -180,7 +180,7 @@ def start_with(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
     """
     check_start(start)
     with store.write() as session:
-        dataset_id, gold = _need_gold(session, group_id)
+        dataset_id, gold = _require_gold(session, group_id)
         changed = replace(gold, start=start)
         if changed != gold:
             start_gold(session, group_id, start)
@@ -197,7 +197,7 @@ def unmark(store: Store, group_id: int, *, actor: str) -> GoldGroup:
         NotFoundError: It is none.
     """
     with store.write() as session:
-        dataset_id, gone = _need_gold(session, group_id)
+        dataset_id, gone = _require_gold(session, group_id)
         unmark_gold(session, group_id)
         body = {"group": group_id, "did": "unmarked"}
         append(session, [Entry(KIND, actor, now(), body, dataset_id)])
@@ -226,11 +226,11 @@ def read_report(store: Store, dataset: str | int) -> GoldReport:
             if annotation.submitted is None and not made:
                 continue
             gold, truth = known[annotation.group_id]
-            result = _result(
+            result = _gold_result(
                 gold, truth, _first_submission(session, annotation, made), max(len(made), 1)
             )
             found.setdefault(annotation.person, []).append(result)
-    people = tuple(_person(name, results) for name, results in sorted(found.items()))
+    people = tuple(_results_of_person(name, results) for name, results in sorted(found.items()))
     return GoldReport(tuple(gold for gold, _ in known.values()), people)
 
 
@@ -281,7 +281,7 @@ def check_start(start: str) -> None:
         raise InputError(f"annotators begin with {', '.join(STARTS)}", pointer="/start")
 
 
-def _truth(state: GroupState) -> Json:
+def _truth_values(state: GroupState) -> Json:
     ball = None if state.solution is None or state.solution.ball is None else state.solution.ball
     return {
         "group": group_to_json(state.group),
@@ -304,7 +304,7 @@ def _gold_with_truth(session: Session, row: Any) -> tuple[GoldGroup, Json]:
     return gold, truth
 
 
-def _need_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
+def _require_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
     """A gold group and the id of its dataset."""
     row = gold_head(session, group_id)
     if row is None and group_dataset(session, group_id) is None:
@@ -342,17 +342,19 @@ def _first_submission(
     return _Submission(first["at"], first["verdict"], group, solve(group, state.policy, known))
 
 
-def _result(gold: GoldGroup, truth: Json, submission: _Submission, submissions: int) -> GoldResult:
+def _gold_result(
+    gold: GoldGroup, truth: Json, submission: _Submission, submissions: int
+) -> GoldResult:
     group = group_from_json(truth["group"])
     solution = submission.solution
     own = None if solution is None or solution.ball is None else solution.ball.point
     ball = None if truth["ball"] is None else tuple(truth["ball"])
     verdict, judged = submission.verdict, truth["verdict"] in JUDGED
-    annotated = aligned(group, submission.group)
+    annotated = rename_views_as_original(group, submission.group)
     if ball is not None and "views" in truth:
         error = world_error(group, true_views(truth), annotated, ball, own)
     else:
-        error = error_of(group, annotated, ball, own)
+        error = distance_from_truth(group, annotated, ball, own)
     return GoldResult(
         group=gold.group,
         label=gold.label,
@@ -373,7 +375,7 @@ def true_views(truth: Json) -> dict[str, TrueView]:
     }
 
 
-def _person(name: str, results: list[GoldResult]) -> PersonResults:
+def _results_of_person(name: str, results: list[GoldResult]) -> PersonResults:
     results.sort(key=lambda one: one.submitted)
     judged = [one.right for one in results if one.right is not None]
     low, high = wilson(sum(judged), len(judged))

@@ -97,17 +97,17 @@ def mark_known(
     check_start(choice.start)
     number = dataset_id(store, dataset)
     query = parse_query(choice.query, longest=MAX_LISTED_LENGTH)
-    version = _version(store, dataset, choice)
+    version = _version_of_choice(store, dataset, choice)
     with store.read() as session:
         if is_copy(session, number):
             raise ConflictError("a person's own annotation cannot be a gold group")
         ids = Listing(session, number, query.conditions).ids(query.order)
-        found = _of_sample(session, ids)
+        found = _truths_of_sample(session, ids)
         if version is not None:
-            found = _of_version(session, ids, version)
+            found = _truths_of_version(session, ids, version)
         truths = dict(islice(found, choice.size))
     if not truths:
-        raise _nothing(choice.source)
+        raise _no_truth_error(choice.source)
     chosen = GoldChoiceResult(tuple(truths), len(ids) - len(truths))
     with store.write() as session:
         for group_id, truth in truths.items():
@@ -119,18 +119,20 @@ def mark_known(
     return chosen
 
 
-def _of_sample(session: Session, group_ids: Sequence[int]) -> Iterator[tuple[int, Json]]:
+def _truths_of_sample(session: Session, group_ids: Sequence[int]) -> Iterator[tuple[int, Json]]:
     """Truths of groups whose frames lie beside what is true of them."""
     known: dict[Path, Mapping[str, SceneTruth]] = {}
     for start in range(0, len(group_ids), BATCH):
         groups = read_groups(session, group_ids[start : start + BATCH])
         for group_id in group_ids[start : start + BATCH]:
-            truth = _scene(groups[group_id], known)
+            truth = _find_scene_truth(groups[group_id], known)
             if truth is not None:
                 yield group_id, _sample_truth(groups[group_id].group, truth)
 
 
-def _scene(stored: StoredGroup, known: dict[Path, Mapping[str, SceneTruth]]) -> SceneTruth | None:
+def _find_scene_truth(
+    stored: StoredGroup, known: dict[Path, Mapping[str, SceneTruth]]
+) -> SceneTruth | None:
     """The truth of a group, where its frames lie where the truth beside them says."""
     group = stored.group
     media = next((view.media for view in group.views if view.media is not None), None)
@@ -140,7 +142,7 @@ def _scene(stored: StoredGroup, known: dict[Path, Mapping[str, SceneTruth]]) -> 
         return None
     root = place.parents[len(match.parts) - 1]
     if root not in known:
-        known[root] = _read(root / TRUTH)
+        known[root] = _read_truth_file(root / TRUTH)
     truth = known[root].get(group.key)
     if truth is None or {fault.kind for fault in truth.faults} & _NOT_ONE_WORLD:
         return None
@@ -149,7 +151,7 @@ def _scene(stored: StoredGroup, known: dict[Path, Mapping[str, SceneTruth]]) -> 
     )
 
 
-def _read(file: Path) -> Mapping[str, SceneTruth]:
+def _read_truth_file(file: Path) -> Mapping[str, SceneTruth]:
     if not file.is_file() or file.is_symlink() or file.stat().st_size > LARGEST:
         return {}
     return read_truth(file)
@@ -169,7 +171,7 @@ def _sample_truth(group: Group, truth: SceneTruth) -> Json:
     return {**values, "ball": [*truth.ball], "views": views}
 
 
-def _version(store: Store, dataset: str | int, choice: GoldChoice) -> Version | None:
+def _version_of_choice(store: Store, dataset: str | int, choice: GoldChoice) -> Version | None:
     """The version that knows the truth; None where another source does."""
     if choice.source is not TruthSource.VERSION:
         return None
@@ -180,7 +182,7 @@ def _version(store: Store, dataset: str | int, choice: GoldChoice) -> Version | 
     return find_version(store, dataset, choice.version)
 
 
-def _of_version(
+def _truths_of_version(
     session: Session, group_ids: Sequence[int], version: Version
 ) -> Iterator[tuple[int, Json]]:
     """Truths of groups that a version holds, and upon which people agreed or somebody decided."""
@@ -198,7 +200,7 @@ def _of_version(
         yield ids[row.key], {**values, "source": str(TruthSource.VERSION)}
 
 
-def _nothing(source: TruthSource) -> InputError:
+def _no_truth_error(source: TruthSource) -> InputError:
     if source is TruthSource.SAMPLE:
         return InputError(
             "the truth of none of these groups is known",
@@ -256,13 +258,13 @@ def begin_next(
         None where there is nothing left for them.
     """
     with store.write() as session:
-        annotation = _next(session, terms, person_of(person), chance or SystemRandom())
+        annotation = _next_annotation(session, terms, person_of(person), chance or SystemRandom())
     if annotation is not None:
         solve_and_keep(store, annotation.copy_id)
     return annotation
 
 
-def _next(
+def _next_annotation(
     session: Session, terms: Terms, person: str, chance: Random
 ) -> IndependentAnnotation | None:
     annotations = annotations_of_batch(session, terms.batch_id, terms.dataset_id)

@@ -55,7 +55,7 @@ class IndependentAnnotation:
     settled: str | None
 
 
-def _takes(
+def _annotations_from_rows(
     session: Session, statement: Select[*tuple[Any, ...]], values: dict[str, Any] | None = None
 ) -> list[IndependentAnnotation]:
     return [IndependentAnnotation(**row._mapping) for row in session.execute(statement, values)]
@@ -83,14 +83,18 @@ def insert_annotation(
 def find_annotation(session: Session, annotation_id: int) -> IndependentAnnotation | None:
     """An independent annotation by its id."""
     return next(
-        iter(_takes(session, _ANNOTATIONS.where(IndependentAnnotationModel.id == annotation_id))),
+        iter(
+            _annotations_from_rows(
+                session, _ANNOTATIONS.where(IndependentAnnotationModel.id == annotation_id)
+            )
+        ),
         None,
     )
 
 
 def annotation_of_copy(session: Session, copy_id: int) -> IndependentAnnotation | None:
     """The independent annotation whose copy a group is; None for an ordinary group."""
-    return next(iter(_takes(session, _OF_COPY, {"copy": copy_id})), None)
+    return next(iter(_annotations_from_rows(session, _OF_COPY, {"copy": copy_id})), None)
 
 
 def closed_copies(session: Session, dataset_id: int) -> set[int]:
@@ -108,7 +112,9 @@ def closed_copies(session: Session, dataset_id: int) -> set[int]:
 def annotations_of_group(session: Session, group_id: int) -> list[IndependentAnnotation]:
     """The independent annotations of a group in the order in which they began."""
     mine = IndependentAnnotationModel.group_id == group_id
-    return _takes(session, _ANNOTATIONS.where(mine).order_by(IndependentAnnotationModel.id))
+    return _annotations_from_rows(
+        session, _ANNOTATIONS.where(mine).order_by(IndependentAnnotationModel.id)
+    )
 
 
 def annotations_of_batch(
@@ -120,7 +126,7 @@ def annotations_of_batch(
     statement = _ANNOTATIONS.where(
         mine, IndependentAnnotationModel.copy_id.in_(_copies_of(dataset_id))
     )
-    return _takes(session, statement.order_by(IndependentAnnotationModel.id))
+    return _annotations_from_rows(session, statement.order_by(IndependentAnnotationModel.id))
 
 
 def count_left(
@@ -206,10 +212,12 @@ def annotations_in(
         where.append(IndependentAnnotationModel.person == person)
     if kind is not None:
         where.append(IndependentAnnotationModel.kind == kind)
-    return _takes(session, statement.where(*where).order_by(IndependentAnnotationModel.id))
+    return _annotations_from_rows(
+        session, statement.where(*where).order_by(IndependentAnnotationModel.id)
+    )
 
 
-def names_of(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
+def names_of_copies(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
     """``id``, ``key``, ``label``, ``of_id`` and ``same`` (whether it has the original's key) of copies, and
     ``number``, ``of_key`` and ``of_label`` of the original."""
     original = aliased(GroupModel)

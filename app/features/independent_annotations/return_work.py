@@ -81,7 +81,7 @@ def log_return(
         body["batch"] = batch
     at = now()
     append(session, [Entry(kind, actor, at, body, group.dataset_id, group_id)])
-    _announce(session, group, person, actor=actor, at=at, batch=batch)
+    _announce_return(session, group, person, actor=actor, at=at, batch=batch)
     why = f": {reason}" if reason else ""
     walk = "" if batch is None else f"?q=batch%3A{batch}"
     notify(
@@ -90,7 +90,7 @@ def log_return(
     )  # fmt: skip
 
 
-def _announce(
+def _announce_return(
     session: Session, group: StoredGroup, person: str, *, actor: str, at: str, batch: int | None
 ) -> None:
     """Tell webhooks of the dataset, for a copy of the one that it is of."""

@@ -59,7 +59,7 @@ def list_independent_annotations(
     return IndependentAnnotationList(items=found)
 
 
-def _begun(annotation: DisclosedAnnotation) -> Response:
+def _begun_response(annotation: DisclosedAnnotation) -> Response:
     return document(annotation, 201)
 
 
@@ -71,7 +71,7 @@ def _begun(annotation: DisclosedAnnotation) -> Response:
     responses=responses(404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(_begun)
+@responds(_begun_response)
 def begin(group: Id, store: AppStore, actor: Actor) -> service.DisclosedAnnotation:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
     return service.begin_annotation(store, group, person=actor)

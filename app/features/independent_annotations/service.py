@@ -32,7 +32,7 @@ from app.features.independent_annotations.queries import (
     count_annotations,
     find_annotation,
     insert_annotation,
-    names_of,
+    names_of_copies,
 )
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
@@ -269,13 +269,13 @@ def show(session: Session, annotation: IndependentAnnotation) -> DisclosedAnnota
 def _disclosed_annotations(
     session: Session, annotations: Sequence[IndependentAnnotation]
 ) -> list[DisclosedAnnotation]:
-    heads = {row.id: row for row in names_of(session, [one.copy_id for one in annotations])}
+    heads = {row.id: row for row in names_of_copies(session, [one.copy_id for one in annotations])}
     reader = READER.get()
     blind = frozenset[int]() if reader is None else frozenset().union(*reader.batches.values())
     waiting = [one.copy_id for one in annotations if one.submitted is None and one.settled is None]
     back = read_returned(session, waiting)
 
-    def is_told(one: IndependentAnnotation) -> bool:
+    def is_disclosed(one: IndependentAnnotation) -> bool:
         """Whether it may be known of what it is a copy, and what became of it: its person is told neither
         while they work blind, nor ever of a copy without a name, which may be of a gold group."""
         if one.batch_id in blind:
@@ -291,7 +291,7 @@ def _disclosed_annotations(
             dataset=heads[one.copy_id].of_id,
             of=one.group_id if disclosed else None,
             number=heads[one.copy_id].number if disclosed else None,
-            title=_title(heads[one.copy_id], disclosed),
+            title=_title_of_copy(heads[one.copy_id], disclosed),
             person=one.person,
             place=one.place,
             begun=one.begun,
@@ -301,11 +301,11 @@ def _disclosed_annotations(
             settled=one.settled if disclosed else None,
             returned=back.get(one.copy_id),
         )
-        for one, disclosed in ((one, is_told(one)) for one in annotations)
+        for one, disclosed in ((one, is_disclosed(one)) for one in annotations)
     ]
 
 
-def _title(head: Any, disclosed: bool) -> str:
+def _title_of_copy(head: Any, disclosed: bool) -> str:
     return str((head.of_label or head.of_key) if disclosed else (head.label or head.key))
 
 

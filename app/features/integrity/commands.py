@@ -72,7 +72,7 @@ def backup(
     size = out.stat().st_size / 1e6
     say(f"{out} ({size:,.1f} MB) is written and verified")
     say(
-        f"  {_contents(manifest.entries, manifest.rows)}, {plural(len(manifest.files) - 1, 'file')}"
+        f"  {_contents_sentence(manifest.entries, manifest.rows)}, {plural(len(manifest.files) - 1, 'file')}"
     )
     if manifest.frames_elsewhere:
         say(
@@ -105,7 +105,7 @@ def transfer(
     (uploads, exports) stay where they are. Everybody on the machine can read what is typed here: an
     address with a password stands in a file, or the password in ~/.pgpass.
     """
-    from app.features.integrity.transfer import ends_of
+    from app.features.integrity.transfer import settings_of_both_databases
     from app.features.integrity.transfer import transfer as run_transfer
 
     settings = read_settings()
@@ -116,11 +116,15 @@ def transfer(
             say(f"  {table}")
         printed.add(table)
 
-    done = run_transfer(*ends_of(source, target, settings), tell, replace_null=replace_null)
+    done = run_transfer(
+        *settings_of_both_databases(source, target, settings), tell, replace_null=replace_null
+    )
     if json_:
         print_json(vars(done))
         return
-    say(f"{_contents(done.entries, done.rows)} are equal in both; {done.copied:,} rows were copied")
+    say(
+        f"{_contents_sentence(done.entries, done.rows)} are equal in both; {done.copied:,} rows were copied"
+    )
     for name, digest in done.versions.items():
         say(f"  version {name} {digest[:12]}")
 
@@ -145,7 +149,9 @@ def restore(
         print_json(values)
         return
     say(f"{restored.home} is restored from {source}")
-    say(f"  {_contents(restored.entries, restored.rows)}, {plural(restored.files, 'file')}")
+    say(
+        f"  {_contents_sentence(restored.entries, restored.rows)}, {plural(restored.files, 'file')}"
+    )
     if restored.foreign_log:
         say("  the write-ahead log beside it was another database's, and is left out")
     if restored.aside is not None:
@@ -155,6 +161,6 @@ def restore(
     )
 
 
-def _contents(entries: int, rows: dict[str, int]) -> str:
+def _contents_sentence(entries: int, rows: dict[str, int]) -> str:
     groups, verdicts = rows.get("groups", 0), rows.get("verdict", 0)
     return f"{plural(entries, 'entry', 'entries')} of the log, {plural(groups, 'group')}, {plural(verdicts, 'verdict')}"

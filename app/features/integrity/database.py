@@ -35,10 +35,10 @@ def examine_guidelines(session: Session, restore: str) -> Check:
         (row.dataset_id, row.number): hashlib.sha256(row.text.encode()).hexdigest()
         for row in all_guidelines(session)
     }
-    return compare_with_log("guidelines", logged, present, restore, _name)
+    return compare_with_log("guidelines", logged, present, restore, _guideline_name)
 
 
-def _name(key: tuple[int, int]) -> str:
+def _guideline_name(key: tuple[int, int]) -> str:
     dataset, number = key
     return f"version {number} of dataset {dataset}"
 
@@ -78,7 +78,7 @@ def examine(store: Store) -> list[Check]:
     """
     with store.read() as session:
         restore = dialect_in(session).restoring
-        checks = [_file(session, restore)]
+        checks = [_check_file(session, restore)]
         entries = newest_entry(session)
         try:
             logged = replay(session)
@@ -86,16 +86,16 @@ def examine(store: Store) -> list[Check]:
             checks.append(Check("log", False, error.message, error.hint or restore))
         else:
             checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
-            checks.append(_texts(session))
-            checks += _compared_tables(session, logged, restore)
+            checks.append(_check_texts(session))
+            checks += _check_tables_against_log(session, logged, restore)
             checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
         computed = examine_computed(session, restore)
         is_whole = all(check.ok for check in computed)
-        checks += [*computed, _queue(session, REBUILD if is_whole else restore)]
-    return [*checks, *_solutions(store)]
+        checks += [*computed, _check_queue(session, REBUILD if is_whole else restore)]
+    return [*checks, *_check_solutions(store)]
 
 
-def _file(session: Session, restore: str) -> Check:
+def _check_file(session: Session, restore: str) -> Check:
     """The database's own look at its pages and indexes, and at references to rows that are gone."""
     dialect = dialect_in(session)
     faults, lost = dialect.file_faults(session), dialect.count_lost_references(session)
@@ -106,7 +106,7 @@ def _file(session: Session, restore: str) -> Check:
     return Check("file", True, dialect.no_fault)
 
 
-def _texts(session: Session) -> Check:
+def _check_texts(session: Session) -> Check:
     """Texts from before U+0000 was refused: no fault here, and nothing that PostgreSQL can keep."""
     found = find_null_characters(session)
     if not found:
@@ -115,17 +115,17 @@ def _texts(session: Session) -> Check:
     return Check("texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there.")
 
 
-def _compared_tables(session: Session, logged: StateSnapshot, restore: str) -> list[Check]:
+def _check_tables_against_log(session: Session, logged: StateSnapshot, restore: str) -> list[Check]:
     try:
         present = read_state_snapshot(session)
     except StorageError as error:
         return [Check("tables", False, error.message, REBUILD)]
-    checks = _tables(logged, present, restore)
+    checks = _check_tables(logged, present, restore)
     # Of a row that is not what was said, the digest says nothing.
-    return [*checks, _digests(session)] if all(check.ok for check in checks) else checks
+    return [*checks, _check_digests(session)] if all(check.ok for check in checks) else checks
 
 
-def _tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list[Check]:
+def _check_tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list[Check]:
     return [
         compare_with_log(words, getattr(logged, name), getattr(present, name), mend)
         for names, mend in ((REBUILT, REBUILD), (KEPT, restore))
@@ -133,7 +133,7 @@ def _tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list
     ]
 
 
-def _digests(session: Session) -> Check:
+def _check_digests(session: Session) -> Check:
     """Whether cameras, views and groups have the digests by which solutions and edits know them."""
     count, apart = 0, list[str]()
     for station in all_stations(session):
@@ -151,7 +151,7 @@ def _digests(session: Session) -> Check:
     return compared("digests", whole, apart, "not of what was said", REBUILD)
 
 
-def _queue(session: Session, mend: str) -> Check:
+def _check_queue(session: Session, mend: str) -> Check:
     """Whether the row of each group follows from what was said of it and computed for it."""
     try:
         count, apart = differing_rows(session)
@@ -162,7 +162,7 @@ def _queue(session: Session, mend: str) -> Check:
     return compared("queue", whole, [str(number) for number in apart], wrong, mend)
 
 
-def _solutions(store: Store) -> list[Check]:
+def _check_solutions(store: Store) -> list[Check]:
     """Groups that wait to be solved are no fault: the next ``solve`` finds them."""
     checks = []
     for item in list_datasets(store):

@@ -46,10 +46,10 @@ _NO_CONTENT = '"touchline-asks-for-no-content"'
 
 def examine_stores(settings: Settings) -> list[Check]:
     """Ask every configured store for what the service needs of it."""
-    return [_examine(settings, name) for name in sorted(settings.stores)]
+    return [_check_store(settings, name) for name in sorted(settings.stores)]
 
 
-def _examine(settings: Settings, name: str) -> Check:
+def _check_store(settings: Settings, name: str) -> Check:
     title, done = f"store {name}", list[str]()
     try:
         store = open_store(settings, name)
@@ -58,10 +58,10 @@ def _examine(settings: Settings, name: str) -> Check:
         if found is not None and found.size:
             store.read(found.key, 0, 1, found.etag)
             done.append("reads")
-            if not _checks_content(store, found.key):
+            if not _refuses_other_content(store, found.key):
                 return Check(title, False, _UNCONDITIONAL, CONDITIONS)
         if store.settings.exports:
-            _write(store)
+            _write_probe(store)
             done.append("writes")
     except ReviewError as error:
         can = f"; it {' and '.join(done)}" if done else ""
@@ -70,7 +70,7 @@ def _examine(settings: Settings, name: str) -> Check:
     return Check(title, True, f"{', '.join(done)}{empty}")
 
 
-def _checks_content(store: ObjectStore, key: str) -> bool:
+def _refuses_other_content(store: ObjectStore, key: str) -> bool:
     """Whether an object is not given out as the content that it is not."""
     try:
         store.read(key, 0, 1, _NO_CONTENT)
@@ -79,7 +79,7 @@ def _checks_content(store: ObjectStore, key: str) -> bool:
     return False
 
 
-def _write(store: ObjectStore) -> None:
+def _write_probe(store: ObjectStore) -> None:
     key = f"{_PROBE}-{secrets.token_hex(4)}"
     store.put(key, b"Touchline writes and deletes this to see that it can.\n")
     store.delete(key)
@@ -93,25 +93,36 @@ _FORMATS = (".jpg", ".png", ".webp")
 
 def examine_home(settings: Settings) -> list[Check]:
     """What can be said of a home without its database."""
-    examined = (_settings, _permissions, _free_space, _anchor, _sign_on, _mail)
-    return [*(examine(settings) for examine in examined), _versions(), *examine_stores(settings)]
+    examined = (
+        _check_settings,
+        _check_permissions,
+        _check_free_space,
+        _check_anchor,
+        _check_sign_on,
+        _check_mail,
+    )
+    return [
+        *(examine(settings) for examine in examined),
+        _check_library_versions(),
+        *examine_stores(settings),
+    ]
 
 
 def examine_surroundings(store: Store) -> list[Check]:
     """What lies around the tables of a database that can be opened."""
-    settings, admins = store.settings, _linked_admins(store)
+    settings, admins = store.settings, _check_linked_admins(store)
     with store.read() as session:
         return [
             *([admins] if admins else []),
-            _clock(session),
-            _leftovers(settings),
-            _calibrations(session),
-            _uploads(session, settings),
-            _recordings(session, settings),
+            _check_clock(session),
+            _check_leftovers(settings),
+            _check_calibrations(session),
+            _check_uploads(session, settings),
+            _check_recordings(session, settings),
         ]
 
 
-def _settings(settings: Settings) -> Check:
+def _check_settings(settings: Settings) -> Check:
     known = {_PREFIX + name.upper() for name in Settings.model_fields}
     unknown = sorted(name for name in os.environ if name.startswith(_PREFIX) and name not in known)
     gone = [str(folder) for folder in settings.import_folders if not folder.is_dir()]
@@ -124,7 +135,7 @@ def _settings(settings: Settings) -> Check:
     return Check("settings", True, f"home {settings.home}")
 
 
-def _sign_on(settings: Settings) -> Check:
+def _check_sign_on(settings: Settings) -> Check:
     """Whether single sign-on is set up whole, and its provider answers."""
     name, mend = "single sign-on", "Look at the settings TOUCHLINE_SSO_...; docs/teams.md has them."
     try:
@@ -139,7 +150,7 @@ def _sign_on(settings: Settings) -> Check:
         )
 
 
-def _mail(settings: Settings) -> Check:
+def _check_mail(settings: Settings) -> Check:
     """Whether the mail server takes us; it is sent nothing."""
     try:
         server = read_mail_server(settings)
@@ -153,7 +164,7 @@ def _mail(settings: Settings) -> Check:
     return Check("mail", True, found)
 
 
-def _linked_admins(store: Store) -> Check | None:
+def _check_linked_admins(store: Store) -> Check | None:
     """Whether an admin can come in where there is no other way; None: there is one."""
     try:
         rules = read_rules(store.settings.model_copy(update={"team": True}))
@@ -169,7 +180,7 @@ def _linked_admins(store: Store) -> Check | None:
     return Check("admins", count > 0, sentence, mend)
 
 
-def _permissions(settings: Settings) -> Check:
+def _check_permissions(settings: Settings) -> Check:
     found = open_to_others(settings)
     if found:
         sentence = f"other users can read {plural(len(found), 'file or folder', 'files and folders')}: {found[0]}"
@@ -179,7 +190,7 @@ def _permissions(settings: Settings) -> Check:
     return Check("permissions", True, "the home is its owner's alone")
 
 
-def _free_space(settings: Settings) -> Check:
+def _check_free_space(settings: Settings) -> Check:
     free = shutil.disk_usage(settings.home).free
     # A migration copies the database twice: once as it is, once packed.
     database = settings.database_file
@@ -191,7 +202,7 @@ def _free_space(settings: Settings) -> Check:
     return Check("room", True, sentence)
 
 
-def _versions() -> Check:
+def _check_library_versions() -> Check:
     sqlite = pysqlite3.dbapi2.sqlite_version
     lacking = [ending for ending in _FORMATS if not cv2.haveImageWriter(ending)]
     sentence = f"SQLite {sqlite}, OpenCV {cv2.__version__}"
@@ -204,7 +215,7 @@ def _versions() -> Check:
     return Check("versions", True, sentence)
 
 
-def _anchor(settings: Settings) -> Check:
+def _check_anchor(settings: Settings) -> Check:
     try:
         anchor = read_anchor(settings.database_file)
     except StorageError as error:
@@ -215,7 +226,7 @@ def _anchor(settings: Settings) -> Check:
     return Check("anchor", True, sentence)
 
 
-def _clock(session: Session) -> Check:
+def _check_clock(session: Session) -> Check:
     now = datetime.now(UTC)
     # Two machines that edit in turn may differ by a little.
     count, latest = entries_after(session, text_of(now + timedelta(minutes=5)))
@@ -229,7 +240,7 @@ def _clock(session: Session) -> Check:
     return Check("clock", True, f"{sentence}; the newest is not: the clock was set right since")
 
 
-def _leftovers(settings: Settings) -> Check:
+def _check_leftovers(settings: Settings) -> Check:
     found = [str(path.relative_to(settings.home)) for path in leftovers(settings)]
     if found:
         sentence = f"{len(found):,} half-written files are left: {found[0]}"
@@ -239,20 +250,20 @@ def _leftovers(settings: Settings) -> Check:
     return Check("leftovers", True, "none")
 
 
-def _calibrations(session: Session) -> Check:
+def _check_calibrations(session: Session) -> Check:
     count = len(unused_calibrations(session))
     mend = "The server deletes them when it has nothing to do." if count else None
     return Check("unused calibrations", True, f"{count:,} that no solution rests on", mend)
 
 
-def _uploads(session: Session, settings: Settings) -> Check:
+def _check_uploads(session: Session, settings: Settings) -> Check:
     found = unread_uploads(session, settings)
     sentence = f"{len(found):,} kept for frames that no dataset reads"
     mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
     return Check("uploads", True, sentence, mend)
 
 
-def _recordings(session: Session, settings: Settings) -> Check:
+def _check_recordings(session: Session, settings: Settings) -> Check:
     found = unused_frames(session, settings)
     sentence = f"{len(found):,} indices and folders of frames that nothing uses"
     mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None

@@ -60,18 +60,20 @@ def examine_people(session: Session, restore: str) -> list[Check]:
         session: A read session on a log whose chain is whole.
         restore: What to do where a row is not what was said.
     """
-    logged, present = _logged_people(session), _present(session)
+    logged, present = _logged_people(session), _present_people(session)
     for key, role in logged.unsure.items():
         if present.roles.get(key) == role:
             logged.roles[key] = role
     parts = {"accounts": "accounts", "roles": "roles in datasets", "shown": "adopted names"}
     return [
-        compare_with_log(words, getattr(logged, name), getattr(present, name), restore, _name)
+        compare_with_log(
+            words, getattr(logged, name), getattr(present, name), restore, _record_name
+        )
         for name, words in parts.items()
     ]
 
 
-def _present(session: Session) -> People:
+def _present_people(session: Session) -> People:
     people = all_people(session)
     names = {row.id: row.name for row in people}
     return People(
@@ -87,16 +89,16 @@ def _logged_people(session: Session) -> People:
     people, deleted = People(), None
     for entry in entries_of_kinds(session, [PERSON, DELETED, DATASET]):
         if entry.kind == DELETED:
-            _move_roles(people, entry)
+            _replay_dataset_deletion(people, entry)
         elif entry.kind == DATASET:
-            _restore_roles(people, entry, deleted)
+            _replay_dataset_creation(people, entry, deleted)
         elif (step := _STEPS.get(entry.body["did"])) is not None:
             step(people, entry, str(entry.body["person"]))
         deleted = entry if entry.kind == DELETED else None
     return people
 
 
-def _move_roles(people: People, deleted: LogEntry) -> None:
+def _replay_dataset_deletion(people: People, deleted: LogEntry) -> None:
     """Roles in a dataset go with it, or to the one that begins afresh in its place."""
     gone = {key: role for key, role in people.roles.items() if key[1] == deleted.dataset_id}
     for name, dataset in gone:
@@ -107,7 +109,7 @@ def _move_roles(people: People, deleted: LogEntry) -> None:
             people.unsure[name, dataset] = role
 
 
-def _restore_roles(people: People, made: LogEntry, deleted: LogEntry | None) -> None:
+def _replay_dataset_creation(people: People, made: LogEntry, deleted: LogEntry | None) -> None:
     """A dataset that an earlier version made right after it deleted another may have its roles."""
     if deleted is None or made.body["name"] != deleted.body["name"]:
         return
@@ -116,46 +118,46 @@ def _restore_roles(people: People, made: LogEntry, deleted: LogEntry | None) -> 
         people.unsure[name, made.dataset_id] = people.unsure.pop((name, dataset))
 
 
-def _account(people: People, entry: LogEntry, name: str) -> None:
+def _replay_account(people: People, entry: LogEntry, name: str) -> None:
     _, disabled = people.accounts.get(name, ("", False))
     people.accounts[name] = (entry.body["role"], disabled)
 
 
-def _disabled(people: People, entry: LogEntry, name: str) -> None:
+def _replay_disabling(people: People, entry: LogEntry, name: str) -> None:
     people.accounts[name] = (entry.body["role"], entry.body["did"] == "disabled")
 
 
-def _given(people: People, entry: LogEntry, name: str) -> None:
+def _replay_role_given(people: People, entry: LogEntry, name: str) -> None:
     assert entry.dataset_id is not None
     people.unsure.pop((name, entry.dataset_id), None)
     people.roles[name, entry.dataset_id] = entry.body["role"]
 
 
-def _taken(people: People, entry: LogEntry, name: str) -> None:
+def _replay_role_taken(people: People, entry: LogEntry, name: str) -> None:
     assert entry.dataset_id is not None
     people.unsure.pop((name, entry.dataset_id), None)
     people.roles.pop((name, entry.dataset_id), None)
 
 
-def _adopted(people: People, entry: LogEntry, name: str) -> None:
+def _replay_adoption(people: People, entry: LogEntry, name: str) -> None:
     people.shown[entry.body["from"]] = name
 
 
 _STEPS: Mapping[str, Callable[[People, LogEntry, str], None]] = {
-    "first admin": _account,
-    "invited": _account,
-    "came by single sign-on": _account,
-    "role": _account,
-    "disabled": _disabled,
-    "enabled": _disabled,
-    "role in dataset": _given,
-    "role taken": _taken,
-    "adopted": _adopted,
+    "first admin": _replay_account,
+    "invited": _replay_account,
+    "came by single sign-on": _replay_account,
+    "role": _replay_account,
+    "disabled": _replay_disabling,
+    "enabled": _replay_disabling,
+    "role in dataset": _replay_role_given,
+    "role taken": _replay_role_taken,
+    "adopted": _replay_adoption,
 }
 """What of the words about people changes who there is, and as what."""
 
 
-def _name(key: str | tuple[str, int]) -> str:
+def _record_name(key: str | tuple[str, int]) -> str:
     return key if isinstance(key, str) else f"{key[0]} in dataset {key[1]}"
 
 
@@ -174,20 +176,20 @@ def examine_computed(session: Session, restore: str) -> list[Check]:
         session: A read session.
         restore: What to do where one is not as it was written.
     """
-    calibrations, damaged = _damaged(damaged_calibrations(session))
-    readings, unread = _damaged(damaged_readings(session))
+    calibrations, damaged = _count_damaged(damaged_calibrations(session))
+    readings, unread = _count_damaged(damaged_readings(session))
     solutions, apart = 0, list[str]()
     for rows in solution_batches(session):
         solutions += len(rows)
         apart += _differing_solutions(session, rows, {*damaged})
     return [
-        _check_of("calibrations", calibrations, damaged, restore),
-        _check_of("readings of paint", readings, unread, restore),
-        _check_of("solutions", solutions, apart, restore),
+        _check_written_records("calibrations", calibrations, damaged, restore),
+        _check_written_records("readings of paint", readings, unread, restore),
+        _check_written_records("solutions", solutions, apart, restore),
     ]
 
 
-def _damaged(items: Iterable[tuple[str, bool]]) -> tuple[int, list[str]]:
+def _count_damaged(items: Iterable[tuple[str, bool]]) -> tuple[int, list[str]]:
     count, damaged = 0, []
     for key, is_damaged in items:
         count += 1
@@ -196,7 +198,7 @@ def _damaged(items: Iterable[tuple[str, bool]]) -> tuple[int, list[str]]:
     return count, damaged
 
 
-def _check_of(name: str, count: int, apart: Sequence[str], restore: str) -> Check:
+def _check_written_records(name: str, count: int, apart: Sequence[str], restore: str) -> Check:
     return compared(name, f"{count:,}, each as it was written", apart, WRONG, restore)
 
 
@@ -205,18 +207,18 @@ def _differing_solutions(session: Session, rows: Sequence[Any], damaged: Set[str
 
     What rests on a damaged calibration cannot be told; the calibration is named by itself.
     """
-    groups = _groups(session, [row.group_id for row in rows if row.current])
+    groups = _groups_with_sound_rows(session, [row.group_id for row in rows if row.current])
     for row in rows:
         try:
             known = damaged.isdisjoint(calibrations_of(row))
-            is_whole = not known or _is_whole(session, row, groups)
+            is_whole = not known or _is_as_written(session, row, groups)
         except StorageError:
             is_whole = False
         if not is_whole:
             yield f"{row.id} of group {row.group_id}"
 
 
-def _groups(session: Session, ids: Sequence[int]) -> dict[int, Group]:
+def _groups_with_sound_rows(session: Session, ids: Sequence[int]) -> dict[int, Group]:
     """Groups of which a solution can be told to be theirs: what their rows say is what they hash.
 
     None where a row cannot be read: that is a fault of the tables.
@@ -232,7 +234,7 @@ def _groups(session: Session, ids: Sequence[int]) -> dict[int, Group]:
     }
 
 
-def _is_whole(session: Session, row: Any, groups: Mapping[int, Group]) -> bool:
+def _is_as_written(session: Session, row: Any, groups: Mapping[int, Group]) -> bool:
     solution, summary = decode_row(session, row), read_summary(row.summary)
     if row.facts is not None:
         facts_from_bytes([row.facts])
@@ -240,7 +242,7 @@ def _is_whole(session: Session, row: Any, groups: Mapping[int, Group]) -> bool:
         return True
     group = groups[row.group_id]
     is_theirs = _fits_group(group, solution, policy_of(row.policy))
-    return is_theirs and _agree(summary, summarize(group, solution))
+    return is_theirs and _are_equal_values(summary, summarize(group, solution))
 
 
 def _fits_group(group: Group, solution: Solution, policy: Policy) -> bool:
@@ -253,7 +255,7 @@ def _fits_group(group: Group, solution: Solution, policy: Policy) -> bool:
     )
 
 
-def _agree(stored: SolutionSummary, computed: SolutionSummary) -> bool:
+def _are_equal_values(stored: SolutionSummary, computed: SolutionSummary) -> bool:
     return all(
         math.isclose(ours, theirs, rel_tol=_EQUAL, abs_tol=_EQUAL)
         if isinstance(ours, float) and isinstance(theirs, float)

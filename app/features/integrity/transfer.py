@@ -46,7 +46,9 @@ _PASSWORD = re.compile(r"://[^:/@]*:[^@]*@|[?&]password=")
 """In the address of a database, as its driver reads it."""
 
 
-def ends_of(source: str, target: str, settings: Settings) -> tuple[Settings, Settings]:
+def settings_of_both_databases(
+    source: str, target: str, settings: Settings
+) -> tuple[Settings, Settings]:
     """Settings of the database that is copied, and of the one that it is copied to.
 
     Args:
@@ -58,20 +60,20 @@ def ends_of(source: str, target: str, settings: Settings) -> tuple[Settings, Set
         InputError: An address has a password that everybody could read, others than its owner may
             use a file, or it holds no address.
     """
-    begin = _database(source, "FROM", settings)
+    begin = _database_settings(source, "FROM", settings)
     # The files of a home that goes into a database stay in that home.
-    into = settings if _address(target, "TO") is None else begin
-    return begin, _database(target, "TO", into)
+    into = settings if _database_address(target, "TO") is None else begin
+    return begin, _database_settings(target, "TO", into)
 
 
-def _database(place: str, name: str, settings: Settings) -> Settings:
-    address = _address(place, name)
+def _database_settings(place: str, name: str, settings: Settings) -> Settings:
+    address = _database_address(place, name)
     if address is not None:
         return settings.model_copy(update={"database_url": address})
     return settings.model_copy(update={"home": Path(place).absolute(), "database_url": None})
 
 
-def _address(place: str, name: str) -> str | None:
+def _database_address(place: str, name: str) -> str | None:
     """The address that an argument is, or that the file holds which it names; None: it is a home."""
     if "://" in place:
         if _PASSWORD.search(place):
@@ -211,11 +213,11 @@ def transfer(
         with store.read() as session:
             writer = engine.execution_options(**WRITE)
             if not replace_null and (found := find_null_characters(session)):
-                raise _unstorable(found)
-            return _transfer(session, writer, dialect, target.yields, tell)
+                raise _null_character_error(found)
+            return _copy_all_tables(session, writer, dialect, target.yields, tell)
 
 
-def _unstorable(found: Sequence[NullCharacter]) -> InputError:
+def _null_character_error(found: Sequence[NullCharacter]) -> InputError:
     count = plural(len(found), "text holds", "texts hold")
     return InputError(
         f"{count} U+0000, which no database takes any more: {named(found)}",
@@ -223,7 +225,7 @@ def _unstorable(found: Sequence[NullCharacter]) -> InputError:
     )
 
 
-def _transfer(
+def _copy_all_tables(
     session: Session,
     target: Engine,
     dialect: Dialect,
@@ -236,23 +238,23 @@ def _transfer(
             "the database that is copied was never set up by Touchline",
             hint="Run touchline migrate.",
         )
-    _begin(target, dialect, anchor.installation)
+    _prepare_target(target, dialect, anchor.installation)
     copied = 0
-    for tables in _steps():
-        copied += _copy(session, target, tables, tell)
+    for tables in _tables_by_transaction():
+        copied += _copy_tables(session, target, tables, tell)
     with Session(target) as copy:
         rows = _require_equal(session, copy)
-        entries = _require_chain(copy, anchor.entries, anchor.hash)
-        dialect.settle(copy, _tables(), anchor.installation)
+        entries = _require_same_chain(copy, anchor.entries, anchor.hash)
+        dialect.settle(copy, _tables_to_copy(), anchor.installation)
         # Their marks are those of the changes of another database.
         shutil.rmtree(yields, ignore_errors=True)
         copy.execute(_REVISION, {"revision": anchor.schema})
-        versions = _versions(copy)
+        versions = _version_hashes(copy)
         copy.commit()
     return Transferred(rows, copied, entries, versions)
 
 
-def _begin(target: Engine, dialect: Dialect, installation: str) -> None:
+def _prepare_target(target: Engine, dialect: Dialect, installation: str) -> None:
     """Make an empty schema that says that it is unfinished; or see that it is one of ours.
 
     Raises:
@@ -277,25 +279,27 @@ def _begin(target: Engine, dialect: Dialect, installation: str) -> None:
 _EMPTY = "Name a database without tables, or a home that does not exist yet."
 
 
-def _tables() -> list[Table]:
+def _tables_to_copy() -> list[Table]:
     """What is copied; marks of changes are made by the target's own triggers."""
     return [table for table in Base.metadata.sorted_tables if table.name != _MARKS]
 
 
-def _steps() -> Iterator[list[Table]]:
+def _tables_by_transaction() -> Iterator[list[Table]]:
     """Tables after those that they refer to; the groups of versions with these, which seal them."""
-    together = [table for table in _tables() if table.name in (f"{_VERSION}_group", _VERSION)]
+    together = [
+        table for table in _tables_to_copy() if table.name in (f"{_VERSION}_group", _VERSION)
+    ]
     together.sort(key=lambda table: table.name == _VERSION)
     # Whose it is first: then a target of another installation is known.
     yield [Base.metadata.tables[_INSTALLATION]]
-    for table in _tables():
+    for table in _tables_to_copy():
         if table.name == _VERSION:
             yield together
         elif table not in together and table.name != _INSTALLATION:
             yield [table]
 
 
-def _copy(
+def _copy_tables(
     session: Session, target: Engine, tables: Sequence[Table], tell: Callable[[str, int], None]
 ) -> int:
     """Copy what is missing of tables; several go over in one transaction."""
@@ -305,7 +309,7 @@ def _copy(
         for table in tables:
             # Rows went over in this order: so many of the first ones are there.
             present = connection.execute(select(func.count()).select_from(table)).scalar_one()
-            rows = iter(_rows(session, table, present))
+            rows = iter(_read_rows(session, table, present))
             while batch := list(islice(rows, _BATCH)):
                 connection.execute(insert(table), batch)
                 copied += len(batch)
@@ -316,7 +320,7 @@ def _copy(
     return copied
 
 
-def _rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict[str, Any]]:
+def _read_rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict[str, Any]]:
     """The rows of a table by key, a few at a time."""
     statement = select(table).order_by(*table.primary_key.columns).offset(after)
     found = connection.execute(statement, execution_options={"yield_per": _BATCH})
@@ -327,8 +331,8 @@ def _rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict
 def _require_equal(session: Session, connection: Connection) -> dict[str, int]:
     """Rows by table, where every row of the copy is that of the source."""
     counts = {}
-    for table in _tables():
-        ours, theirs = _digest(connection, table), _digest(session, table)
+    for table in _tables_to_copy():
+        ours, theirs = _digest_rows(connection, table), _digest_rows(session, table)
         if ours != theirs:
             raise DamagedError(
                 f"table {table.name} of the copy is not equal: {ours[0]:,} rows of {theirs[0]:,}",
@@ -338,16 +342,16 @@ def _require_equal(session: Session, connection: Connection) -> dict[str, int]:
     return counts
 
 
-def _digest(connection: Connection, table: Table) -> tuple[int, str]:
+def _digest_rows(connection: Connection, table: Table) -> tuple[int, str]:
     """How many rows there are, and a digest of their values in order."""
     count, digest = 0, hashlib.sha256()
-    for row in _rows(connection, table):
+    for row in _read_rows(connection, table):
         count += 1
         digest.update(repr(list(row.values())).encode())
     return count, digest.hexdigest()
 
 
-def _require_chain(session: Session, entries: int, last: str) -> int:
+def _require_same_chain(session: Session, entries: int, last: str) -> int:
     count = verify_chain(session)
     found = session.execute(text("SELECT hash FROM log WHERE id = :id"), {"id": entries})
     if count != entries or (found.scalar() or "") != last:
@@ -355,7 +359,7 @@ def _require_chain(session: Session, entries: int, last: str) -> int:
     return count
 
 
-def _versions(connection: Connection) -> dict[str, str]:
+def _version_hashes(connection: Connection) -> dict[str, str]:
     statement = text(
         "SELECT dataset.name AS dataset, version.name AS name, version.hash AS hash FROM version"
         " JOIN dataset ON dataset.id = version.dataset_id ORDER BY version.id"

@@ -240,7 +240,7 @@ class Jobs(JobRecords):
     def cancel_kind(self, dataset_id: int, *kinds: str) -> None:
         """End a dataset's jobs of some kinds, or of all where none is named, and wait for nothing.
 
-        Work that asks ``JobProgress.require_wanted`` in its transactions writes nothing in any
+        Work that asks ``JobProgress.require_not_cancelled`` in its transactions writes nothing in any
         that begins after this.
         """
         self.cancel_each(self.ids_of(dataset_id, *kinds))

@@ -37,7 +37,7 @@ def maintenance(
         raise typer.BadParameter("--clear takes the notice away, and needs nothing else")
     if text is None and (starts or until):
         raise typer.BadParameter("--starts and --until belong to a text")
-    begin, end = _time(starts, "--starts"), _time(until, "--until")
+    begin, end = _parse_time(starts, "--starts"), _parse_time(until, "--until")
     with opened_store() as store:
         if clear:
             clear_banner(store, actor=acting())
@@ -47,7 +47,7 @@ def maintenance(
     print_values(vars(banner) if banner else {"text": None}, json_)
 
 
-def _time(text: str | None, option: str) -> datetime | None:
+def _parse_time(text: str | None, option: str) -> datetime | None:
     if text is None:
         return None
     try:

@@ -67,24 +67,24 @@ def pitch(
     if set_ is not None and match is None:
         raise typer.BadParameter("--set needs --match")
     name = dataset or source or ""
-    _print(_of_dataset(name, accept, match, set_, workers), match, json_)
+    _print_pitches(_estimate_pitches_of_dataset(name, accept, match, set_, workers), match, json_)
 
 
-def _of_dataset(
+def _estimate_pitches_of_dataset(
     dataset: str, accept: bool, match: str | None, size: str | None, workers: int | None
 ) -> DatasetPitches:
-    from app.features.pitches.service import change_pitches, estimate_pitches, sizes_asked
+    from app.features.pitches.service import change_pitches, estimate_pitches, requested_sizes
 
     with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pitches(store, dataset, executor, progress)
-        wanted = sizes_asked(found, match, accept=accept, size=size)
+        wanted = requested_sizes(found, match, accept=accept, size=size)
         if not wanted:
             return found
         with store.write() as session:
             return change_pitches(session, dataset, wanted, if_match=found.etag, actor=acting())
 
 
-def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
+def _print_pitches(found: DatasetPitches, match: str | None, json_: bool) -> None:
     from app.features.datasets.service import of_match
 
     items = of_match(found.items, match)
@@ -94,14 +94,14 @@ def _print(found: DatasetPitches, match: str | None, json_: bool) -> None:
     for item in items:
         values = pitch_values(item)
         size = f"{item.pitch.length:g} x {item.pitch.width:g} m"
-        shown = f"length {_number(values, 'length')}, width {_number(values, 'width')}"
+        shown = f"length {_metres_with_sigma(values, 'length')}, width {_metres_with_sigma(values, 'width')}"
         proposed = item.proposed
         advice = "" if proposed is None else f"; use {proposed.length:g} x {proposed.width:g} m"
         name = item.match or "groups without a match"
         say(f"{name}: {size}; lines show {item.problem or shown}{advice}")
 
 
-def _number(values: dict[str, Any], name: str) -> str:
+def _metres_with_sigma(values: dict[str, Any], name: str) -> str:
     found = (values["estimate"] or {}).get(name)
     if found is None:
         return "unknown"
@@ -173,33 +173,33 @@ def _pictures_of_dataset(
     from app.features.match_estimates.pictures import (
         change_pictures,
         estimate_pictures,
-        pictures_asked,
+        requested_pictures,
     )
 
     with opened_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pictures(store, dataset, executor, progress)
         chosen = need_match(found, match, dataset)
-        wanted = pictures_asked(chosen, accept=accept, as_taken=as_taken)
+        wanted = requested_pictures(chosen, accept=accept, as_taken=as_taken)
         changed = 0
         if wanted:
             with store.write() as session:
                 changed = change_pictures(session, dataset, wanted, actor=acting())
     if json_:
-        print_json([{**_values(item), "changed": item.match in wanted} for item in chosen])
+        print_json([{**_picture_values(item), "changed": item.match in wanted} for item in chosen])
         return
     for item in chosen:
-        say(f"{item.match}: {_sentence(item)}")
+        say(f"{item.match}: {_picture_sentence(item)}")
     if wanted:
         say(f"{plural(changed, 'view')} changed; run touchline solve --dataset {dataset}")
 
 
-def _sentence(state: PictureState) -> str:
+def _picture_sentence(state: PictureState) -> str:
     if state.estimate is None:
         return state.sentence
     return f"{state.sentence}; {'use it with --accept' if state.proposed else 'nothing to change'}"
 
 
-def _values(state: PictureState) -> dict[str, Any]:
+def _picture_values(state: PictureState) -> dict[str, Any]:
     from dataclasses import asdict
 
     values = asdict(state)

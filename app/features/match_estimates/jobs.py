@@ -192,7 +192,7 @@ class MatchJob:
         return lambda progress: self.work(MatchCall(jobs, store, progress.job), progress)
 
 
-def _estimate(call: MatchCall, progress: JobProgress) -> Json:
+def _estimate_pictures(call: MatchCall, progress: JobProgress) -> Json:
     with call.jobs.pool() as executor:
         counter = counting_progress(progress, "matches")
         found = estimate_pictures(call.store, call.dataset_id, executor, counter, call.matches)
@@ -212,10 +212,10 @@ def _estimate(call: MatchCall, progress: JobProgress) -> Json:
     }
 
 
-PICTURES = MatchJob("pictures", "Estimate the pictures of {}", _estimate)
+PICTURES = MatchJob("pictures", "Estimate the pictures of {}", _estimate_pictures)
 
 
-def _share(call: MatchCall, progress: JobProgress) -> Json:
+def _share_positions(call: MatchCall, progress: JobProgress) -> Json:
     try:
         with call.jobs.pool() as executor:
             found = share_positions(
@@ -237,14 +237,14 @@ def _share(call: MatchCall, progress: JobProgress) -> Json:
 POSITIONS = MatchJob(
     "positions",
     "Share the main cameras' positions of {}",
-    _share,
+    _share_positions,
     require_sharable,
     take_back_positions,
     resumes=False,
 )
 
 
-def _adjust(call: MatchCall, progress: JobProgress) -> Json:
+def _adjust_rig(call: MatchCall, progress: JobProgress) -> Json:
     """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept`` takes it (none:
     nothing), with the ``inputs`` of the proposal that a person saw: no other one is saved."""
     what, inputs = call.job.request["what"], call.job.request["inputs"]
@@ -263,7 +263,7 @@ def _adjust(call: MatchCall, progress: JobProgress) -> Json:
     return {**proposal_values(proposed), "accepted": what}
 
 
-RIG = MatchJob("rig", "Adjust the cameras of {}", _adjust, require_adjustable, resumes=False)
+RIG = MatchJob("rig", "Adjust the cameras of {}", _adjust_rig, require_adjustable, resumes=False)
 
 
 def take_rig_back(jobs: Jobs, store: Store, dataset: str, *, actor: str) -> int:

@@ -54,7 +54,7 @@ def noise(
         values = {"advice": advice, "values": found.values, "applied": applied, **factors}
         print_json({**asdict(found), **values})
         return
-    _say(found)
+    _print_noise(found)
     if policy is not None:
         say("The dataset uses the estimates; `touchline solve` computes what that changes.")
     elif alike:
@@ -65,7 +65,7 @@ def noise(
         say(f"Run it again with --apply to use the estimates: {', '.join(changes)}.")
 
 
-def _say(found: Noise) -> None:
+def _print_noise(found: Noise) -> None:
     for item in found.advice:
         present = "leaves it to each image"
         if item.present is not None:
@@ -131,13 +131,13 @@ def rig(
     if json_:
         print_json(values)
     else:
-        _print(values)
+        _print_cameras(values)
 
 
-def _print(values: dict[str, Any]) -> None:
+def _print_cameras(values: dict[str, Any]) -> None:
     say("camera    moved m  turned deg  focal %  picture px  sigma m  sigma px  lines px")
     for item in values["cameras"]:
-        lines = _change(item["lines_before_px"], item["lines_after_px"])
+        lines = _change_text(item["lines_before_px"], item["lines_after_px"])
         say(
             f"{item['key']:9} {item['moved_m']:7.2f} {item['turned_degrees']:11.3f} "
             f"{item['focal_percent']:8.2f} {item['picture_px']:11.1f} "
@@ -145,11 +145,11 @@ def _print(values: dict[str, Any]) -> None:
         )
     say("pair            frames  gap px          held out  gap px          2nd ahead, frames")
     for item in values["pairs"]:
-        gap = _change(item["before_px"], item["after_px"])
-        unseen = _change(item["held_out_before_px"], item["held_out_after_px"])
+        gap = _change_text(item["before_px"], item["after_px"])
+        unseen = _change_text(item["held_out_before_px"], item["held_out_after_px"])
         say(
             f"{item['a'] + ' ' + item['b']:15} {item['frames']:6}  {gap:14} "
-            f"{item['held_out']:9}  {unseen:14}  {_offset(item)}"
+            f"{item['held_out']:9}  {unseen:14}  {_offset_text(item)}"
         )
     say(
         f"{values['frames']} instants, {values['gross']} left out; balls move "
@@ -169,11 +169,11 @@ _ENDS = {
 }
 
 
-def _change(before: float | None, after: float | None) -> str:
+def _change_text(before: float | None, after: float | None) -> str:
     return "" if before is None or after is None else f"{before:.1f} -> {after:.1f}"
 
 
-def _offset(item: dict[str, Any]) -> str:
+def _offset_text(item: dict[str, Any]) -> str:
     if item["offset_frames"] is None:
         return ""
     return f"{item['offset_frames']:+.3f} +- {item['offset_sigma_frames']:.3f}"

@@ -69,7 +69,7 @@ class PictureState:
 
 
 @dataclass(frozen=True)
-class _Task:
+class _PictureTask:
     match: str
     frames: tuple[PictureFrame, ...]
     used: tuple[PictureGeometry | None, ...]
@@ -109,16 +109,16 @@ def estimate_pictures(
         found = read_dataset_head(session, dataset)
         names = (item.match for item in match_pitches(session, found.id) if item.match)
         matches = [match for match in names if only is None or match in only]
-    tasks = (_task(store, found.id, match, found.policy.calibration) for match in matches)
+    tasks = (_make_task(store, found.id, match, found.policy.calibration) for match in matches)
     states = []
-    for state in fan_out(_estimate, tasks, executor):
+    for state in fan_out(_estimate_match, tasks, executor):
         states.append(state)
         if progress is not None:
             progress(len(states), len(matches))
     return sorted(states, key=lambda state: state.match)
 
 
-def pictures_asked(
+def requested_pictures(
     chosen: Iterable[PictureState], *, accept: bool = False, as_taken: bool = False
 ) -> dict[str, PictureGeometry | None]:
     """What somebody wants the pictures of matches to be, by match.
@@ -155,12 +155,12 @@ def change_pictures(
     """
     found = require_matches(session, dataset, [*wanted])
     return sum(
-        _give(session, found.id, groups_of_match(session, found.id, match), picture, actor)
+        _give_picture(session, found.id, groups_of_match(session, found.id, match), picture, actor)
         for match, picture in wanted.items()
     )
 
 
-def _give(
+def _give_picture(
     session: Session,
     dataset_id: int,
     ids: Sequence[int],
@@ -187,10 +187,12 @@ def _main_view(group: Group) -> View | None:
     return None if is_given else view
 
 
-def _task(store: Store, dataset_id: int, match: str, policy: CalibrationPolicy) -> _Task:
+def _make_task(
+    store: Store, dataset_id: int, match: str, policy: CalibrationPolicy
+) -> _PictureTask:
     seen = list(_main_views(store, dataset_id, match))
     frames = tuple(PictureFrame(view.station.lines, view.size, at.pitch) for at, view in seen)
-    return _Task(match, frames, tuple(view.station.picture for _, view in seen), policy)
+    return _PictureTask(match, frames, tuple(view.station.picture for _, view in seen), policy)
 
 
 def _main_views(store: Store, dataset_id: int, match: str) -> Iterator[tuple[Group, View]]:
@@ -204,7 +206,7 @@ def _main_views(store: Store, dataset_id: int, match: str) -> Iterator[tuple[Gro
                     yield stored.group, view
 
 
-def _estimate(task: _Task) -> PictureState:
+def _estimate_match(task: _PictureTask) -> PictureState:
     """Of one match; runs in a worker."""
     used = max(set(task.used), key=task.used.count) if task.used else None
     try:

@@ -85,7 +85,7 @@ class DatasetPositions:
 
 
 @dataclass(frozen=True)
-class _Picture:
+class _MainPicture:
     """The main camera of a group, and its calibration by its lines alone, where that is known."""
 
     group_id: int
@@ -96,10 +96,10 @@ class _Picture:
 
 
 @dataclass(frozen=True)
-class _Task:
+class _PositionTask:
     match: str
     inputs: str
-    pictures: tuple[_Picture, ...]
+    pictures: tuple[_MainPicture, ...]
     policy: CalibrationPolicy
 
 
@@ -110,7 +110,7 @@ def get_positions(store: Store, dataset: str | int) -> DatasetPositions:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return _read(session, dataset)
+        return _read_positions(session, dataset)
 
 
 def share_positions(
@@ -143,16 +143,16 @@ def share_positions(
     found = require_sharable(store, dataset, matches)
     policy = found.policy.calibration
     with store.read() as session:
-        chosen = _chosen(session, found, matches)
-    tasks = (_task(store, item, policy) for item in chosen)
-    for done, (task, positions) in enumerate(fan_out(_estimate, tasks, executor), start=1):
+        chosen = _matches_with_inputs(session, found, matches)
+    tasks = (_make_task(store, item, policy) for item in chosen)
+    for done, (task, positions) in enumerate(fan_out(_estimate_match, tasks, executor), start=1):
         edits = {group: SetPositions(at) for group, at in positions.items()}
         with store.write() as session:
             if require_wanted is not None:
                 require_wanted()
             then = position_inputs(session, found.id, task.match).get(task.match)
             body = {"match": task.match, "inputs": task.inputs, "before": then}
-            _give(session, found.id, edits, actor, body)
+            _give_positions(session, found.id, edits, actor, body)
         if progress is not None:
             progress(done, len(chosen))
     return get_positions(store, found.id)
@@ -169,7 +169,7 @@ def require_sharable(
     """
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        _chosen(session, found, matches)
+        _matches_with_inputs(session, found, matches)
     if not found.policy.calibration.share_position:
         raise ConflictError(
             f'the policy of "{found.name}" does not use the position that a match shares',
@@ -204,7 +204,7 @@ def take_back_positions(
     """
     match = match or ""
     found = read_dataset_head(session, dataset)
-    _chosen(session, found, [match])
+    _matches_with_inputs(session, found, [match])
     entries = last_share(session, found.id, match)
     if stopped and not any(
         job.started and entries and job.started <= entries[0].at for job in stopped
@@ -220,10 +220,10 @@ def take_back_positions(
         "before": share.body["inputs"],
         "takes_back": share.at,
     }
-    _give(session, found.id, edits, actor, body)
+    _give_positions(session, found.id, edits, actor, body)
 
 
-def _give(
+def _give_positions(
     session: Session, dataset_id: int, edits: Mapping[int, Edit], actor: str, body: dict[str, Any]
 ) -> None:
     """One entry for each group that changes, and for the first in any case: it says from what.
@@ -243,18 +243,20 @@ def _give(
     edit_groups(*where, actor=actor, body=body, always_logged=ids[0] if ids else None)
 
 
-def _read(session: Session, dataset: str | int) -> DatasetPositions:
+def _read_positions(session: Session, dataset: str | int) -> DatasetPositions:
     found = read_dataset_head(session, dataset)
     policy, then = found.policy.calibration, position_inputs(session, found.id)
     items = tuple(
-        _state(item, then.get(item.match), policy)
+        _position_state(item, then.get(item.match), policy)
         for item in match_positions(session, found.id)
         if item.views
     )
     return DatasetPositions(found.id, found.name, policy.share_position, items)
 
 
-def _state(item: MatchPositions, then: str | None, policy: CalibrationPolicy) -> PositionState:
+def _position_state(
+    item: MatchPositions, then: str | None, policy: CalibrationPolicy
+) -> PositionState:
     x = y = z = sigma = 0.0
     if item.positions:
         x, y, z = np.mean([at.mean for at in item.positions], axis=0).tolist()
@@ -266,13 +268,13 @@ def _state(item: MatchPositions, then: str | None, policy: CalibrationPolicy) ->
         shared=len(item.positions),
         mean=(x, y, z) if item.positions else None,
         sigma_m=sigma if item.positions else None,
-        current=None if then is None else then == _inputs(item, policy),
+        current=None if then is None else then == _inputs_digest(item, policy),
         used=policy.share_position,
     )
-    return replace(found, sentence=_sentence(found))
+    return replace(found, sentence=_state_sentence(found))
 
 
-def _sentence(state: PositionState) -> str:
+def _state_sentence(state: PositionState) -> str:
     if state.current is None:
         return f"none of {state.views} pictures of the main camera uses a shared position"
     verb = "use" if state.used else "keep"
@@ -287,7 +289,7 @@ def _sentence(state: PositionState) -> str:
     return kept if state.current else f"{kept}; {changed}: share it again"
 
 
-def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
+def _inputs_digest(item: MatchPositions, policy: CalibrationPolicy) -> str:
     """Key of what is estimated: all that it is computed from."""
     # Whether the policy uses it changes nothing of that, nor does paint: lines alone say it.
     values = asdict(replace(policy, share_position=True))
@@ -295,7 +297,7 @@ def _inputs(item: MatchPositions, policy: CalibrationPolicy) -> str:
     return digest([SOLVER_VERSION, values, item.inputs])
 
 
-def _chosen(
+def _matches_with_inputs(
     session: Session, dataset: DatasetHead, matches: Collection[str] | None
 ) -> list[tuple[MatchPositions, str]]:
     """Matches to share in, each with the key of what it will be shared from."""
@@ -305,15 +307,17 @@ def _chosen(
         if match not in known:
             raise NotFoundError(f'"{dataset.name}" has no match {match} with lines')
     if matches is not None:
-        return [(known[match], _inputs(known[match], policy)) for match in matches]
+        return [(known[match], _inputs_digest(known[match], policy)) for match in matches]
     then = position_inputs(session, dataset.id)
-    keyed = [(item, _inputs(item, policy)) for item in known.values()]
+    keyed = [(item, _inputs_digest(item, policy)) for item in known.values()]
     return [(item, inputs) for item, inputs in keyed if then.get(item.match) != inputs]
 
 
-def _task(store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationPolicy) -> _Task:
+def _make_task(
+    store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationPolicy
+) -> _PositionTask:
     item, inputs = chosen
-    pictures: list[_Picture] = []
+    pictures: list[_MainPicture] = []
     with store.read() as session:
         for start in range(0, len(item.groups), _BATCH):
             stored = read_groups(session, item.groups[start : start + _BATCH], extras=False)
@@ -323,17 +327,20 @@ def _task(store: Store, chosen: tuple[MatchPositions, str], policy: CalibrationP
             }
             known = read_calibrations(session, keys.values())
             pictures += (
-                _picture(number, it.group, known.get(keys[number])) for number, it in stored.items()
+                _main_picture(number, it.group, known.get(keys[number]))
+                for number, it in stored.items()
             )
-    return _Task(item.match, inputs, tuple(pictures), policy)
+    return _PositionTask(item.match, inputs, tuple(pictures), policy)
 
 
-def _picture(group_id: int, group: Group, alone: Calibration | None) -> _Picture:
+def _main_picture(group_id: int, group: Group, alone: Calibration | None) -> _MainPicture:
     view = group.views[0]
-    return _Picture(group_id, view.key, view.station, group.pitch, alone)
+    return _MainPicture(group_id, view.key, view.station, group.pitch, alone)
 
 
-def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]:
+def _estimate_match(
+    task: _PositionTask,
+) -> tuple[_PositionTask, dict[int, dict[str, SharedPosition]]]:
     """Positions by group and view; runs in a worker."""
     found = list(_calibrated_alone(task))
     places = [place for _, _, place in found if place is not None]
@@ -345,15 +352,17 @@ def _estimate(task: _Task) -> tuple[_Task, dict[int, dict[str, SharedPosition]]]
         near = None if pan is None else others.prior(pan)
         at = {}
         if near is not None:
-            at[picture.view] = SharedPosition(_rounded(near.mean), _rounded(near.sigma))
+            at[picture.view] = SharedPosition(
+                _rounded_position(near.mean), _rounded_position(near.sigma)
+            )
         positions[picture.group_id] = at
     # What was read travels back no farther than it must.
     return replace(task, pictures=()), positions
 
 
 def _calibrated_alone(
-    task: _Task,
-) -> Iterator[tuple[_Picture, Calibration | None, FramePlace | None]]:
+    task: _PositionTask,
+) -> Iterator[tuple[_MainPicture, Calibration | None, FramePlace | None]]:
     """Pictures, calibrated; None where solving would take no position from others."""
     for picture in task.pictures:
         station = picture.station
@@ -368,6 +377,6 @@ def _calibrated_alone(
         yield picture, alone, place_of(alone, station.size)
 
 
-def _rounded(values: np.ndarray) -> tuple[float, float, float]:
+def _rounded_position(values: np.ndarray) -> tuple[float, float, float]:
     x, y, z = np.round(values, _DIGITS).tolist()
     return x, y, z

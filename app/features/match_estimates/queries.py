@@ -113,12 +113,14 @@ def match_pictures(session: Session, dataset_id: int) -> list[MatchPictures]:
     for match, picture, frames in session.execute(statement):
         found.setdefault(match, []).append((picture, frames))
     return [
-        MatchPictures(match, sum(frames for _, frames in rows), _picture(rows[0][0]), len(rows) > 1)
+        MatchPictures(
+            match, sum(frames for _, frames in rows), _picture_from_text(rows[0][0]), len(rows) > 1
+        )
         for match, rows in found.items()
     ]
 
 
-def _picture(text: str | None) -> PictureGeometry | None:
+def _picture_from_text(text: str | None) -> PictureGeometry | None:
     if text is None:
         return None
     with as_written():
@@ -201,7 +203,7 @@ def position_inputs(
         Keys by match; None for one whose first share was taken back.
     """
     rows = session.execute(
-        _given(
+        _share_entries_statement(
             func.max(LogModel.id), GroupModel.match, dataset_id=dataset_id, match=match
         ).group_by(GroupModel.match)
     ).all()
@@ -209,9 +211,9 @@ def position_inputs(
     found: dict[str, str | None] = {}
     for number, name in rows:
         entry: LogEntry | None = newest[number]
-        if not _is_of(newest[number], name):
+        if not _was_in_match(newest[number], name):
             # Its group was given that in another match.
-            entry = next((of[0] for of in _times(session, dataset_id, name)), None)
+            entry = next((of[0] for of in _shares_by_time(session, dataset_id, name)), None)
         if entry is not None:
             found[name] = entry.body["inputs"]
     return found
@@ -220,7 +222,7 @@ def position_inputs(
 def last_share(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
     """The entries of a match's newest share that was not taken back; none where there is none."""
     taken_back = set()
-    for entries in _times(session, dataset_id, match):
+    for entries in _shares_by_time(session, dataset_id, match):
         first = entries[0]
         if first.at in taken_back:
             continue
@@ -232,18 +234,20 @@ def last_share(session: Session, dataset_id: int, match: str) -> list[LogEntry]:
     return []
 
 
-def _times(session: Session, dataset_id: int, match: str) -> Iterator[list[LogEntry]]:
+def _shares_by_time(session: Session, dataset_id: int, match: str) -> Iterator[list[LogEntry]]:
     """The entries that groups were given while in a match, by time, the newest first."""
-    statement = _given(LogModel.id, LogModel.at, dataset_id=dataset_id, match=match)
+    statement = _share_entries_statement(
+        LogModel.id, LogModel.at, dataset_id=dataset_id, match=match
+    )
     rows = session.execute(statement.order_by(LogModel.id.desc())).all()
     for _, of_time in groupby(rows, key=lambda row: row.at):
         ids = sorted(row.id for row in of_time)
-        entries = [entry for entry in read_entries(session, ids) if _is_of(entry, match)]
+        entries = [entry for entry in read_entries(session, ids) if _was_in_match(entry, match)]
         if entries:
             yield entries
 
 
-def _given(*columns: Any, dataset_id: int, match: str | None) -> Any:
+def _share_entries_statement(*columns: Any, dataset_id: int, match: str | None) -> Any:
     """Columns of the entries about the groups of a match, or of all, as these are now."""
     statement = (
         select(*columns)
@@ -253,6 +257,6 @@ def _given(*columns: Any, dataset_id: int, match: str | None) -> Any:
     return statement if match is None else statement.where(GroupModel.match == match)
 
 
-def _is_of(entry: LogEntry, match: str) -> bool:
+def _was_in_match(entry: LogEntry, match: str) -> bool:
     """Whether the group was in the match then; the first entries did not say."""
     return bool(entry.body.get("match", match) == match)

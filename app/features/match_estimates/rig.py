@@ -76,7 +76,7 @@ def propose(
     """
     states, pitch, policy = adjustable(store, dataset)
     with store.read() as session:
-        frames = _frames(session, states[0].dataset_id)
+        frames = _rig_frames(session, states[0].dataset_id)
     own = None if lines is None else _read_lines(lines, states)
     cameras = [
         RigCamera(
@@ -280,7 +280,7 @@ def _read_lines(path: Path, states: Sequence[StationState]) -> dict[str, Lines]:
     return lines
 
 
-def _frames(session: Session, dataset_id: int) -> list[RigFrame]:
+def _rig_frames(session: Session, dataset_id: int) -> list[RigFrame]:
     """Every instant of a dataset that at least two static cameras show the ball in."""
     known = known_groups(session, dataset_id)
     numbered = all(item.key.isascii() and item.key.isdigit() for item in known)
@@ -292,14 +292,14 @@ def _frames(session: Session, dataset_id: int) -> list[RigFrame]:
             balls = {
                 view.station.key: center
                 for view in groups[item.id].group.views
-                if view.station.shared and (center := _center(view)) is not None
+                if view.station.shared and (center := _ball_center(view)) is not None
             }
             if len(balls) > 1:
                 frames.append(RigFrame(int(item.key) if numbered else place, balls))
     return frames
 
 
-def _center(view: View) -> ImagePoint | None:
+def _ball_center(view: View) -> ImagePoint | None:
     """Where a view shows the one ball, in its own right; None where it does not."""
     ball = view.ball
     return ball.center if view.included and ball is not None and not ball.inferred else None

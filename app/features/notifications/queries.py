@@ -80,7 +80,7 @@ def select_notifications(
     statement = (
         select(*columns, DatasetModel.name.label("dataset"))
         .outerjoin(DatasetModel, DatasetModel.id == NotificationModel.dataset_id)
-        .where(*_visible(person_id, visibility, since))
+        .where(*_visibility_conditions(person_id, visibility, since))
         .order_by(NotificationModel.id.desc())
         .limit(limit)
     )
@@ -92,7 +92,10 @@ def select_notifications(
 
 def count_unread(session: Session, person_id: int, visibility: Visibility, since: str) -> int:
     """How much of it they have not seen yet."""
-    unread = (*_visible(person_id, visibility, since), NotificationModel.read.is_(None))
+    unread = (
+        *_visibility_conditions(person_id, visibility, since),
+        NotificationModel.read.is_(None),
+    )
     return session.scalar(select(func.count()).select_from(NotificationModel).where(*unread)) or 0
 
 
@@ -100,13 +103,15 @@ def mark_read(
     session: Session, person_id: int, visibility: Visibility, ids: Sequence[int] | None, at: str
 ) -> None:
     """They have seen some of it, or (None) all that they see now."""
-    where = [*_visible(person_id, visibility, ""), NotificationModel.read.is_(None)]
+    where = [*_visibility_conditions(person_id, visibility, ""), NotificationModel.read.is_(None)]
     if ids is not None:
         where.append(NotificationModel.id.in_(ids))
     session.execute(update(NotificationModel).where(*where).values(read=at))
 
 
-def _visible(person_id: int, visibility: Visibility, since: str) -> list[ColumnElement[bool]]:
+def _visibility_conditions(
+    person_id: int, visibility: Visibility, since: str
+) -> list[ColumnElement[bool]]:
     where = [NotificationModel.person_id == person_id, NotificationModel.at >= since]
     # What is of no dataset was told to them, and is theirs.
     seen = visibility.condition(NotificationModel.dataset_id, literal(visibility.name))

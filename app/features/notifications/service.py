@@ -71,7 +71,7 @@ def notify(
     if dataset_id is not None and roles.role_in(dataset_id) is Role.NONE:
         return False
     at = now()
-    delete_notifications(session, row.id, _oldest())
+    delete_notifications(session, row.id, _oldest_shown_time())
     what = {"at": at, "kind": str(kind), "actor": actor, "sentence": sentence}
     where = {"address": address, "dataset_id": dataset_id, "group_id": group_id}
     insert_notification(session, row.id, {**what, **where})
@@ -83,26 +83,26 @@ def read_notifications(
 ) -> NotificationState:
     """What somebody was told in the last 90 days, of what they see at this moment."""
     with store.read() as session:
-        return _read(session, login, limit, before)
+        return _read_state(session, login, limit, before)
 
 
 def read_all(store: Store, login: Login, ids: Sequence[int] | None = None) -> NotificationState:
     """They have seen some of what they were told, or (None) all of it."""
     with store.write() as session:
         mark_read(session, login.person_id, login.visibility, ids, now())
-        bell = _read(session, login)
+        bell = _read_state(session, login)
         session.respond(bell)
         return bell
 
 
-def _read(
+def _read_state(
     session: Session, login: Login, limit: int = 50, before: int | None = None
 ) -> NotificationState:
-    mine = (login.person_id, login.visibility, _oldest())
+    mine = (login.person_id, login.visibility, _oldest_shown_time())
     return NotificationState(
         select_notifications(session, *mine, limit, before), count_unread(session, *mine)
     )
 
 
-def _oldest() -> str:
+def _oldest_shown_time() -> str:
     return text_of(datetime.now(UTC) - timedelta(days=KEPT_DAYS))

@@ -20,7 +20,7 @@ REPORTED = (
 """What a result counts of all matches."""
 
 
-def _read(call: MatchCall, progress: JobProgress) -> Json:
+def _read_paint(call: MatchCall, progress: JobProgress) -> Json:
     try:
         found = read_paint(
             call.store,
@@ -40,7 +40,7 @@ def _read(call: MatchCall, progress: JobProgress) -> Json:
 PAINT = MatchJob(
     "paint",
     "Read the paint of the pictures of {}",
-    _read,
+    _read_paint,
     require_readable,
     take_back_paint,
     has_runs=True,
@@ -59,7 +59,7 @@ def stop_and_forget(jobs: Jobs, store: Store, dataset: str | int) -> int:
     return forget_proposals(store, number)
 
 
-def _propose(call: MatchCall, progress: JobProgress) -> Json:
+def _propose_lines(call: MatchCall, progress: JobProgress) -> Json:
     run = propose_views(
         call.store,
         call.dataset_id,
@@ -70,4 +70,4 @@ def _propose(call: MatchCall, progress: JobProgress) -> Json:
     return asdict(run)
 
 
-PROPOSALS = MatchJob("proposals", "Propose cameras for views of {} that have none", _propose)
+PROPOSALS = MatchJob("proposals", "Propose cameras for views of {} that have none", _propose_lines)

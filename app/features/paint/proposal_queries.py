@@ -86,17 +86,20 @@ class MatchProposals:
     accepted: int
 
 
-def _is_bare() -> ColumnElement[bool]:
+def _has_no_lines_or_camera() -> ColumnElement[bool]:
     return and_(StationModel.lines == "{}", StationModel.given.is_(None))
 
 
-def _is_open() -> ColumnElement[bool]:
+def _is_open_proposal() -> ColumnElement[bool]:
     """Whether a view is as it was when it was looked at, as far as lines and camera go."""
     beside = ProposalModel.beside
-    return or_(and_(_is_bare(), beside == ""), and_(beside != "", beside == StationModel.digest))
+    return or_(
+        and_(_has_no_lines_or_camera(), beside == ""),
+        and_(beside != "", beside == StationModel.digest),
+    )
 
 
-def _is_asked(lost: Collection[int]) -> ColumnElement[bool]:
+def _needs_proposal(lost: Collection[int]) -> ColumnElement[bool]:
     """Whether a view is one to look at: of a static camera that is the first with a picture.
 
     Args:
@@ -111,7 +114,7 @@ def _is_asked(lost: Collection[int]) -> ColumnElement[bool]:
         .group_by(view.station_id)
     )
     alone = or_(StationModel.shared.is_(False), ViewModel.id.in_(first))
-    bare = and_(_is_bare(), ViewModel.media_path.is_not(None), alone)
+    bare = and_(_has_no_lines_or_camera(), ViewModel.media_path.is_not(None), alone)
     return or_(bare, ViewModel.id.in_(numbers_in(sorted(lost))))
 
 
@@ -154,7 +157,7 @@ def groups_with_open(outcome: str | None = None) -> Select[Any]:
         select(ViewModel.group_id)
         .join(ProposalModel, ProposalModel.view_id == ViewModel.id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(_is_open())
+        .where(_is_open_proposal())
     )
     return statement if outcome is None else statement.where(ProposalModel.outcome == outcome)
 
@@ -174,7 +177,7 @@ def views_to_look_at(
         select(ViewModel.group_id, ViewModel.id)
         .join(GroupModel, GroupModel.id == ViewModel.group_id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(GroupModel.dataset_id == dataset_id, _is_asked(lost))
+        .where(GroupModel.dataset_id == dataset_id, _needs_proposal(lost))
         .order_by(GroupModel.match, GroupModel.number, ViewModel.position)
     )
     if matches is not None:
@@ -190,9 +193,9 @@ def match_proposals(
 ) -> list[MatchProposals]:
     """How far each match of a dataset is, or each of these, by name."""
     lost = lost_views(session, dataset_id, matches)
-    is_candidate, outcome = _is_asked(lost), ProposalModel.outcome
+    is_candidate, outcome = _needs_proposal(lost), ProposalModel.outcome
     # What was said of a view as it was before says nothing of it now.
-    looked = and_(is_candidate, _is_open())
+    looked = and_(is_candidate, _is_open_proposal())
 
     def number(*conditions: ColumnElement[bool]) -> ColumnElement[int]:
         return func.coalesce(func.sum(case((and_(*conditions), 1), else_=0)), 0)
@@ -224,20 +227,22 @@ def read_proposals(session: Session, views: Iterable[int]) -> dict[int, Proposal
     for start in range(0, len(wanted), _BATCH):
         some = wanted[start : start + _BATCH]
         for row in session.execute(select(_PROPOSAL).where(_PROPOSAL.c.view_id.in_(some))):
-            found[row.view_id] = _of_row(row)
+            found[row.view_id] = _proposal_from_row(row)
     return found
 
 
 def group_proposals(session: Session, group_id: int) -> list[tuple[str, bool, Proposal]]:
     """Key of the view, whether it is open, and the proposal, in the order of a group's views."""
     statement = (
-        select(ViewModel.key, _is_open().label("open"), *_PROPOSAL.columns)
+        select(ViewModel.key, _is_open_proposal().label("open"), *_PROPOSAL.columns)
         .join(_PROPOSAL, _PROPOSAL.c.view_id == ViewModel.id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
         .where(ViewModel.group_id == group_id)
         .order_by(ViewModel.position)
     )
-    return [(row.key, bool(row.open), _of_row(row)) for row in session.execute(statement)]
+    return [
+        (row.key, bool(row.open), _proposal_from_row(row)) for row in session.execute(statement)
+    ]
 
 
 def save_proposals(session: Session, proposals: Sequence[Proposal]) -> None:
@@ -268,7 +273,7 @@ def delete_proposals(session: Session, dataset_id: int) -> int:
     return int(cast(Any, gone).rowcount)
 
 
-def _of_row(row: Any) -> Proposal:
+def _proposal_from_row(row: Any) -> Proposal:
     values = {item.name: getattr(row, item.name) for item in fields(Proposal)}
     with as_written():
         return Proposal(**{**values, "lines": lines_from_json(parse(row.lines))})

@@ -152,10 +152,10 @@ def propose_views(
         closing(WorkerPool(LIMITS, count, 0, "pictures", COUNTS["proposals"])) as pool,
     ):
         for start in range(0, len(pending), _PER_WORKER * count):
-            tasks = _tasks(store, found, dict(pending[start : start + _PER_WORKER * count]))
+            tasks = _make_tasks(store, found, dict(pending[start : start + _PER_WORKER * count]))
             views = [task.media for task in tasks]
             videos.make_ready(views, run.views, total, progress)
-            answers = _answers(store, pool, videos, tasks)
+            answers = _run_tasks(store, pool, videos, tasks)
             with store.write() as session:
                 if require_wanted is not None:
                     require_wanted()
@@ -181,7 +181,7 @@ def forget_proposals(store: Store, dataset: str | int) -> int:
     return gone
 
 
-def _tasks(
+def _make_tasks(
     store: Store, dataset: DatasetHead, views_by_group: dict[int, list[int]]
 ) -> list[ProposalTask]:
     tasks = []
@@ -192,11 +192,11 @@ def _tasks(
             known = nearby_cameras_of_match(session, stored)
             for key, number in stored.view_ids.items():
                 if number in views_by_group[stored.id]:
-                    tasks.append(_task(stored, key, known, dataset, old.get(number)))
+                    tasks.append(_make_task(stored, key, known, dataset, old.get(number)))
     return [task for task in tasks if task is not None]
 
 
-def _task(
+def _make_task(
     stored: StoredGroup, key: str, known: Sequence[Any], dataset: DatasetHead, old: Proposal | None
 ) -> ProposalTask | None:
     view, policy = stored.group.view(key), dataset.policy.calibration
@@ -227,17 +227,17 @@ def _task(
     )
 
 
-def _answers(
+def _run_tasks(
     store: Store, pool: WorkerPool, videos: VideoIndexer, tasks: Sequence[ProposalTask]
 ) -> list[Proposal | None]:
     futures = [
         PictureTask(pool, *videos.with_index(task.media, read_proposal, task, store.settings))
         for task in tasks
     ]
-    return [_result(task, reads) for task, reads in zip(tasks, futures, strict=True)]
+    return [_proposal_of_task(task, reads) for task, reads in zip(tasks, futures, strict=True)]
 
 
-def _result(task: ProposalTask, reads: PictureTask) -> Proposal | None:
+def _proposal_of_task(task: ProposalTask, reads: PictureTask) -> Proposal | None:
     try:
         found: Proposal | None = reads.result()
     except (ImageError, TooLargeError):

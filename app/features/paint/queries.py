@@ -125,7 +125,7 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
         .group_by(group.id)
         .order_by(group.match, group.number)
     )
-    reasons = _reasons(session, dataset_id)
+    reasons = _readings_by_reason(session, dataset_id)
     rows: dict[str, list[Any]] = {}
     for row in session.execute(statement):
         rows.setdefault(row.match, []).append(row)
@@ -142,7 +142,7 @@ def match_paint(session: Session, dataset_id: int) -> list[MatchPaint]:
     ]
 
 
-def _reasons(session: Session, dataset_id: int) -> dict[str, dict[str | None, int]]:
+def _readings_by_reason(session: Session, dataset_id: int) -> dict[str, dict[str | None, int]]:
     """How many readings each match has by their reason; nothing of them is decoded."""
     group = GroupModel
     named = values_of(group.paint)
@@ -167,7 +167,7 @@ def last_run(session: Session, dataset_id: int) -> list[LogEntry]:
     """The entries of a dataset's newest reading that was not taken back; none where there is none."""
     taken_back: set[str] = set()
     runs: dict[str, list[LogEntry]] = {}
-    for entry in _entries(session, dataset_id):
+    for entry in _log_entries(session, dataset_id):
         if FOLLOWS in entry.body:
             continue
         back = entry.body.get("takes_back")
@@ -179,7 +179,7 @@ def last_run(session: Session, dataset_id: int) -> list[LogEntry]:
     return runs[left[-1]] if left else []
 
 
-def _entries(session: Session, dataset_id: int) -> Iterator[LogEntry]:
+def _log_entries(session: Session, dataset_id: int) -> Iterator[LogEntry]:
     """Of the groups that a dataset has, oldest first."""
     statement = (
         select(LogModel.id)

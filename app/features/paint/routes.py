@@ -101,7 +101,9 @@ async def read_view_paint(
     question = await to_thread.run_sync(
         make_paint_request, services.store, view, points_by_marking(wanted.lines)
     )
-    found = await _answer(request, question, partial(question.request_paint, services.frames))
+    found = await _wait_for_result(
+        request, question, partial(question.request_paint, services.frames)
+    )
     return Response(status_code=CLIENT_GONE) if found is None else PaintDocument.of(found)
 
 
@@ -122,11 +124,15 @@ async def propose_lines(
     """
     lines = {} if wanted is None else points_by_marking(wanted.lines)
     question = await to_thread.run_sync(make_proposal_request, services.store, view, lines)
-    found = await _answer(request, question, partial(question.request_proposal, services.frames))
+    found = await _wait_for_result(
+        request, question, partial(question.request_proposal, services.frames)
+    )
     return Response(status_code=CLIENT_GONE) if found is None else ProposalDocument.of(found)
 
 
-async def _answer(request: Request, question: ViewPaintRequest, ask: Callable[[], PoolTask]) -> Any:
+async def _wait_for_result(
+    request: Request, question: ViewPaintRequest, ask: Callable[[], PoolTask]
+) -> Any:
     """What was found, or None where nobody waits for it any more."""
     with with_view_in_error(question.view.key):
         return await ask().result_unless_client_gone(request.is_disconnected)
@@ -182,7 +188,7 @@ def accept_proposed_lines(
     return PROPOSALS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-def _forgotten(gone: int) -> Response:
+def _forgotten_response(gone: int) -> Response:
     return document(ForgottenProposalsDocument(forgotten=gone))
 
 
@@ -193,7 +199,7 @@ def _forgotten(gone: int) -> Response:
     responses=responses(404),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_forgotten)
+@responds(_forgotten_response)
 def forget(dataset: DatasetPath, services: AppServices) -> int:
     """Forget everything that was proposed for a dataset; lines that were accepted stay.
 

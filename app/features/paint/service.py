@@ -106,8 +106,8 @@ def get_paint(store: Store, dataset: str | int) -> DatasetPaint:
     with store.read() as session:
         found = require_matches(session, dataset)
         matches = match_paint(session, found.id)
-        old = _old(session, found, matches)
-    items = tuple(_state(item, None if old is None else old[item.match]) for item in matches)
+        old = _count_outdated(session, found, matches)
+    items = tuple(_paint_state(item, None if old is None else old[item.match]) for item in matches)
     return DatasetPaint(found.id, found.name, found.policy.calibration.source == "paint", items)
 
 
@@ -152,14 +152,14 @@ def read_paint(
     ):
         for start in range(0, len(ids), _PER_WORKER * count):
             some = ids[start : start + _PER_WORKER * count]
-            tasks = _tasks(store, some, found)
+            tasks = _make_tasks(store, some, found)
             views = [task.view.media for of_group in tasks.values() for task in of_group]
             videos.make_ready(views, done, len(ids), progress)
-            readings = _readings(store, pool, videos, tasks)
+            readings = _read_pictures(store, pool, videos, tasks)
             with store.write() as session:
                 if require_wanted is not None:
                     require_wanted()
-                _give(session, found.id, readings, actor, {"run": run})
+                _give_readings(session, found.id, readings, actor, {"run": run})
             done += len(some)
             if progress is not None:
                 progress(done, len(ids))
@@ -226,10 +226,10 @@ def take_back_paint(
         for number, paint in before.items()
     }
     run = entries[0].body["run"]
-    _give(session, found.id, wanted, actor, {"run": f"{run} back", "takes_back": run})
+    _give_readings(session, found.id, wanted, actor, {"run": f"{run} back", "takes_back": run})
 
 
-def _give(
+def _give_readings(
     session: Session,
     dataset_id: int,
     wanted: Mapping[int, Mapping[str, PaintReading]],
@@ -256,11 +256,15 @@ def _give(
     )
 
 
-def _tasks(store: Store, ids: Sequence[int], dataset: DatasetHead) -> dict[int, list[PaintTask]]:
+def _make_tasks(
+    store: Store, ids: Sequence[int], dataset: DatasetHead
+) -> dict[int, list[PaintTask]]:
     """What is to be read for each group; groups without a view that takes paint have none."""
     with store.read() as session:
         stored = read_groups(session, ids)
-        clicks = replace(dataset.policy, calibration=_without_paint(dataset.policy.calibration))
+        clicks = replace(
+            dataset.policy, calibration=_policy_without_paint(dataset.policy.calibration)
+        )
         known = known_calibrations(session, [item.group for item in stored.values()], clicks)
     return {
         number: list(_group_tasks(item, dataset.policy.calibration, known))
@@ -268,7 +272,7 @@ def _tasks(store: Store, ids: Sequence[int], dataset: DatasetHead) -> dict[int, 
     }
 
 
-def _without_paint(policy: CalibrationPolicy) -> CalibrationPolicy:
+def _policy_without_paint(policy: CalibrationPolicy) -> CalibrationPolicy:
     return replace(policy, source="lines")
 
 
@@ -284,7 +288,7 @@ def _group_tasks(
             yield PaintTask(alone, policy, key, clicked, old)
 
 
-def _readings(
+def _read_pictures(
     store: Store,
     pool: WorkerPool,
     videos: VideoIndexer,
@@ -302,13 +306,13 @@ def _readings(
         number: {
             task.view.key: reading
             for task, reads in some
-            if (reading := _result(task, reads)) is not None
+            if (reading := _reading_of_task(task, reads)) is not None
         }
         for number, some in futures.items()
     }
 
 
-def _result(task: PaintTask, reads: PictureTask) -> PaintReading | None:
+def _reading_of_task(task: PaintTask, reads: PictureTask) -> PaintReading | None:
     try:
         reading: PaintReading | None = reads.result()
     except (ImageError, TooLargeError):
@@ -328,7 +332,7 @@ def has_pictures(store: Store, dataset: str | int) -> bool:
         return any(item.views > item.without_picture for item in match_paint(session, number))
 
 
-def _old(
+def _count_outdated(
     session: Session, dataset: DatasetHead, matches: Sequence[MatchPaint]
 ) -> dict[str, int] | None:
     """How many readings of each match do not fit any more; None where they are too many."""
@@ -344,7 +348,7 @@ def _old(
     return old
 
 
-def _state(item: MatchPaint, old: int | None) -> PaintState:
+def _paint_state(item: MatchPaint, old: int | None) -> PaintState:
     found = PaintState(
         match=item.match,
         groups=len(item.groups),
@@ -357,10 +361,10 @@ def _state(item: MatchPaint, old: int | None) -> PaintState:
         paint_disagrees=item.reasons.get(PAINT_DISAGREES, 0),
         no_frame=item.reasons.get(NO_FRAME, 0),
     )
-    return replace(found, sentence=_sentence(found))
+    return replace(found, sentence=_state_sentence(found))
 
 
-def _sentence(state: PaintState) -> str:
+def _state_sentence(state: PaintState) -> str:
     left = max(state.views - state.without_picture, state.read)
     if not left:
         return f"none of {state.views} views has a picture" if state.views else "nothing to read"

@@ -150,11 +150,11 @@ class AccessTokens:
                 raise NotLoggedInError("the account was disabled meanwhile")
             delete_expired_token(session, person.id, name, text_of(at))
             mine = access_tokens(session, person.id)
-            _require_room([row.name for row in mine], name)
+            _require_free_name_and_count([row.name for row in mine], name)
             token_id = insert_access_token(session, values)
-            _log(session, person.name, person, "token made", values | {"id": token_id})
+            _log_token_event(session, person.name, person, "token made", values | {"id": token_id})
             made = next(row for row in access_tokens(session, person.id) if row.id == token_id)
-        return self._read(made), text
+        return self._token_from_row(made), text
 
     def find(self, text: str) -> Login:
         """Who asks with a token, and what it is for.
@@ -172,7 +172,7 @@ class AccessTokens:
         if row.dataset_id is not None:
             roles = roles.only(row.dataset_id)
         seen = datetime.fromisoformat(row.used or row.created)
-        use = TokenUse(row.name, _scopes(row), fresh=row.used is None)
+        use = TokenUse(row.name, _scopes_of_row(row), fresh=row.used is None)
         return Login(row.id, row.person_id, row.person, roles, seen, use)
 
     def is_use_unlogged(self, login: Login) -> bool:
@@ -188,7 +188,7 @@ class AccessTokens:
     def of_person(self, person_id: int | None) -> list[AccessToken]:
         """The tokens of a person, or of everybody (None), the newest of each first."""
         with self._store.read() as session:
-            return [self._read(row) for row in access_tokens(session, person_id)]
+            return [self._token_from_row(row) for row in access_tokens(session, person_id)]
 
     def end(self, token_id: int, person_id: int | None, *, actor: str) -> AccessToken:
         """End a token: whoever uses it is refused from now on.
@@ -214,14 +214,16 @@ class AccessTokens:
                     hint="The page Account, or touchline users tokens, lists your tokens.",
                 )
             delete_access_token(session, token_id)
-            _log(session, actor, person, "token ended", {"id": token_id, "name": row.name})
-            return self._read(row)
+            _log_token_event(
+                session, actor, person, "token ended", {"id": token_id, "name": row.name}
+            )
+            return self._token_from_row(row)
 
-    def _read(self, row: Any) -> AccessToken:
+    def _token_from_row(self, row: Any) -> AccessToken:
         names = ("id", "person", "name", "start", "dataset", "created", "expires", "used")
         values = {name: getattr(row, name) for name in names}
         expired = row.expires <= text_of(self._clock())
-        return AccessToken(**values, scopes=_scopes(row), expired=expired)
+        return AccessToken(**values, scopes=_scopes_of_row(row), expired=expired)
 
 
 def _checked_name(text: str) -> str:
@@ -233,18 +235,20 @@ def _checked_name(text: str) -> str:
     return name
 
 
-def _require_room(names: Sequence[str], name: str) -> None:
+def _require_free_name_and_count(names: Sequence[str], name: str) -> None:
     if name in names:
         raise ConflictError(f"you have a token {name} already", hint="End it, or choose a name.")
     if len(names) >= MOST:
         raise ConflictError(f"you have {MOST} tokens already", hint="End some of them first.")
 
 
-def _scopes(row: Any) -> tuple[Scope, ...]:
+def _scopes_of_row(row: Any) -> tuple[Scope, ...]:
     return tuple(Scope(name) for name in row.scopes.split())
 
 
-def _log(session: Session, actor: str, person: Any, did: str, values: dict[str, Any]) -> None:
+def _log_token_event(
+    session: Session, actor: str, person: Any, did: str, values: dict[str, Any]
+) -> None:
     changed = {name: values[name] for name in ("scopes", "expires", "dataset_id") if name in values}
     token = {"token": values["name"], "token_id": values["id"]}
     note(session, actor, person.name, did, person.role, **token, **changed)

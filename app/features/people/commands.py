@@ -24,7 +24,7 @@ Email = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Send the lin
 Dataset = Annotated[str, typer.Argument(help="Name or id of the dataset.")]
 
 
-def _role(text: str) -> Role:
+def _parse_role(text: str) -> Role:
     from app.features.people.roles import Role
 
     try:
@@ -46,7 +46,7 @@ def add(
     """Make an account, and print or mail the link with which its person chooses a password."""
     from app.features.people.invitations import invite_one
 
-    wanted, post = _role(role), _post()
+    wanted, post = _parse_role(role), _make_mailer()
     with opened_store() as store:
         _, row = invite_one(store, name, wanted, email, post, actor=acting())
     _print_link(row, json_)
@@ -67,7 +67,7 @@ def invite_many(
     from app.features.people.invitations import invite_many as invite
     from app.features.people.invitations import read_list
 
-    rows, post = read_list(file.read()), _post()
+    rows, post = read_list(file.read()), _make_mailer()
     with opened_store() as store:
         report = invite(store, rows, post, actor=acting(), dry_run=dry_run)
     refused = sum(row.state == "refused" for row in report)
@@ -83,7 +83,7 @@ def invite_many(
         raise typer.Exit(1)
 
 
-def _post() -> LinkMailer:
+def _make_mailer() -> LinkMailer:
     from app.features.people.invitations import LinkMailer
     from app.mail import read_mail_server
 
@@ -98,7 +98,7 @@ def list_(json_: Json = False) -> None:
     from app.features.people.service import list_people
 
     with opened_store() as store:
-        found = [_values(person) for person in list_people(store)]
+        found = [_person_values(person) for person in list_people(store)]
     if json_:
         print_json(found)
         return
@@ -112,13 +112,13 @@ def list_(json_: Json = False) -> None:
 @commands.command()
 def disable(name: Name, json_: Json = False) -> None:
     """Stop letting somebody in, and log them out everywhere; what they did stays."""
-    _change(name, json_, disabled=True)
+    _change_person(name, json_, disabled=True)
 
 
 @commands.command()
 def enable(name: Name, json_: Json = False) -> None:
     """Let somebody in again, with the password that they had."""
-    _change(name, json_, disabled=False)
+    _change_person(name, json_, disabled=False)
 
 
 @commands.command()
@@ -128,7 +128,7 @@ def role(
     json_: Json = False,
 ) -> None:
     """Give somebody another role, in every dataset in which they have none of their own."""
-    _change(name, json_, role=_role(role))
+    _change_person(name, json_, role=_parse_role(role))
 
 
 @commands.command()
@@ -141,13 +141,13 @@ def grant(
     json_: Json = False,
 ) -> None:
     """Give somebody a role in one dataset, in place of what they are in all of them."""
-    _give(name, dataset, _role(role), json_)
+    _give_role(name, dataset, _parse_role(role), json_)
 
 
 @commands.command()
 def take(name: Name, dataset: Dataset, json_: Json = False) -> None:
     """Take somebody's role in one dataset: what they are in all of them counts there again."""
-    _give(name, dataset, None, json_)
+    _give_role(name, dataset, None, json_)
 
 
 @commands.command()
@@ -175,7 +175,7 @@ def reset(
     from app.features.people.second_factor import SecondFactors
     from app.features.people.service import find_person
 
-    post = _post()
+    post = _make_mailer()
     with opened_store() as store:
         found = find_person(store, name)
         if second_factor:
@@ -194,10 +194,10 @@ def unlink(name: Name, json_: Json = False) -> None:
         found = find_person(store, name)
         unlink_person(store, found.id, actor=acting())
         person = find_person(store, name)
-    print_values(_values(person), json_)
+    print_values(_person_values(person), json_)
 
 
-def _give(name: str, dataset: str, role: Role | None, json_: bool) -> None:
+def _give_role(name: str, dataset: str, role: Role | None, json_: bool) -> None:
     from app.features.people.members import give_role
     from app.features.people.service import find_person
 
@@ -262,16 +262,16 @@ def _print_tokens(found: list[AccessToken], json_: bool, *, ended: bool) -> None
         )
 
 
-def _change(name: str, json_: bool, **change: Any) -> None:
+def _change_person(name: str, json_: bool, **change: Any) -> None:
     from app.features.people.service import change_person, find_person
 
     with opened_store() as store:
         found = find_person(store, name)
         person = change_person(store, found.id, actor=acting(), **change)
-    print_values(_values(person), json_)
+    print_values(_person_values(person), json_)
 
 
-def _values(person: Person) -> dict[str, Any]:
+def _person_values(person: Person) -> dict[str, Any]:
     datasets = {one.dataset: str(one.role) for one in person.datasets}
     values = {
         "name": person.name,

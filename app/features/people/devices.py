@@ -68,19 +68,23 @@ class Devices:
 
     def cookie_of(self, name: str) -> str:
         """What ends the name of a person's cookie: several people may use one browser."""
-        return hashlib.sha256(_folded(name)).hexdigest()[:12]
+        return hashlib.sha256(_folded_name(name)).hexdigest()[:12]
 
     def _signature(self, name: str, issued: str, nonce: str) -> str:
         key = installation_key(self._store.settings, DEVICES)
         with self._store.read_one() as session:
             person = person_by_name(session, name.strip().lower())
         password = "" if person is None else person.password or ""
-        parts = (_folded(name), issued.encode("utf-8", "replace"), nonce.encode("utf-8", "replace"))
+        parts = (
+            _folded_name(name),
+            issued.encode("utf-8", "replace"),
+            nonce.encode("utf-8", "replace"),
+        )
         text = b"\n".join((*parts, hashlib.sha256(password.encode()).digest()))
         return hmac.new(key, text, hashlib.sha256).hexdigest()
 
 
-def _folded(name: str) -> bytes:
+def _folded_name(name: str) -> bytes:
     return name.strip().lower().encode("utf-8", "replace")
 
 
@@ -147,7 +151,7 @@ class InMemoryPending:
         with self._lock:
             self._open.pop(asker, None)
             # They lie in the order in which they end.
-            while self._open and (len(self._open) >= MOST or self._oldest_ended(at)):
+            while self._open and (len(self._open) >= MOST or self._has_oldest_ended(at)):
                 del self._open[next(iter(self._open))]
             self._open[asker] = value, at + self._lasts
 
@@ -157,7 +161,7 @@ class InMemoryPending:
             value, ends = self._open.pop(asker, (None, None))
         return value if ends is not None and self._clock() < ends else None
 
-    def _oldest_ended(self, at: datetime) -> bool:
+    def _has_oldest_ended(self, at: datetime) -> bool:
         return next(iter(self._open.values()))[1] <= at
 
 
@@ -177,24 +181,24 @@ class StoredPending:
     def put(self, asker: str, value: bytes) -> None:
         """See ``PendingActions``."""
         at = self._clock()
-        closed, ends = self._key().encrypt(value), text_of(at + self._lasts)
+        closed, ends = self._encryption_key().encrypt(value), text_of(at + self._lasts)
         with self._store.write(lasting=False) as session:
-            put_begun(session, self._name(asker), closed, ends, text_of(at), MOST)
+            put_begun(session, self._hashed_name(asker), closed, ends, text_of(at), MOST)
 
     def take(self, asker: str) -> bytes | None:
         """See ``PendingActions``."""
         with self._store.write() as session:
-            closed = take_pending(session, self._name(asker), text_of(self._clock()))
-        return None if closed is None else self._key().decrypt(closed)
+            closed = take_pending(session, self._hashed_name(asker), text_of(self._clock()))
+        return None if closed is None else self._encryption_key().decrypt(closed)
 
-    def _name(self, asker: str) -> str:
+    def _hashed_name(self, asker: str) -> str:
         return token_hash(f"{self._kind}/{asker}")
 
-    def _key(self) -> Fernet:
+    def _encryption_key(self) -> Fernet:
         return Fernet(urlsafe_b64encode(installation_key(self._store.settings, BEGUN)))
 
 
-def waiting(store: Store, clock: Clock, lasts: timedelta, kind: str) -> PendingActions:
+def make_pending_actions(store: Store, clock: Clock, lasts: timedelta, kind: str) -> PendingActions:
     """What waits, where every process finds it that may be asked for it."""
     if store.sharing.is_shared:
         return StoredPending(store, clock, lasts, kind)

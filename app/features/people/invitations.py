@@ -89,7 +89,7 @@ class LinkMailer:
             by: Who invites.
         """
         letters = [
-            _letter(self.url, row, link, address, by)
+            _invitation_letter(self.url, row, link, address, by)
             for row, link, address in rows
             if address and self.url and self.server
         ]
@@ -166,11 +166,11 @@ def invite_many(
         seen: dict[str, int] = {}
         for one in wanted:
             try:
-                name, role, address = _checked(one, seen)
+                name, role, address = _checked_invitation(one, seen)
                 if person_by_name(session, name) is not None:
                     raise InputError(f"there is a {name} already")
             except ReviewError as error:
-                refused.append(_refused(one, error.message))
+                refused.append(_refused_invitation(one, error.message))
                 continue
             seen[name] = one.row
             if dry_run:
@@ -205,14 +205,14 @@ def read_list(text: str) -> list[InvitationRow]:
             continue
         if columns is None:
             header = [value.lower().replace("e-mail", "email") for value in values]
-            columns = _header(header) if "name" in header else _COLUMNS
+            columns = _checked_header(header) if "name" in header else _COLUMNS
             if "name" in header:
                 continue
-        found.append(_row(reader.line_num, columns, values))
+        found.append(_invitation_row(reader.line_num, columns, values))
     return found
 
 
-def _header(names: Sequence[str]) -> Sequence[str]:
+def _checked_header(names: Sequence[str]) -> Sequence[str]:
     unknown = [name for name in names if name not in _COLUMNS]
     if unknown or len(set(names)) != len(names):
         raise InputError(
@@ -222,7 +222,7 @@ def _header(names: Sequence[str]) -> Sequence[str]:
     return names
 
 
-def _row(number: int, columns: Sequence[str], values: Sequence[str]) -> InvitationRow:
+def _invitation_row(number: int, columns: Sequence[str], values: Sequence[str]) -> InvitationRow:
     last = len(columns) - 1
     # Cells beyond the last column make its value one that is refused, and that the report shows.
     cells = [*values[:last], ",".join(value for value in values[last:] if value)]
@@ -232,7 +232,7 @@ def _row(number: int, columns: Sequence[str], values: Sequence[str]) -> Invitati
     )
 
 
-def _checked(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str | None]:
+def _checked_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str | None]:
     name = checked_name(one.name)
     if name in seen:
         raise InputError(f"{name} stands in row {seen[name]}, too")
@@ -245,11 +245,11 @@ def _checked(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str |
     return name, role, checked_address(one.email) if one.email else None
 
 
-def _refused(one: InvitationRow, problem: str) -> Invitation:
+def _refused_invitation(one: InvitationRow, problem: str) -> Invitation:
     return Invitation(one.row, one.name[:80], one.role[:40], "refused", problem=problem)
 
 
-def _letter(url: str, row: Invitation, link: Link, address: str, by: str) -> Letter:
+def _invitation_letter(url: str, row: Invitation, link: Link, address: str, by: str) -> Letter:
     host = urlsplit(url).hostname
     until = f"{datetime.fromisoformat(link.expires):%d %B %Y, %H:%M} UTC"
     if row.state == "reset":

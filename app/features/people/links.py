@@ -19,7 +19,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
 from app.features.people.login_queries import delete_logins, identity_of
 from app.features.people.queries import (
-    count_able,
+    count_people_who_can_log_in,
     find_link,
     forget_links,
     insert_link,
@@ -71,13 +71,13 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
         )
     if password.casefold() == name.casefold():
         raise InputError("a password must differ from the name", pointer=pointer)
-    if _in_turn(lambda: _is_easy_to_guess(password, name)):
+    if _with_hashing_turn(lambda: _is_easy_to_guess(password, name)):
         raise InputError(
             "this password is easy to guess: it is common, or repeats a few parts",
             hint="Three or four unrelated words are easy to remember.",
             pointer=pointer,
         )
-    return _in_turn(lambda: HASHER.hash(password))
+    return _with_hashing_turn(lambda: HASHER.hash(password))
 
 
 def _is_easy_to_guess(password: str, name: str) -> bool:
@@ -91,7 +91,9 @@ def _is_easy_to_guess(password: str, name: str) -> bool:
 
 def is_password(password: str, known: str | None) -> bool:
     """Whether a password belongs to a hash; without one it takes as long, and is not."""
-    fits = _in_turn(lambda: HASHER.verify(password[:LONGEST], known or _placeholder_hash()))
+    fits = _with_hashing_turn(
+        lambda: HASHER.verify(password[:LONGEST], known or _placeholder_hash())
+    )
     return fits and known is not None and len(password) <= LONGEST
 
 
@@ -101,7 +103,7 @@ def _placeholder_hash() -> str:
     return HASHER.hash("a placeholder password, as long as others")
 
 
-def _in_turn(work: Callable[[], T]) -> T:
+def _with_hashing_turn(work: Callable[[], T]) -> T:
     if not _turns.acquire(timeout=PATIENCE):
         raise OverloadedError(
             "too many people are logging in at this moment", hint="Try again in a while."
@@ -146,7 +148,7 @@ class LinkHolder:
 def make_first_link(store: Store, *, actor: str) -> Link | None:
     """A link that makes the first admin; None where there is one who can log in."""
     with store.write() as session:
-        if count_able(session, Role.ADMIN):
+        if count_people_who_can_log_in(session, Role.ADMIN):
             return None
         return insert_new(session, None, by=actor, at=datetime.now(UTC), lasts=FIRST_LASTS)
 
@@ -160,7 +162,7 @@ def insert_new(
     return Link(token, expires)
 
 
-def look(store: Store, token: str) -> LinkHolder:
+def find_link_holder(store: Store, token: str) -> LinkHolder:
     """Whom a link is for; it stays good.
 
     Raises:
@@ -170,7 +172,7 @@ def look(store: Store, token: str) -> LinkHolder:
         return _find_holder(session, token)[1]
 
 
-def use(store: Store, token: str, password: str, name: str | None = None) -> str:
+def use_link(store: Store, token: str, password: str, name: str | None = None) -> str:
     """Set the password that somebody has chosen; the link, and all their sessions, end with it.
 
     Returns:
@@ -181,7 +183,7 @@ def use(store: Store, token: str, password: str, name: str | None = None) -> str
         InputError: The password, or the name of the first admin, cannot be one.
         ConflictError: The name is taken.
     """
-    meant = look(store, token)
+    meant = find_link_holder(store, token)
     chosen = meant.name or checked_name(name or "")
     # Some tenths of a second: not while the database waits.
     hashed = hash_password(password, chosen)
@@ -203,7 +205,7 @@ def take(session: Session, token: str, name: str | None, *, password: str | None
     """
     person_id, _ = _find_holder(session, token)
     if person_id is None:
-        person_id = _make_admin(session, checked_name(name or ""))
+        person_id = _insert_first_admin(session, checked_name(name or ""))
         forget_links(session, None)
     update_person(session, person_id, password=password)
     delete_logins(session, person_id)
@@ -217,7 +219,7 @@ def _find_holder(session: Session, token: str) -> tuple[int | None, LinkHolder]:
     if row is None:
         raise NotFoundError(GONE, hint=ASK)
     if row.person_id is None:
-        if count_able(session, Role.ADMIN):
+        if count_people_who_can_log_in(session, Role.ADMIN):
             raise NotFoundError(GONE, hint=ASK)
         return None, LinkHolder(None, False)
     person = person_by_id(session, row.person_id)
@@ -231,7 +233,7 @@ def has_joined(session: Session, person: Any) -> bool:
     return person.password is not None or identity_of(session, person.id) is not None
 
 
-def _make_admin(session: Session, name: str) -> int:
+def _insert_first_admin(session: Session, name: str) -> int:
     if person_by_name(session, name) is not None:
         raise ConflictError(f"there is a {name} already", hint="Choose another name.")
     note(session, name, name, "first admin", Role.ADMIN)

@@ -52,11 +52,11 @@ def find_login(
         idle_since: A session that was used last before this time has ended.
     """
     given = {"token_hash": token_hash, "at": at, "idle_since": idle_since}
-    return session.execute(_found(tuple(leading)), given).one_or_none()
+    return session.execute(_login_statement(tuple(leading)), given).one_or_none()
 
 
 @cache
-def _found(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
+def _login_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
     """Made once: it takes longer to put together than to answer."""
     return with_rights(_FOUND, leading).where(
         LoginModel.token_hash == bindparam("token_hash"),
@@ -216,11 +216,11 @@ def find_access_token(
     """The token under a hash with its person and their rights (``rights_in``), unless it has expired
     or the person is disabled; ``leading`` are the roles that lead a dataset."""
     given = {"token_hash": token_hash, "at": at}
-    return session.execute(_found_tokens(tuple(leading)), given).one_or_none()
+    return session.execute(_access_token_statement(tuple(leading)), given).one_or_none()
 
 
 @cache
-def _found_tokens(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
+def _access_token_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
     return with_rights(_ALL_TOKENS, leading).where(
         AccessTokenModel.token_hash == bindparam("token_hash"),
         AccessTokenModel.expires > bindparam("at"),

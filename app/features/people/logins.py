@@ -246,10 +246,12 @@ class Logins:
             require(session)
             delete_ended(session, at=text_of(at), idle_since=text_of(at - IDLE))
             if before and (
-                old := find_login(session, token_hash(before), leading=LEADING, **self._alive(at))
+                old := find_login(
+                    session, token_hash(before), leading=LEADING, **self._expiry_limits(at)
+                )
             ):
                 delete_login(session, old.id, old.person_id)
-            for unassigned in logins_of(session, person_id, **self._alive(at))[MOST - 1 :]:
+            for unassigned in logins_of(session, person_id, **self._expiry_limits(at))[MOST - 1 :]:
                 delete_login(session, unassigned.id, person_id)
             insert_login(session, values)
             details = {"address": address[:60], "way": way.value}
@@ -262,7 +264,7 @@ class Logins:
         Raises:
             BusyError: It had to be said ``at_once``, and cannot be without waiting.
         """
-        alive = self._alive(self._clock())
+        alive = self._expiry_limits(self._clock())
         with self._store.read_without_waiting() if at_once else self._store.read_one() as session:
             row = find_login(session, token_hash(token), leading=LEADING, **alive)
         if row is None or self._only not in (None, row.way):
@@ -287,7 +289,7 @@ class Logins:
     def sessions(self, login: Login) -> list[OpenSession]:
         """Every session of a person, the one that was used last first."""
         with self._store.read() as session:
-            rows = logins_of(session, login.person_id, **self._alive(self._clock()))
+            rows = logins_of(session, login.person_id, **self._expiry_limits(self._clock()))
         return [
             OpenSession(row.id, row.browser, row.address, row.created, row.seen, row.expires)
             for row in rows
@@ -326,7 +328,7 @@ class Logins:
             raise InputError("this is not your present password", pointer="/old")
         hashed = hash_password(new, login.name, pointer="/new")
         with self._store.write() as session:
-            found = logins_of(session, login.person_id, **self._alive(self._clock()))
+            found = logins_of(session, login.person_id, **self._expiry_limits(self._clock()))
             mine = next((row for row in found if row.id == login.id), None)
             if mine is None:
                 raise NotLoggedInError("your session has ended")
@@ -339,7 +341,7 @@ class Logins:
             login.person_id, hashed, mine.browser, mine.address, None, way=way, vouched=vouched
         )
 
-    def _alive(self, at: datetime) -> dict[str, str]:
+    def _expiry_limits(self, at: datetime) -> dict[str, str]:
         return {"at": text_of(at), "idle_since": text_of(at - IDLE)}
 
 
@@ -358,10 +360,12 @@ def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
     single = {key: Role(role) for key, role in rights.roles.items()}
     roles = DatasetRoles(everywhere, single)
     copies = {key: roles.role_in(of_id) for key, of_id in rights.copies.items()}
-    return DatasetRoles(everywhere, {**single, **copies}, blind=_blind_in(roles, rights))
+    return DatasetRoles(
+        everywhere, {**single, **copies}, blind=_blind_batches_by_dataset(roles, rights)
+    )
 
 
-def _blind_in(roles: DatasetRoles, rights: Rights) -> dict[int, frozenset[int]]:
+def _blind_batches_by_dataset(roles: DatasetRoles, rights: Rights) -> dict[int, frozenset[int]]:
     """The batches in which somebody annotates blind, by dataset.
 
     Leads see everything. Who judges decides where people differ: also in a batch of their own, once

@@ -60,7 +60,7 @@ def list_members(store: Store, dataset: str | int) -> list[Member]:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return _members(session, _need_dataset(session, dataset))
+        return _read_members(session, _require_dataset(session, dataset))
 
 
 def single_roles(session: Session) -> dict[int, list[SingleRole]]:
@@ -105,7 +105,7 @@ def give_role(
             "the role admin applies to the whole server, not to a dataset", pointer="/role"
         )
     with store.write() as session:
-        dataset_id = _need_dataset(session, dataset)
+        dataset_id = _require_dataset(session, dataset)
         person = person_by_id(session, person_id)
         if person is None:
             raise NotFoundError.person(person_id)
@@ -120,17 +120,17 @@ def give_role(
             set_dataset_role(session, person_id, dataset_id, role, by=actor)
             did = "role taken" if role is None else "role in dataset"
             note(session, actor, person.name, did, role or person.role, dataset_id=dataset_id)
-        return next(one for one in _members(session, dataset_id, person_id))
+        return next(one for one in _read_members(session, dataset_id, person_id))
 
 
-def _need_dataset(session: Session, dataset: str | int) -> int:
+def _require_dataset(session: Session, dataset: str | int) -> int:
     row = find_dataset(session, dataset)
     if row is None:
         raise NotFoundError.dataset(dataset)
     return int(row.id)
 
 
-def _members(session: Session, dataset_id: int, person_id: int | None = None) -> list[Member]:
+def _read_members(session: Session, dataset_id: int, person_id: int | None = None) -> list[Member]:
     return [
         Member(row.id, row.name, Role(row.everywhere), None if row.role is None else Role(row.role))
         for row in members(session, dataset_id, person_id)

@@ -119,7 +119,7 @@ def find_ownership(store: Store, named: Named, visibility: Visibility) -> Owners
         visibility: Which datasets take part where a name alone does not say which of them is meant.
     """
     if named.kind is OwnedKind.UPLOAD:
-        return _upload(store, named.by)
+        return _ownership_of_upload(store, named.by)
     with store.read() as session:
         find = _FIND.get(named.kind)
         if find is not None:
@@ -130,18 +130,22 @@ def find_ownership(store: Store, named: Named, visibility: Visibility) -> Owners
     return None if dataset is None else Ownership(dataset)
 
 
-def _dataset(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
+def _ownership_of_dataset(
+    session: Session, named: str | int, _sight: Visibility
+) -> Ownership | None:
     row = find_dataset(session, named)
     return None if row is None else Ownership(int(row.id))
 
 
-def _job(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
-    number = _number(named)
+def _ownership_of_job(session: Session, named: str | int, _sight: Visibility) -> Ownership | None:
+    number = _parse_id(named)
     row = None if number is None else owner_of_job(session, number)
     return None if row is None else Ownership(row.dataset_id, frozenset({row.actor}))
 
 
-def _version(session: Session, named: str | int, visibility: Visibility) -> Ownership | None:
+def _ownership_of_version(
+    session: Session, named: str | int, visibility: Visibility
+) -> Ownership | None:
     """By id, name or hash, among the datasets that somebody sees."""
     rows = versions_like(session, str(named))
     every = find_versions(rows, str(named))
@@ -161,7 +165,7 @@ def find_versions(rows: Sequence[Any], text: str) -> list[Any]:
     return fitting
 
 
-def _upload(store: Store, named: str | int) -> Ownership | None:
+def _ownership_of_upload(store: Store, named: str | int) -> Ownership | None:
     try:
         found = get_upload(store.settings, str(named))
     except NotFoundError:
@@ -169,16 +173,16 @@ def _upload(store: Store, named: str | int) -> Ownership | None:
     return Ownership(None, frozenset(found.by))
 
 
-def _number(named: str | int) -> int | None:
+def _parse_id(named: str | int) -> int | None:
     if isinstance(named, int):
         return named
     return int(named) if named.isascii() and named.isdigit() and len(named) < 19 else None
 
 
 _FIND: Mapping[OwnedKind, Callable[[Session, Any, Visibility], Ownership | None]] = {
-    OwnedKind.DATASET: _dataset,
-    OwnedKind.NEW_DATASET: _dataset,
-    OwnedKind.JOB: _job,
-    OwnedKind.EXPORT: _job,
-    OwnedKind.VERSION: _version,
+    OwnedKind.DATASET: _ownership_of_dataset,
+    OwnedKind.NEW_DATASET: _ownership_of_dataset,
+    OwnedKind.JOB: _ownership_of_job,
+    OwnedKind.EXPORT: _ownership_of_job,
+    OwnedKind.VERSION: _ownership_of_version,
 }

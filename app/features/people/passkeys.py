@@ -29,7 +29,7 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import Challenges, waiting
+from app.features.people.devices import Challenges, make_pending_actions
 from app.features.people.links import token_hash
 from app.features.people.login_queries import (
     delete_logins,
@@ -106,7 +106,7 @@ class Passkeys:
         clock: Callable[[], datetime] = lambda: datetime.now(UTC),
     ):
         self._store, self._logins, self._clock = store, logins, clock
-        self._challenges = Challenges(waiting(store, clock, LASTS, "passkey"))
+        self._challenges = Challenges(make_pending_actions(store, clock, LASTS, "passkey"))
 
     def of(self, person_id: int) -> list[Passkey]:
         """The passkeys of a person, the oldest first."""
@@ -124,13 +124,13 @@ class Passkeys:
         require_password(self._store, login, password, self._clock())
         with self._store.read() as session:
             rows = passkeys_of(session, login.person_id)
-        _require_room(rows)
+        _require_few_passkeys(rows)
         options = generate_registration_options(
             rp_id=site.name,
             rp_name=ISSUER,
-            user_id=_handle(login.person_id),
+            user_id=_user_handle(login.person_id),
             user_name=login.name,
-            challenge=self._challenges.make(_of_session(login)),
+            challenge=self._challenges.make(_session_challenge_key(login)),
             authenticator_selection=AuthenticatorSelectionCriteria(
                 resident_key=ResidentKeyRequirement.REQUIRED, user_verification=VERIFIED
             ),
@@ -152,7 +152,7 @@ class Passkeys:
             InputError: It does not answer what this session was asked last, or is not for this site.
             ConflictError: There are too many, or one of that name, or it is known already.
         """
-        made = self._read_new(login, credential, site)
+        made = self._verify_new_credential(login, credential, site)
         name, at = name.strip(), text_of(self._clock())
         if not name:
             raise InputError("a passkey needs a name", pointer="/name")
@@ -166,7 +166,7 @@ class Passkeys:
         }
         with self._store.write() as session:
             rows = passkeys_of(session, login.person_id)
-            _require_room(rows)
+            _require_few_passkeys(rows)
             if name in {row.name for row in rows}:
                 raise ConflictError(f"you have a passkey {name} already", hint="Name it otherwise.")
             if find_passkey(session, values["credential"]) is not None:
@@ -204,7 +204,7 @@ class Passkeys:
         """
         options = generate_authentication_options(
             rp_id=site.name,
-            challenge=self._challenges.make(_of_browser(asker)),
+            challenge=self._challenges.make(_browser_challenge_key(asker)),
             user_verification=VERIFIED,
         )
         return options_to_json_dict(options)
@@ -225,7 +225,7 @@ class Passkeys:
             NotLoggedInError: It is nobody's, does not answer what this browser was asked last, is not
                 for this site, was copied (its count goes back), or the account is disabled.
         """
-        challenge = self._challenges.take(_of_browser(asker))
+        challenge = self._challenges.take(_browser_challenge_key(asker))
         if challenge is None:
             raise NotLoggedInError(LATE, hint="Try again.")
         with self._store.read() as session:
@@ -239,15 +239,17 @@ class Passkeys:
             found = find_passkey(session, row.credential)
             if found is None or found.person_id != row.person_id:
                 raise NotLoggedInError(REFUSED, hint=AGAIN)
-            count = _verified(found, credential, challenge, site)
+            count = _verified_sign_count(found, credential, challenge, site)
             use_passkey(session, found.id, count, text_of(self._clock()))
 
         return self._logins.begin(
             row.person_id, person.password, browser, address, before, require, LoginMethod.PASSKEY
         )
 
-    def _read_new(self, login: Login, credential: dict[str, Any], site: PasskeySite) -> Any:
-        challenge = self._challenges.take(_of_session(login))
+    def _verify_new_credential(
+        self, login: Login, credential: dict[str, Any], site: PasskeySite
+    ) -> Any:
+        challenge = self._challenges.take(_session_challenge_key(login))
         if challenge is None:
             raise InputError(LATE, hint="Begin again.", pointer="/credential")
         try:
@@ -265,10 +267,12 @@ class Passkeys:
             raise InputError(REFUSED, hint="Begin again.", pointer="/credential") from error
 
 
-def _verified(row: Any, credential: dict[str, Any], challenge: bytes, site: PasskeySite) -> int:
+def _verified_sign_count(
+    row: Any, credential: dict[str, Any], challenge: bytes, site: PasskeySite
+) -> int:
     """How often the device says that it has signed; raises NotLoggedInError unless it has, this."""
     try:
-        if base64url_to_bytes(credential["response"]["userHandle"]) != _handle(row.person_id):
+        if base64url_to_bytes(credential["response"]["userHandle"]) != _user_handle(row.person_id):
             raise ValueError("this passkey belongs to another person")
         return verify_authentication_response(
             credential=credential,
@@ -284,19 +288,19 @@ def _verified(row: Any, credential: dict[str, Any], challenge: bytes, site: Pass
         raise NotLoggedInError(REFUSED, hint=AGAIN) from error
 
 
-def _require_room(rows: Any) -> None:
+def _require_few_passkeys(rows: Any) -> None:
     if len(rows) >= MOST:
         raise ConflictError(f"you have {MOST} passkeys", hint="Delete one of them first.")
 
 
-def _handle(person_id: int) -> bytes:
+def _user_handle(person_id: int) -> bytes:
     """Under which name a device keeps the passkey of a person."""
     return str(person_id).encode()
 
 
-def _of_session(login: Login) -> str:
+def _session_challenge_key(login: Login) -> str:
     return f"session {login.id}"
 
 
-def _of_browser(asker: str) -> str:
+def _browser_challenge_key(asker: str) -> str:
     return f"browser {token_hash(asker)}"

@@ -63,10 +63,10 @@ class ProviderClient:
             found = json.loads(content)
         except (httpx.HTTPError, httpx.InvalidURL, OSError, ValueError, RecursionError) as error:
             log.warning("no answer of the provider", address=address, reason=repr(error)[:200])
-            raise self._failed() from error
+            raise self._provider_failed_error() from error
         if not isinstance(found, dict):
             log.warning("no answer of the provider", address=address, reason="no JSON object")
-            raise self._failed()
+            raise self._provider_failed_error()
         return status, found
 
     def require_own(self, address: object) -> str:
@@ -114,7 +114,7 @@ class ProviderClient:
         """Certificates of public authorities, or those of ``SSL_CERT_FILE``."""
         return httpx.create_ssl_context(trust_env=True)
 
-    def _failed(self) -> ConflictError:
+    def _provider_failed_error(self) -> ConflictError:
         return ConflictError(
             f"{self._rules.label} did not give a valid response",
             hint="Try again in a while; the server's log says more.",
@@ -158,7 +158,7 @@ class LoginRequest:
 
 
 @dataclass(frozen=True)
-class _CachedAnswer:
+class _CachedResponse:
     """Something that the provider said, and when."""
 
     value: Any
@@ -178,8 +178,8 @@ class Provider:
     ):
         self._rules, self._clock = rules, clock
         self._answers = ProviderClient(rules)
-        self._description: _CachedAnswer | None = None
-        self._keys: _CachedAnswer | None = None
+        self._description: _CachedResponse | None = None
+        self._keys: _CachedResponse | None = None
 
     def address(self, request: LoginRequest) -> str:
         """Where a browser goes to log in.
@@ -187,7 +187,7 @@ class Provider:
         Raises:
             ConflictError: The provider gave an invalid response.
         """
-        there = self._describe()
+        there = self._read_discovery_document()
         address, _ = self._client(request).create_authorization_url(
             there["authorization_endpoint"],
             state=request.state,
@@ -203,7 +203,7 @@ class Provider:
             NotLoggedInError: The code, or what it is good for, is refused.
             ConflictError: The provider gave an invalid response.
         """
-        return self._verified(self._exchange(request, code), request)
+        return self._verified_claims(self._exchange_code_for_token(request, code), request)
 
     def examine(self) -> str:
         """A sentence on where it is, having asked it anew.
@@ -212,11 +212,11 @@ class Provider:
             ConflictError: The provider gave an invalid response.
         """
         self._description = None
-        self._describe()
+        self._read_discovery_document()
         return f"{self._rules.issuer} answers, with {len(self._fetch_keys().keys)} keys"
 
-    def _exchange(self, request: LoginRequest, code: str) -> str:
-        there = self._describe()
+    def _exchange_code_for_token(self, request: LoginRequest, code: str) -> str:
+        there = self._read_discovery_document()
         body = prepare_token_request(
             "authorization_code",
             code=code,
@@ -234,16 +234,16 @@ class Provider:
         token = found.get("id_token")
         if status != 200 or not isinstance(token, str):
             log.warning("a code was refused", status=status, error=repr(found.get("error"))[:100])
-            raise self._refusal()
+            raise self._refused_login_error()
         return token
 
-    def _verified(self, token: str, request: LoginRequest) -> Mapping[str, Any]:
+    def _verified_claims(self, token: str, request: LoginRequest) -> Mapping[str, Any]:
         """The claims of an ID token that is good."""
         try:
             try:
-                found = jwt.decode(token, self._known_keys(), algorithms=ALGORITHMS)
+                found = jwt.decode(token, self._cached_keys(), algorithms=ALGORITHMS)
             except InvalidKeyIdError:
-                found = jwt.decode(token, self._newer_keys(), algorithms=ALGORITHMS)
+                found = jwt.decode(token, self._refetched_keys(), algorithms=ALGORITHMS)
             claims = CodeIDToken(
                 found.claims,
                 found.header,
@@ -263,7 +263,7 @@ class Provider:
             Exception
         ) as error:  # What the libraries raise on any bytes is no part of their promise.
             log.warning("an ID token was refused", reason=repr(error)[:200])
-            raise self._refusal() from error
+            raise self._refused_login_error() from error
         return dict(claims)
 
     def _client(self, request: LoginRequest) -> OAuth2Client:
@@ -276,7 +276,7 @@ class Provider:
             code_challenge_method="S256",
         )
 
-    def _describe(self) -> Mapping[str, Any]:
+    def _read_discovery_document(self) -> Mapping[str, Any]:
         """The provider's description of itself (OpenID Connect Discovery 1.0)."""
         kept = self._description
         if kept is None or self._clock() - kept.at > KEPT:
@@ -286,23 +286,23 @@ class Provider:
                 log.warning(
                     "the provider is another one", status=status, it=repr(found.get("issuer"))
                 )
-                raise self._changed_error(
+                raise self._provider_error(
                     "does not answer as the provider in this server's settings"
                 )
             for name in ("authorization_endpoint", "token_endpoint", "jwks_uri"):
                 self._answers.require_own(found.get(name))
-            kept = self._description = _CachedAnswer(found, self._clock())
+            kept = self._description = _CachedResponse(found, self._clock())
         described: Mapping[str, Any] = kept.value
         return described
 
-    def _known_keys(self) -> jwk.KeySet:
+    def _cached_keys(self) -> jwk.KeySet:
         kept = self._keys
         if kept is None or self._clock() - kept.at > KEPT:
             return self._fetch_keys()
         known: jwk.KeySet = kept.value
         return known
 
-    def _newer_keys(self) -> jwk.KeySet:
+    def _refetched_keys(self) -> jwk.KeySet:
         """Its keys, asked for again where it may have changed them since."""
         kept = self._keys
         if kept is not None and self._clock() - kept.at < AGAIN:
@@ -311,29 +311,29 @@ class Provider:
         return self._fetch_keys()
 
     def _fetch_keys(self) -> jwk.KeySet:
-        status, found = self._answers.fetch(self._describe()["jwks_uri"])
+        status, found = self._answers.fetch(self._read_discovery_document()["jwks_uri"])
         listed = found.get("keys")
-        keys = [_key(one) for one in listed] if isinstance(listed, list) else []
+        keys = [_parse_signing_key(one) for one in listed] if isinstance(listed, list) else []
         usable = [one for one in keys if one is not None]
         if status != 200 or not usable:
             log.warning("the provider has no keys", status=status)
-            raise self._changed_error("shows no keys by which its logins can be checked")
-        self._keys = _CachedAnswer(jwk.KeySet(usable), self._clock())
+            raise self._provider_error("shows no keys by which its logins can be checked")
+        self._keys = _CachedResponse(jwk.KeySet(usable), self._clock())
         return jwk.KeySet(usable)
 
-    def _refusal(self) -> NotLoggedInError:
+    def _refused_login_error(self) -> NotLoggedInError:
         return NotLoggedInError(
             f"{self._rules.label} does not confirm this login", hint=REFUSED_HINT
         )
 
-    def _changed_error(self, what: str) -> ConflictError:
+    def _provider_error(self, what: str) -> ConflictError:
         return ConflictError(
             f"{self._rules.label} {what}",
             hint="The operator of this server can run touchline doctor.",
         )
 
 
-def _key(entry: Any) -> Any | None:
+def _parse_signing_key(entry: Any) -> Any | None:
     """A public key that signs, as a library knows it; None: it is none, or too weak."""
     if not isinstance(entry, dict) or entry.get("kty") not in KINDS:
         return None

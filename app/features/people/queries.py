@@ -73,7 +73,7 @@ def count_people(session: Session) -> int:
     return session.scalar(select(func.count()).select_from(PersonModel)) or 0
 
 
-def count_able(session: Session, role: str, *, but: int | None = None) -> int:
+def count_people_who_can_log_in(session: Session, role: str, *, but: int | None = None) -> int:
     """How many people of a role can log in, one of them left out."""
     statement = select(func.count()).where(
         PersonModel.role == role,
@@ -159,7 +159,9 @@ def with_rights(
         leading: The roles that lead a dataset: who has one sees everybody's copies of its groups.
     """
     return statement.add_columns(
-        _roles().label("single"), _copies(leading).label("copies"), _blind().label("blind")
+        _roles_column().label("single"),
+        _copies_column(leading).label("copies"),
+        _blind_batches_column().label("blind"),
     )
 
 
@@ -176,13 +178,13 @@ def rights_of(session: Session, person_id: int, leading: Collection[str]) -> Rig
     return Rights({}, {}) if row is None else rights_in(row)
 
 
-def _roles() -> ColumnElement[Any]:
+def _roles_column() -> ColumnElement[Any]:
     mine = DatasetRoleModel.person_id == PersonModel.id
     pairs = pairs_of(DatasetRoleModel.dataset_id, DatasetRoleModel.role)
-    return _list(select(pairs).where(mine))
+    return _scalar_subquery(select(pairs).where(mine))
 
 
-def _copies(leading: Collection[str]) -> ColumnElement[Any]:
+def _copies_column(leading: Collection[str]) -> ColumnElement[Any]:
     """Their own, and those of what they lead: in that dataset, or where they have no other role
     there, in all."""
     table = CopyDatasetModel
@@ -192,10 +194,10 @@ def _copies(leading: Collection[str]) -> ColumnElement[Any]:
     seen = or_(
         table.person == PersonModel.name, table.of_id.in_(led.correlate(PersonModel)), everywhere
     )
-    return _list(select(pairs_of(table.dataset_id, table.of_id)).where(seen))
+    return _scalar_subquery(select(pairs_of(table.dataset_id, table.of_id)).where(seen))
 
 
-def _blind() -> ColumnElement[Any]:
+def _blind_batches_column() -> ColumnElement[Any]:
     """The batches that name them, those in which they have begun a copy, and what is left there."""
     batch, annotation, group, part = (
         BatchModel,
@@ -204,32 +206,38 @@ def _blind() -> ColumnElement[Any]:
         BatchPersonModel,
     )
     here, mine = annotation.batch_id == batch.id, annotation.person == PersonModel.name
-    gold = batch.gold_every.is_not(None) | _exists(here, annotation.kind == GOLD)
+    gold = batch.gold_every.is_not(None) | _exists_correlated(here, annotation.kind == GOLD)
     copies = batch.gold_every.is_not(None) | ((batch.verdicts > 1) & (batch.blind | gold))
     named = (part.batch_id == batch.id, part.person_id == PersonModel.id)
-    annotators = _exists(part.batch_id == batch.id, part.part == "annotator")
-    annotates = _exists(*named, part.part == "annotator") | (_exists(*named) & ~annotators)
+    annotators = _exists_correlated(part.batch_id == batch.id, part.part == "annotator")
+    annotates = _exists_correlated(*named, part.part == "annotator") | (
+        _exists_correlated(*named) & ~annotators
+    )
     own_count = select(func.count()).where(
         here, annotation.group_id == group.group_id, annotation.kind == INDEPENDENT
     )
-    free = _exists(
+    free = _exists_correlated(
         group.batch_id == batch.id,
         group.settled.is_(None),
         group.submitted.is_(None),
-        ~_exists(here, mine, annotation.group_id == group.group_id),
+        ~_exists_correlated(here, mine, annotation.group_id == group.group_id),
         own_count.correlate(BatchModel, BatchGroupModel).scalar_subquery() < batch.verdicts,
     )
-    begun = _exists(here, mine, annotation.submitted.is_(None), annotation.settled.is_(None))
+    begun = _exists_correlated(
+        here, mine, annotation.submitted.is_(None), annotation.settled.is_(None)
+    )
     waits = case((free | begun, 1), else_=0)
     found = select(pairs_of(batch.id, batch.dataset_id, waits))
-    return _list(found.where(batch.state == OPEN, copies, annotates | _exists(here, mine)))
+    return _scalar_subquery(
+        found.where(batch.state == OPEN, copies, annotates | _exists_correlated(here, mine))
+    )
 
 
-def _exists(*where: ColumnElement[bool]) -> Exists:
+def _exists_correlated(*where: ColumnElement[bool]) -> Exists:
     return exists().where(*where).correlate(BatchModel, BatchGroupModel, PersonModel)
 
 
-def _list(statement: Select[Any]) -> ColumnElement[Any]:
+def _scalar_subquery(statement: Select[Any]) -> ColumnElement[Any]:
     return statement.correlate(PersonModel).scalar_subquery()
 
 
@@ -361,10 +369,10 @@ def set_required(session: Session, on: bool) -> None:
 
 def has_second_factor(session: Session, person_id: int) -> bool:
     """Whether somebody has an authenticator that is confirmed, or a passkey."""
-    return bool(session.scalar(select(_is_own(person_id))))
+    return bool(session.scalar(select(_has_confirmed_factor(person_id))))
 
 
-def _is_own(person_id: int | ColumnElement[int]) -> ColumnElement[bool]:
+def _has_confirmed_factor(person_id: int | ColumnElement[int]) -> ColumnElement[bool]:
     confirmed = SecondFactorModel.confirmed.is_(True)
     return or_(
         exists().where(SecondFactorModel.person_id == person_id, confirmed),
@@ -381,5 +389,5 @@ def people_with_second_factor(session: Session) -> set[int]:
 
 MUST_ENROL: ColumnElement[bool] = exists().where(
     TeamSettingModel.name == REQUIRED, TeamSettingModel.value == "on"
-) & ~_is_own(PersonModel.__table__.c.id)
+) & ~_has_confirmed_factor(PersonModel.__table__.c.id)
 """Of a row of people: whether everybody needs a second factor, and they have none yet."""

@@ -41,7 +41,7 @@ from app.http.team import AppTeam, Team
 users_router = APIRouter(prefix="/users", tags=["users"], route_class=SecretRoute)
 
 
-def _with_link(person: Person, row: Invitation) -> UserWithLink:
+def _user_with_link(person: Person, row: Invitation) -> UserWithLink:
     return UserWithLink(
         user=person,
         link=row.link,
@@ -56,10 +56,10 @@ def _with_link(person: Person, row: Invitation) -> UserWithLink:
 @paged()
 def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
     """Everybody with an account, disabled ones too."""
-    return _list(store, team)
+    return _list_users(store, team)
 
 
-def _list(store: Store, team: Team) -> UserList:
+def _list_users(store: Store, team: Team) -> UserList:
     by_mail = team.mail is not None and team.url is not None
     return UserList(items=people.list_people(store), adopted_by=adopted_by(store), mail=by_mail)
 
@@ -79,9 +79,9 @@ def invite_user(
     With an `email`, and where the server sends mail, the link goes there and is not shown. Where it
     cannot be sent, it is shown with the reason.
     """
-    post = _post(team, request)
+    post = _make_mailer(team, request)
     person, row = invite_one(store, new.name, new.role, new.email, post, actor=me.actor)
-    return _with_link(person, row)
+    return _user_with_link(person, row)
 
 
 @users_router.post(
@@ -106,7 +106,7 @@ def invite_users(
     rows = [
         InvitationRow(number, **one.model_dump()) for number, one in enumerate(wanted.people, 1)
     ]
-    items = invite_many(store, rows, _post(team, request), actor=me.actor, dry_run=dry_run)
+    items = invite_many(store, rows, _make_mailer(team, request), actor=me.actor, dry_run=dry_run)
     refused = sum(item.state == "refused" for item in items)
     return InvitationReport(
         items=items,
@@ -117,7 +117,7 @@ def invite_users(
     )
 
 
-def _post(team: Team, request: Request) -> LinkMailer:
+def _make_mailer(team: Team, request: Request) -> LinkMailer:
     return LinkMailer(team.mail, team.url, team.base(request))
 
 
@@ -158,7 +158,9 @@ def renew_link(
     of `POST /users` does.
     """
     email = None if new is None else new.email
-    return _with_link(*renew_one(store, user, email, _post(team, request), actor=me.actor))
+    return _user_with_link(
+        *renew_one(store, user, email, _make_mailer(team, request), actor=me.actor)
+    )
 
 
 @users_router.post(
@@ -173,7 +175,7 @@ def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
     The log is not changed: its entries keep their name, and this becomes an entry of its own.
     """
     adopt(store, user, actor=me.actor)
-    return _list(store, team)
+    return _list_users(store, team)
 
 
 @users_router.get(

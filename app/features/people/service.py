@@ -20,8 +20,8 @@ from app.features.people.login_queries import (
 from app.features.people.members import SingleRole, single_roles
 from app.features.people.queries import (
     all_people,
-    count_able,
     count_people,
+    count_people_who_can_log_in,
     forget_links,
     insert_person,
     people_with_links,
@@ -81,7 +81,9 @@ def list_people(store: Store) -> list[Person]:
         waiting, single = people_with_links(session, now()), single_roles(session)
         tokens, factors = count_access_tokens(session), people_with_second_factor(session)
         ways = people_with_identity(session)
-        people = [_person(row, waiting, tokens, factors, ways) for row in all_people(session)]
+        people = [
+            _person_from_row(row, waiting, tokens, factors, ways) for row in all_people(session)
+        ]
     return [replace(one, datasets=tuple(single.get(one.id, ()))) for one in people]
 
 
@@ -120,7 +122,7 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
                 f"there is a {name} already", hint="A new link for them: reset their password."
             )
         person, link = insert_invited(session, name, role, actor=actor)
-        return _read(session, person), link
+        return _read_person(session, person), link
 
 
 def insert_invited(session: Session, name: str, role: Role, *, actor: str) -> tuple[int, Link]:
@@ -139,7 +141,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
         ConflictError: They are disabled.
     """
     with store.write() as session:
-        person = _read(session, person_id)
+        person = _read_person(session, person_id)
         if person_of(actor) != actor:
             raise ForbiddenError(
                 "a token cannot set a password", hint="An admin makes the link in the browser."
@@ -152,7 +154,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
             raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")
         note(session, actor, person.name, "link", person.role)
         link = insert_new(session, person_id, by=actor, at=datetime.now(UTC))
-        return _read(session, person_id), link
+        return _read_person(session, person_id), link
 
 
 def change_person(
@@ -174,7 +176,7 @@ def change_person(
     """
     require_no_token(actor)
     with store.write() as session:
-        person = _read(session, person_id)
+        person = _read_person(session, person_id)
         if person.name == actor:
             raise ForbiddenError(
                 "you cannot change your own role", hint="Another admin of this server can."
@@ -182,7 +184,7 @@ def change_person(
         wanted = person.role if role is None else role
         off = person.disabled if disabled is None else disabled
         loses = person.role is Role.ADMIN and (off or wanted is not Role.ADMIN)
-        if loses and not count_able(session, Role.ADMIN, but=person_id):
+        if loses and not count_people_who_can_log_in(session, Role.ADMIN, but=person_id):
             raise ConflictError(
                 f"{person.name} is the last admin who can log in", hint="Make another one first."
             )
@@ -195,13 +197,13 @@ def change_person(
             delete_logins(session, person_id)
             delete_access_tokens(session, person_id)
             forget_links(session, person_id)
-        return _read(session, person_id)
+        return _read_person(session, person_id)
 
 
 def get_person(store: Store, person_id: int) -> Person:
     """Somebody by their id; raises NotFoundError when there is nobody."""
     with store.read() as session:
-        return _read(session, person_id)
+        return _read_person(session, person_id)
 
 
 def find_person(store: Store, name: str) -> Person:
@@ -212,16 +214,16 @@ def find_person(store: Store, name: str) -> Person:
     raise NotFoundError(f"there is no {name}", hint="touchline users list shows everybody.")
 
 
-def _read(session: Session, person_id: int) -> Person:
+def _read_person(session: Session, person_id: int) -> Person:
     row = person_by_id(session, person_id)
     if row is None:
         raise NotFoundError.person(person_id)
     waiting, tokens = people_with_links(session, now()), count_access_tokens(session)
     factors, ways = people_with_second_factor(session), people_with_identity(session)
-    return _person(row, waiting, tokens, factors, ways)
+    return _person_from_row(row, waiting, tokens, factors, ways)
 
 
-def _person(
+def _person_from_row(
     row: Any,
     waiting: set[int],
     tokens: Mapping[int, int],

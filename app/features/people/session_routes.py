@@ -118,10 +118,10 @@ def log_in(
     where people come by single sign-on alone.
     """
     team.require_passwords()
-    return _begin(team, store, request, response, who.name, who.password, who.code)
+    return _begin_session(team, store, request, response, who.name, who.password, who.code)
 
 
-def _begin(
+def _begin_session(
     team: Team,
     store: Store,
     request: Request,
@@ -229,7 +229,7 @@ def end_session(session: Id, team: AppTeam, me: Me) -> None:
 def look_at_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam) -> LinkHolder:
     """Whom a link is for; 404 when it is not good any more."""
     team.count_try(request)
-    return LinkHolder(**vars(links.look(store, asked.token)))
+    return LinkHolder(**vars(links.find_link_holder(store, asked.token)))
 
 
 @router.post(
@@ -247,5 +247,5 @@ def use_link(
     """
     team.require_passwords()
     team.count_try(request)
-    name = links.use(store, chosen.token, chosen.password, chosen.name)
-    return _begin(team, store, request, response, name, chosen.password)
+    name = links.use_link(store, chosen.token, chosen.password, chosen.name)
+    return _begin_session(team, store, request, response, name, chosen.password)

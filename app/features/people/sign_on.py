@@ -18,8 +18,8 @@ from typing import Any
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotLoggedInError
-from app.features.people.devices import use_code, waiting
-from app.features.people.links import look, new_token, take, token_hash
+from app.features.people.devices import make_pending_actions, use_code
+from app.features.people.links import find_link_holder, new_token, take, token_hash
 from app.features.people.login_queries import (
     delete_logins,
     find_identity,
@@ -36,7 +36,7 @@ from app.features.people.queries import (
 )
 from app.features.people.roles import checked_name, note
 from app.features.people.second_factor import require_password
-from app.features.people.sign_on_rules import SignOnRules, require_none, shown_of
+from app.features.people.sign_on_rules import SignOnRules, require_no_identity, shown_of
 from app.finite import json_text
 
 LASTS = timedelta(minutes=10)
@@ -108,7 +108,7 @@ class SignOn:
         self.rules = rules
         self._store, self._logins, self._clock = store, logins, clock
         self._provider = Provider(rules, clock)
-        self._begun = waiting(store, clock, LASTS, "sign-on")
+        self._begun = make_pending_actions(store, clock, LASTS, "sign-on")
 
     def begin(
         self,
@@ -135,9 +135,9 @@ class SignOn:
         """
         if not _OWN.fullmatch(to) or len(to) > _LONGEST:
             raise InputError("this is not a page of this server", pointer="/to")
-        if link is not None and look(self._store, link).name is None:
+        if link is not None and find_link_holder(self._store, link).name is None:
             name = checked_name(name or "")
-        return self._begin(asker, redirect, to, link=link, name=name)
+        return self._begin_login(asker, redirect, to, link=link, name=name)
 
     def begin_link(self, asker: str, login: Login, password: str | None, *, redirect: str) -> str:
         """The address where somebody who is logged in shows which account is theirs.
@@ -148,8 +148,8 @@ class SignOn:
         """
         require_password(self._store, login, password, self._clock())
         with self._store.read() as session:
-            require_none(session, login.person_id, self.rules)
-        return self._begin(asker, redirect, "/account", session=login.id)
+            require_no_identity(session, login.person_id, self.rules)
+        return self._begin_login(asker, redirect, "/account", session=login.id)
 
     def finish(
         self,
@@ -194,20 +194,22 @@ class SignOn:
         if issuer is not None and issuer != self.rules.issuer:
             raise NotLoggedInError("the response comes from another provider", hint="Begin again.")
         if begun.session is not None:
-            return self._link(begun, code, login)
-        claims = begun.claims or self._claims(begun, code)
-        person_id, password = self._person(begun, claims)
+            return self._link_account(begun, code, login)
+        claims = begun.claims or self._admitted_claims(begun, code)
+        person_id, password = self._find_or_make_person(begun, claims)
         vouched = self.rules.has_trusted_factor(claims)
         if factor is not None and not vouched:
             # In a transaction of its own, which another that writes would wait for.
-            on_code(self._name(person_id))
+            on_code(self._person_name(person_id))
 
         def require(session: Session) -> None:
             # Read again: the account may have been taken away from them since.
-            if not _is_theirs(session, self.rules, claims, person_id):
-                raise NotLoggedInError(self._unknown(), hint=self._ask())
+            if not _has_identity(session, self.rules, claims, person_id):
+                raise NotLoggedInError(
+                    self._unknown_account_sentence(), hint=self._unknown_account_hint()
+                )
             if not vouched and has_second_factor(session, person_id):
-                self._require_factor(session, person_id, factor)
+                self._require_second_factor(session, person_id, factor)
             use_identity(session, person_id, shown_of(claims), text_of(self._clock()))
 
         try:
@@ -229,7 +231,7 @@ class SignOn:
             raise
         return SignOnResult(token, begun.to)
 
-    def _begin(self, asker: str, redirect: str, to: str, **more: Any) -> str:
+    def _begin_login(self, asker: str, redirect: str, to: str, **more: Any) -> str:
         request = LoginRequest(redirect, new_token(), new_token(), secrets.token_urlsafe(48))
         address = self._provider.address(request)
         self._begun.put(
@@ -237,12 +239,14 @@ class SignOn:
         )
         return address
 
-    def _claims(self, begun: _PendingLogin, code: str) -> Mapping[str, Any]:
+    def _admitted_claims(self, begun: _PendingLogin, code: str) -> Mapping[str, Any]:
         claims = self._provider.claims(begun.asked, code)
         self.rules.require_admitted(claims)
         return claims
 
-    def _person(self, begun: _PendingLogin, claims: Mapping[str, Any]) -> tuple[int, str | None]:
+    def _find_or_make_person(
+        self, begun: _PendingLogin, claims: Mapping[str, Any]
+    ) -> tuple[int, str | None]:
         """Id of who that is, and the hash of the password that they have.
 
         Raises:
@@ -251,11 +255,13 @@ class SignOn:
         with self._store.write() as session:
             found = find_identity(session, self.rules.issuer, claims["sub"])
             if begun.link is not None:
-                person_id = self._join(session, begun.link, begun.name, claims, found)
+                person_id = self._link_account_by_invitation(
+                    session, begun.link, begun.name, claims, found
+                )
             elif found is not None:
                 person_id = found.person_id
             else:
-                person_id = self._make(session, claims)
+                person_id = self._make_person(session, claims)
             person = person_by_id(session, person_id)
             if person is None or person.disabled:
                 raise NotLoggedInError(
@@ -263,7 +269,7 @@ class SignOn:
                 )
             return person_id, person.password
 
-    def _join(
+    def _link_account_by_invitation(
         self,
         session: Session,
         link: str,
@@ -275,18 +281,21 @@ class SignOn:
         person_id = take(session, link, name, password=None)
         if found is not None and found.person_id != person_id:
             raise self._already_linked_error()
-        self._put(session, person_id, claims)
+        self._save_identity(session, person_id, claims)
         return person_id
 
-    def _make(self, session: Session, claims: Mapping[str, Any]) -> int:
+    def _make_person(self, session: Session, claims: Mapping[str, Any]) -> int:
         """Somebody new, where the operator lets in whom nobody here knows."""
         if self.rules.new_role is None:
-            raise NotLoggedInError(self._unknown(), hint=self._ask())
+            raise NotLoggedInError(
+                self._unknown_account_sentence(), hint=self._unknown_account_hint()
+            )
         try:
             name = checked_name(self.rules.name_for(claims))
         except InputError:
             raise NotLoggedInError(
-                f"{self.rules.label} gives you no name that can be one here", hint=self._ask()
+                f"{self.rules.label} gives you no name that can be one here",
+                hint=self._unknown_account_hint(),
             ) from None
         if person_by_name(session, name) is not None:
             # It may be the same person, and it may not: a name shows nothing.
@@ -299,49 +308,49 @@ class SignOn:
             )
         person_id = insert_person(session, name, self.rules.new_role, by=name)
         note(session, name, name, "came by single sign-on", self.rules.new_role)
-        self._put(session, person_id, claims)
+        self._save_identity(session, person_id, claims)
         return person_id
 
-    def _link(self, begun: _PendingLogin, code: str, login: Login | None) -> SignOnResult:
+    def _link_account(self, begun: _PendingLogin, code: str, login: Login | None) -> SignOnResult:
         if login is None or login.id != begun.session or login.token is not None:
             raise InputError(
                 "the session that wanted to link an account has ended", hint="Begin again."
             )
         try:
-            claims = self._claims(begun, code)
+            claims = self._admitted_claims(begun, code)
         except NotLoggedInError as error:
             raise InputError(error.message, hint=error.hint) from error
         with self._store.write() as session:
-            require_none(session, login.person_id, self.rules)
+            require_no_identity(session, login.person_id, self.rules)
             if find_identity(session, self.rules.issuer, claims["sub"]) is not None:
                 raise self._already_linked_error()
-            self._put(session, login.person_id, claims)
+            self._save_identity(session, login.person_id, claims)
             delete_logins(session, login.person_id, but=login.id)
         return SignOnResult(None, begun.to)
 
-    def _put(self, session: Session, person_id: int, claims: Mapping[str, Any]) -> None:
+    def _save_identity(self, session: Session, person_id: int, claims: Mapping[str, Any]) -> None:
         shown, person = shown_of(claims), person_by_id(session, person_id)
         assert person is not None
         values = {"issuer": self.rules.issuer, "subject": claims["sub"], "shown": shown}
         put_identity(session, {**values, "person_id": person_id, "created": text_of(self._clock())})
         note(session, person.name, person.name, "single sign-on linked", person.role, account=shown)
 
-    def _name(self, person_id: int) -> str:
+    def _person_name(self, person_id: int) -> str:
         with self._store.read() as session:
             person = person_by_id(session, person_id)
         assert person is not None
         return str(person.name)
 
-    def _require_factor(self, session: Session, person_id: int, factor: str | None) -> None:
+    def _require_second_factor(self, session: Session, person_id: int, factor: str | None) -> None:
         if factor is None:
             raise NotLoggedInError(ASK_CODE, hint=LOST, pointer=FACTOR)
         if not use_code(session, self._store, person_id, factor, self._clock()):
             raise NotLoggedInError(WRONG_CODE, hint=LOST, pointer=FACTOR)
 
-    def _unknown(self) -> str:
+    def _unknown_account_sentence(self) -> str:
         return f"no person here is linked with the account that {self.rules.label} names"
 
-    def _ask(self) -> str:
+    def _unknown_account_hint(self) -> str:
         return "An admin can send you a link; if you have an account, link it under Account."
 
     def _already_linked_error(self) -> ConflictError:
@@ -351,7 +360,7 @@ class SignOn:
         )
 
 
-def _is_theirs(
+def _has_identity(
     session: Session, rules: SignOnRules, claims: Mapping[str, Any], person_id: int
 ) -> bool:
     found = find_identity(session, rules.issuer, claims["sub"])

@@ -18,7 +18,7 @@ from app.features.people.login_schemas import (
 )
 from app.features.people.schemas import PasswordOnly
 from app.features.people.session_routes import Me, session_of
-from app.features.people.sign_on_rules import unlink, unlink_person, ways_of
+from app.features.people.sign_on_rules import read_login_ways, unlink, unlink_person
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
@@ -93,7 +93,7 @@ def finish(
 @may(Action.ACCOUNT)
 def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
-    ways, rules = ways_of(store, me.person_id), team.sign_on and team.sign_on.rules
+    ways, rules = read_login_ways(store, me.person_id), team.sign_on and team.sign_on.rules
     return OwnLoginMethods(
         password=ways.password,
         provider=rules.label if rules else None,

@@ -21,7 +21,7 @@ from app.features.people.login_queries import (
     identity_of,
 )
 from app.features.people.logins import Login, LoginMethod
-from app.features.people.queries import all_people, count_able, person_by_id
+from app.features.people.queries import all_people, count_people_who_can_log_in, person_by_id
 from app.features.people.roles import Role, note, require_no_token
 from app.features.people.second_factor import require_password
 from app.finite import Moment
@@ -66,12 +66,16 @@ class SignOnRules:
         Raises:
             NotLoggedInError: They may not.
         """
-        if self.domains and ALL not in self.domains and _domain(claims) not in self.domains:
+        if (
+            self.domains
+            and ALL not in self.domains
+            and _verified_email_domain(claims) not in self.domains
+        ):
             raise NotLoggedInError(
                 f"{self.label} does not vouch for an e-mail address of yours that may come in here",
                 hint="Use the account of your work, and see that its address is verified.",
             )
-        if self.group_claim and self.groups.isdisjoint(_texts(claims.get(self.group_claim))):
+        if self.group_claim and self.groups.isdisjoint(_claim_texts(claims.get(self.group_claim))):
             raise NotLoggedInError(
                 f"at {self.label} you are in none of the groups that may come in here",
                 hint="Whoever runs this server can say which one it takes.",
@@ -84,7 +88,7 @@ class SignOnRules:
 
     def has_trusted_factor(self, claims: Mapping[str, Any]) -> bool:
         """Whether the provider says that it has asked for a second factor, as the operator wants it."""
-        methods = {*_texts(claims.get("amr")), *_texts(claims.get("acr"))}
+        methods = {*_claim_texts(claims.get("amr")), *_claim_texts(claims.get("acr"))}
         return not self.trusted.isdisjoint(methods)
 
 
@@ -120,11 +124,11 @@ def read_rules(settings: Settings) -> SignOnRules | None:
         if name.startswith(_PREFIX) and name != "sso_label"
     ):
         return None
-    secret = _secret(settings)
+    secret = _read_client_secret(settings)
     issuer, client = settings.sso_issuer or "", settings.sso_client_id or ""
     if not (issuer and client and secret):
         absent = [
-            _variable(name)
+            _variable_name(name)
             for name, value in (
                 ("issuer", issuer),
                 ("client_id", client),
@@ -139,25 +143,25 @@ def read_rules(settings: Settings) -> SignOnRules | None:
         )
     if not (client + secret).isascii():
         raise _incomplete_error("the client's id and secret have letters that no provider gives")
-    _require_whole(settings)
+    _require_complete_settings(settings)
     return SignOnRules(
         issuer,
         client,
         secret,
         settings.sso_label.strip(),
-        _hosts([issuer, *settings.sso_hosts]),
+        _allowed_hosts([issuer, *settings.sso_hosts]),
         settings.sso_scope,
         settings.sso_name_claim,
         frozenset(one.strip().lower().lstrip("@") for one in settings.sso_domains),
         settings.sso_group_claim,
         frozenset(settings.sso_groups),
-        _new_role(settings),
+        _role_of_new_people(settings),
         settings.sso_only,
         frozenset(settings.sso_second_factor),
     )
 
 
-def _require_whole(settings: Settings) -> None:
+def _require_complete_settings(settings: Settings) -> None:
     if bool(settings.sso_group_claim) != bool(settings.sso_groups):
         raise _incomplete_error(
             "TOUCHLINE_SSO_GROUP_CLAIM and TOUCHLINE_SSO_GROUPS belong together"
@@ -171,7 +175,7 @@ def _require_whole(settings: Settings) -> None:
         )
 
 
-def _new_role(settings: Settings) -> Role | None:
+def _role_of_new_people(settings: Settings) -> Role | None:
     if not settings.sso_new_role:
         return None
     known = [role.value for role in Role if role is not Role.ADMIN]
@@ -180,7 +184,7 @@ def _new_role(settings: Settings) -> Role | None:
     return Role(settings.sso_new_role)
 
 
-def _hosts(addresses: Sequence[str]) -> frozenset[str]:
+def _allowed_hosts(addresses: Sequence[str]) -> frozenset[str]:
     try:
         found = [(urlsplit(one), origin_of(one)) for one in addresses]
     except ValueError as error:
@@ -192,29 +196,29 @@ def _hosts(addresses: Sequence[str]) -> frozenset[str]:
     return frozenset(origin for _, origin in found)
 
 
-def _secret(settings: Settings) -> str:
+def _read_client_secret(settings: Settings) -> str:
     path, given = settings.sso_client_secret_file, settings.sso_client_secret
     if path is None:
         return given.get_secret_value().strip() if given else ""
     if given:
         raise _incomplete_error("the client's secret is given twice, by a file and without")
-    return read_private(path, _variable("client_secret_file"))
+    return read_private(path, _variable_name("client_secret_file"))
 
 
-def _domain(claims: Mapping[str, Any]) -> str | None:
+def _verified_email_domain(claims: Mapping[str, Any]) -> str | None:
     """Of the e-mail address that the provider has verified; None: of none."""
     if claims.get("email_verified") not in (True, "true"):
         return None
     return str(claims.get("email") or "").rpartition("@")[2].lower() or None
 
 
-def _texts(claim: object) -> list[str]:
+def _claim_texts(claim: object) -> list[str]:
     if isinstance(claim, str):
         return [claim]
     return [one for one in claim if isinstance(one, str)] if isinstance(claim, list) else []
 
 
-def _variable(name: str) -> str:
+def _variable_name(name: str) -> str:
     return f"TOUCHLINE_{_PREFIX}{name}".upper()
 
 
@@ -245,7 +249,7 @@ class OwnWays:
     identity: Identity | None
 
 
-def ways_of(store: Store, person_id: int) -> OwnWays:
+def read_login_ways(store: Store, person_id: int) -> OwnWays:
     """How a person can come in."""
     with store.read() as session:
         person, row = person_by_id(session, person_id), identity_of(session, person_id)
@@ -253,7 +257,7 @@ def ways_of(store: Store, person_id: int) -> OwnWays:
     return OwnWays(person is not None and person.password is not None, found)
 
 
-def require_none(session: Session, person_id: int, rules: SignOnRules) -> None:
+def require_no_identity(session: Session, person_id: int, rules: SignOnRules) -> None:
     """Raise ConflictError where somebody has an account of the provider already."""
     found = identity_of(session, person_id)
     if found is not None and found.issuer == rules.issuer:
@@ -302,7 +306,7 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
             )
         if person is None or delete_identity(session, person_id) is None:
             raise NotFoundError("no account of a provider is linked with that person")
-        if person.role == Role.ADMIN and not count_able(session, Role.ADMIN):
+        if person.role == Role.ADMIN and not count_people_who_can_log_in(session, Role.ADMIN):
             raise ConflictError(
                 f"{person.name} is the last admin who can log in", hint="Make another one first."
             )

@@ -55,7 +55,7 @@ def match_pitches(session: Session, dataset_id: int) -> list[MatchPitch]:
     for row in session.execute(statement):
         rows.setdefault(row[0], []).append(row)
     first = {match: min(row[4] for row in found) for match, found in rows.items()}
-    keys = _keys(session, first.values())
+    keys = _group_keys(session, first.values())
     return [
         MatchPitch(
             match,
@@ -77,7 +77,7 @@ def groups_of_match(session: Session, dataset_id: int, match: str) -> list[int]:
 
 def lines_digests(session: Session, dataset_id: int) -> dict[str, str]:
     """Digest of the lines of each match's cameras."""
-    rows = session.execute(_cameras(StationModel.digest, dataset_id=dataset_id))
+    rows = session.execute(_cameras_statement(StationModel.digest, dataset_id=dataset_id))
     digests: dict[str, list[str]] = {}
     for match, value in rows:
         digests.setdefault(match, []).append(value)
@@ -93,13 +93,13 @@ def lines_of_match(session: Session, dataset_id: int, match: str) -> list[tuple[
         StationModel.height,
         StationModel.picture,
     )
-    statement = _cameras(*columns, dataset_id=dataset_id).where(GroupModel.match == match)
+    statement = _cameras_statement(*columns, dataset_id=dataset_id).where(GroupModel.match == match)
     rows = session.execute(statement.order_by(StationModel.id)).all()
-    seen = (_as_taken(row) for row in rows)
+    seen = (_lines_as_taken(row) for row in rows)
     return [item for item in seen if item is not None]
 
 
-def _as_taken(row: Any) -> tuple[Lines, ImageSize] | None:
+def _lines_as_taken(row: Any) -> tuple[Lines, ImageSize] | None:
     """What a camera's lines are without what was done to its picture; None where nobody knows that."""
     lines, size = lines_from_json(parse(row.lines)), ImageSize(row.width, row.height)
     picture = None if row.picture is None else picture_from_json(parse(row.picture))
@@ -108,7 +108,7 @@ def _as_taken(row: Any) -> tuple[Lines, ImageSize] | None:
     return (picture.undone(lines, size), size) if picture.is_known else None
 
 
-def _cameras(*columns: Any, dataset_id: int) -> Any:
+def _cameras_statement(*columns: Any, dataset_id: int) -> Any:
     """Each match's cameras that have lines, once."""
     return (
         select(GroupModel.match, *columns)
@@ -137,7 +137,7 @@ def edited_pitches(session: Session, dataset_id: int, matches: Iterable[str]) ->
 
     Groups without a match have none in common: nobody knows whether others come from that pitch.
     """
-    newest = _newest(dataset_id).where(GroupModel.match.in_(set(matches) - {""}))
+    newest = _newest_entries_statement(dataset_id).where(GroupModel.match.in_(set(matches) - {""}))
     statement = (
         select(GroupModel.match, GroupModel.pitch_length, GroupModel.pitch_width)
         .join(LogModel, LogModel.group_id == GroupModel.id)
@@ -158,17 +158,18 @@ def last_changes(session: Session, dataset_id: int) -> dict[str, LogEntry]:
     Of groups without a match only where it was said of all that there are, and all had one size.
     """
     entries = {
-        entry.group_id: entry for entry in read_log(session, LogModel.id.in_(_newest(dataset_id)))
+        entry.group_id: entry
+        for entry in read_log(session, LogModel.id.in_(_newest_entries_statement(dataset_id)))
     }
     model = GroupModel
     rows = session.execute(select(model.id, model.match).where(model.id.in_(entries)))
     changes = {row.match: entries[row.id] for row in rows}
-    if "" in changes and not _is_of_all(session, dataset_id, changes[""]):
+    if "" in changes and not _concerns_all_without_match(session, dataset_id, changes[""]):
         del changes[""]
     return changes
 
 
-def _is_of_all(session: Session, dataset_id: int, newest: LogEntry) -> bool:
+def _concerns_all_without_match(session: Session, dataset_id: int, newest: LogEntry) -> bool:
     """Whether all groups without a match were given another size with an entry, and had one."""
     groups = set(groups_of_match(session, dataset_id, ""))
     nameless = select(GroupModel.id).where(
@@ -183,7 +184,7 @@ def _is_of_all(session: Session, dataset_id: int, newest: LogEntry) -> bool:
     return groups <= set(same)
 
 
-def _newest(dataset_id: int) -> Any:
+def _newest_entries_statement(dataset_id: int) -> Any:
     """Ids of the newest entry about the pitch of each match."""
     return (
         select(func.max(LogModel.id))
@@ -217,7 +218,7 @@ def replace_pitch_findings(
     return sorted({group for group, _ in present ^ wanted})
 
 
-def _keys(session: Session, ids: Iterable[int]) -> dict[int, str]:
+def _group_keys(session: Session, ids: Iterable[int]) -> dict[int, str]:
     model = GroupModel
     rows = session.execute(select(model.id, model.key).where(model.id.in_(list(ids))))
     return {row.id: row.key for row in rows}

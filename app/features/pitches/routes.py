@@ -61,7 +61,7 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
     its uncertainty it is `proposed`, and the match's first group has the finding `pitch_size`.
     """
     state = read_pitches(store, dataset)
-    response.headers.update(_tagged(state))
+    response.headers.update(_etag_headers(state))
     return PitchesDocument.model_validate(state)
 
 
@@ -78,11 +78,11 @@ def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) 
     return request_solve(services.jobs, services.store, found.id, actor=actor, title=title)
 
 
-def _sized(sized: PitchJob) -> Response:
+def _sized_response(sized: PitchJob) -> Response:
     pitches = PitchesDocument.model_validate(sized.state)
     job = JobDocument.model_validate(sized.job)
     job.result = {"pitches": pitches.model_dump(mode="json")}
-    return document(job, 202, {**_tagged(sized.state), **job_address(sized.job)})
+    return document(job, 202, {**_etag_headers(sized.state), **job_address(sized.job)})
 
 
 @pitches_router.patch(
@@ -93,7 +93,7 @@ def _sized(sized: PitchJob) -> Response:
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_sized)
+@responds(_sized_response)
 def set_pitch(
     dataset: DatasetPath,
     change: PitchChange,
@@ -119,5 +119,5 @@ def set_pitch(
         )
 
 
-def _tagged(state: DatasetPitches) -> dict[str, str]:
+def _etag_headers(state: DatasetPitches) -> dict[str, str]:
     return {"ETag": state.etag, "Cache-Control": "private, no-cache"}

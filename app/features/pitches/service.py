@@ -106,7 +106,7 @@ class DatasetPitches:
 
 
 @dataclass(frozen=True)
-class _Task:
+class _PitchTask:
     match: str
     inputs: str
     frames: tuple[PitchFrame, ...]
@@ -120,7 +120,7 @@ def read_pitches(store: Store, dataset: str | int) -> DatasetPitches:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return _read(session, dataset)
+        return _read_pitches(session, dataset)
 
 
 def estimate_pitches(
@@ -142,9 +142,11 @@ def estimate_pitches(
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         policy = found.policy.calibration
-        stale = _stale(session, found.id, policy)
-    tasks = (_task(store, found.id, match, inputs, policy) for match, inputs in stale)
-    for done, (match, values) in enumerate(fan_out(_estimate, tasks, executor, stop), start=1):
+        stale = _stale_matches_with_inputs(session, found.id, policy)
+    tasks = (_make_task(store, found.id, match, inputs, policy) for match, inputs in stale)
+    for done, (match, values) in enumerate(
+        fan_out(_estimate_match, tasks, executor, stop), start=1
+    ):
         with store.write() as session:
             save_estimate(session, found.id, match, **values)
         if progress is not None:
@@ -158,7 +160,10 @@ def stale_matches(store: Store, dataset: str | int) -> list[str]:
     """The matches that ``estimate_pitches`` would estimate."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        return [match for match, _ in _stale(session, found.id, found.policy.calibration)]
+        return [
+            match
+            for match, _ in _stale_matches_with_inputs(session, found.id, found.policy.calibration)
+        ]
 
 
 def change_pitches(
@@ -184,7 +189,7 @@ def change_pitches(
         NotFoundError: There is no such dataset or match.
         StaleRevisionError: Somebody else was faster.
     """
-    state = _read(session, dataset)
+    state = _read_pitches(session, dataset)
     if if_match is not None:
         require_etag(state.etag, if_match, f'the pitches of "{state.dataset}"')
     for match, pitch in wanted.items():
@@ -193,12 +198,12 @@ def change_pitches(
         give_pitch(session, state.dataset_id, ids, pitch, actor)
     # What the lines show is not asked again: it does not depend on the size in use.
     shown = {item.match: (item.estimate, item.problem) for item in state.items}
-    changed = _read(session, state.dataset_id, shown)
-    _note(session, changed)
+    changed = _read_pitches(session, state.dataset_id, shown)
+    _save_proposal_findings(session, changed)
     return changed
 
 
-def sizes_asked(
+def requested_sizes(
     found: DatasetPitches, match: str | None, *, accept: bool = False, size: str | None = None
 ) -> dict[str, Pitch]:
     """What somebody wants the pitches of matches to be, by match.
@@ -246,10 +251,10 @@ def parse_pitch(text: str) -> Pitch:
 
 def note_proposals(session: Session, dataset_id: int) -> None:
     """Bring the findings of a dataset's matches in step with what is proposed now."""
-    _note(session, _read(session, dataset_id))
+    _save_proposal_findings(session, _read_pitches(session, dataset_id))
 
 
-def _note(session: Session, state: DatasetPitches) -> None:
+def _save_proposal_findings(session: Session, state: DatasetPitches) -> None:
     found = ((item.group_id, item.sentence) for item in state.proposals)
     refresh_queue(session, replace_pitch_findings(session, state.dataset_id, found))
 
@@ -268,24 +273,26 @@ _Shown = tuple[PitchEstimate | None, str | None]
 """What the lines of a match show: the estimate, or why there is none."""
 
 
-def _read(
+def _read_pitches(
     session: Session, dataset: str | int, shown: Mapping[str, _Shown] | None = None
 ) -> DatasetPitches:
     found = read_dataset_head(session, dataset)
     if shown is None:
-        shown = _shown(session, found.id, found.policy.calibration)
+        shown = _current_estimates(session, found.id, found.policy.calibration)
     changes = last_changes(session, found.id)
     items = tuple(
-        _state(item, shown.get(item.match, (None, None)), changes.get(item.match))
+        _pitch_state(item, shown.get(item.match, (None, None)), changes.get(item.match))
         for item in match_pitches(session, found.id)
         if item.match or item.match in shown
     )
     return DatasetPitches(found.id, found.name, items)
 
 
-def _shown(session: Session, dataset_id: int, policy: CalibrationPolicy) -> dict[str, _Shown]:
+def _current_estimates(
+    session: Session, dataset_id: int, policy: CalibrationPolicy
+) -> dict[str, _Shown]:
     """What was estimated of the lines as they are now; the other matches are not computed."""
-    stale = {match for match, _ in _stale(session, dataset_id, policy)}
+    stale = {match for match, _ in _stale_matches_with_inputs(session, dataset_id, policy)}
     shown: dict[str, _Shown] = dict.fromkeys(stale, (None, None))
     for match, row in read_estimates(session, dataset_id).items():
         if match in stale:
@@ -296,17 +303,20 @@ def _shown(session: Session, dataset_id: int, policy: CalibrationPolicy) -> dict
     return shown
 
 
-def _stale(session: Session, dataset_id: int, policy: CalibrationPolicy) -> list[tuple[str, str]]:
+def _stale_matches_with_inputs(
+    session: Session, dataset_id: int, policy: CalibrationPolicy
+) -> list[tuple[str, str]]:
     """Matches whose lines are others than when they were estimated, and what keys them now."""
     present = read_estimates(session, dataset_id)
     return [
         (match, inputs)
         for match, value in lines_digests(session, dataset_id).items()
-        if (inputs := _inputs(value, policy)) != (present[match].inputs if match in present else "")
+        if (inputs := _inputs_digest(value, policy))
+        != (present[match].inputs if match in present else "")
     ]
 
 
-def _state(item: MatchPitch, shown: _Shown, changed: LogEntry | None) -> PitchState:
+def _pitch_state(item: MatchPitch, shown: _Shown, changed: LogEntry | None) -> PitchState:
     estimate, problem = shown
     previous = None
     if changed is not None:
@@ -322,12 +332,12 @@ def _state(item: MatchPitch, shown: _Shown, changed: LogEntry | None) -> PitchSt
         mixed=len(item.pitches) > 1,
         estimate=estimate,
         problem=problem,
-        proposed=None if estimate is None else _proposed(item.pitches, estimate),
+        proposed=None if estimate is None else _proposed_pitch(item.pitches, estimate),
         previous=previous,
     )
 
 
-def _proposed(pitches: Sequence[Pitch], estimate: PitchEstimate) -> Pitch | None:
+def _proposed_pitch(pitches: Sequence[Pitch], estimate: PitchEstimate) -> Pitch | None:
     """The size that a match's groups should have; the most frequent of theirs comes first."""
     found = (estimate.proposal(pitch) for pitch in pitches)
     proposal = next((pitch for pitch in found if pitch is not None), None)
@@ -335,22 +345,22 @@ def _proposed(pitches: Sequence[Pitch], estimate: PitchEstimate) -> Pitch | None
     return pitches[0] if proposal is None and len(pitches) > 1 and known else proposal
 
 
-def _inputs(lines: str, policy: CalibrationPolicy) -> str:
+def _inputs_digest(lines: str, policy: CalibrationPolicy) -> str:
     """Key of an estimate: all that it is computed from."""
     # Where the camera stands has no part in it, nor has paint: every frame's lines say it.
     own = replace(policy, share_position=False, source="lines")
     return digest([SOLVER_VERSION, digested_calibration(own), lines])
 
 
-def _task(
+def _make_task(
     store: Store, dataset_id: int, match: str, inputs: str, policy: CalibrationPolicy
-) -> _Task:
+) -> _PitchTask:
     with store.read() as session:
         lines = lines_of_match(session, dataset_id, match)
-    return _Task(match, inputs, tuple(PitchFrame(*item) for item in lines), policy)
+    return _PitchTask(match, inputs, tuple(PitchFrame(*item) for item in lines), policy)
 
 
-def _estimate(task: _Task) -> tuple[str, dict[str, Any]]:
+def _estimate_match(task: _PitchTask) -> tuple[str, dict[str, Any]]:
     """Values of the estimate's row; runs in a worker."""
     nothing = PitchEstimate(None, None, None, None, 0)
     problem = None

@@ -34,9 +34,9 @@ def show(
         with connected(server) as client:
             text, values = remote.policy_values(client, dataset)
     else:
-        text, values = _policy_here(dataset)
+        text, values = _read_local_policy(dataset)
     if file is not None:
-        _write(file, text)
+        _write_text(file, text)
     if json_:
         print_json(values)
     elif file is None:
@@ -70,11 +70,15 @@ def set_(
     with opened_store() as store:
         state = change_policy(store, dataset, chosen, if_match=None, actor=acting())
         stale = len(stale_groups(store, state.dataset_id))
-    values = {**_head(state.dataset, state.policy), "version": state.version, "to_solve": stale}
+    values = {
+        **_policy_header(state.dataset, state.policy),
+        "version": state.version,
+        "to_solve": stale,
+    }
     print_values(values, json_)
 
 
-def _policy_here(dataset: str) -> tuple[str, dict[str, Any]]:
+def _read_local_policy(dataset: str) -> tuple[str, dict[str, Any]]:
     """The policy of a dataset in a home, as YAML and as values."""
     from app.features.policies.service import read_policy
     from app.features.policies.text import policy_to_yaml, policy_values
@@ -87,7 +91,7 @@ def _policy_here(dataset: str) -> tuple[str, dict[str, Any]]:
         for item in state.history
     ]
     values = {"values": policy_values(state.policy), "history": history}
-    head = {**_head(state.dataset, state.policy), "version": state.version}
+    head = {**_policy_header(state.dataset, state.policy), "version": state.version}
     return policy_to_yaml(state.policy), {**head, **values}
 
 
@@ -114,11 +118,11 @@ def read_policy_option(text: str) -> Policy:
         raise InputError(f"{path}: {error.message}", hint=error.hint) from error
 
 
-def _head(dataset: str, policy: Policy) -> dict[str, str]:
+def _policy_header(dataset: str, policy: Policy) -> dict[str, str]:
     return {"dataset": dataset, "name": policy.name, "hash": policy.hash}
 
 
-def _write(path: Path, text: str) -> None:
+def _write_text(path: Path, text: str) -> None:
     from app.errors import StorageError
 
     try:

@@ -118,7 +118,7 @@ class Noise:
     @property
     def is_new(self) -> bool:
         """Whether cameras or people are unlike the dataset in another way than its views carry."""
-        return _are_apart(self.factors, self.used)
+        return _differ_noticeably(self.factors, self.used)
 
 
 def read_noise(store: Store, dataset: str | int) -> Noise:
@@ -128,10 +128,10 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
         NotFoundError: There is no such dataset.
     """
     state = read_policy(store, dataset)
-    ids = _solved(store, state.dataset_id)
-    groups, sources, noise = _estimated(store, ids, state.policy)
+    ids = _solved_group_ids(store, state.dataset_id)
+    groups, sources, noise = _estimate_noise(store, ids, state.policy)
     misses = zip(noise.misses, sources, strict=True)
-    found = _sources(
+    found = _estimate_source_factors(
         [(miss, own) for some, own in misses for miss in some], noise.ball, state.policy
     )
     with store.read() as session:
@@ -145,12 +145,12 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
         ball=noise.ball,
         stations=found.of("camera"),
         people=found.of("person"),
-        factors=_factors(found),
+        factors=_factors_by_camera_and_person(found),
         used=used,
         line_estimate=noise.lines,
         follows=state.policy.noise == ESTIMATED,
         advice=advice,
-        notices=tuple(_notices(advice, state.policy)),
+        notices=tuple(_notice_sentences(advice, state.policy)),
     )
 
 
@@ -178,7 +178,7 @@ def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:
         Whether the policy changed, and everything is stale.
     """
     state = read_policy(store, dataset)
-    noise = _estimated(store, _solved(store, state.dataset_id), state.policy)[2]
+    noise = _estimate_noise(store, _solved_group_ids(store, state.dataset_id), state.policy)[2]
     advice = _advice_of(noise, state.policy)
     if not any(item.moved for item in advice):
         return False
@@ -231,13 +231,15 @@ def take_noise_back(session: Session, dataset: str | int, *, actor: str) -> int:
     return apply_noise_factors(session, need_dataset(session, dataset), (), actor)
 
 
-def _solved(store: Store, dataset_id: int) -> list[int]:
+def _solved_group_ids(store: Store, dataset_id: int) -> list[int]:
     """Ids of the groups that have a solution, in the dataset's order."""
     with store.read() as session:
         return [row[0] for row in present_solutions(session, dataset_id) if row[2] is not None]
 
 
-def _groups(store: Store, chosen: Sequence[int]) -> Iterator[tuple[GroupState, Mapping[str, str]]]:
+def _groups_with_ball_actors(
+    store: Store, chosen: Sequence[int]
+) -> Iterator[tuple[GroupState, Mapping[str, str]]]:
     """Groups, and who placed the ball of each view last, as far as somebody did."""
     for start in range(0, len(chosen), CHUNK):
         batch = chosen[start : start + CHUNK]
@@ -257,7 +259,7 @@ def _sources_of(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[
     return found
 
 
-def _sources(
+def _estimate_source_factors(
     seen: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]], ball: BallNoise, policy: Policy
 ) -> SourceFactors:
     """Noise of the sources of some views, beside what is known of the dataset."""
@@ -267,7 +269,7 @@ def _sources(
     return estimate_sources(seen, click, share, given)
 
 
-def _factors(found: SourceFactors) -> Factors:
+def _factors_by_camera_and_person(found: SourceFactors) -> Factors:
     """Of each camera that is told with each person that is; none where all may be alike."""
     cameras, people = (
         ["", *(source.name for source in found.sources if source.kind == kind)]
@@ -281,20 +283,20 @@ def _factors(found: SourceFactors) -> Factors:
     return tuple(factors) if any(item.ratio != 1 for item in factors) else ()
 
 
-def _are_apart(wanted: Factors, used: Factors) -> bool:
+def _differ_noticeably(wanted: Factors, used: Factors) -> bool:
     """Whether factors differ by more than their estimate wanders with every new ball."""
     places = {item[:2] for item in (*wanted, *used)}
     ratios = [(factor_of(wanted, *at), factor_of(used, *at)) for at in places]
     return any(abs(new / old - 1) > WANDER for new, old in ratios)
 
 
-def _estimated(
+def _estimate_noise(
     store: Store, ids: Sequence[int], policy: Policy
 ) -> tuple[int, list[Mapping[str, Sequence[BallSource]]], DatasetNoise]:
     """How many groups were asked, the sources of the balls of each, and what all of them say."""
     seen: list[SeenGroup] = []
     sources: list[Mapping[str, Sequence[BallSource]]] = []
-    for state, placed in _groups(store, noise_sample(ids)):
+    for state, placed in _groups_with_ball_actors(store, noise_sample(ids)):
         if state.solution is not None:
             seen.append(SeenGroup.of(state.group, state.solution, state.policy))
             sources.append(_sources_of(state, placed))
@@ -302,16 +304,16 @@ def _estimated(
 
 
 def _advice_of(noise: DatasetNoise, policy: Policy) -> tuple[Advice, ...]:
-    return (*_advice(noise.ball, policy), *_line_advice(noise.lines, policy))
+    return (*_ball_advice(noise.ball, policy), *_line_advice(noise.lines, policy))
 
 
-def _advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
+def _ball_advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
     if ball.click is not None:
-        yield _threshold_advice("click_sigma_px", _ends(ball.click), policy)
+        yield _threshold_advice("click_sigma_px", _interval_of(ball.click), policy)
     if ball.share is not None and ball.share_interval is not None:
         yield _threshold_advice("box_sigma_share", (ball.share, *ball.share_interval), policy)
     if ball.given is not None:
-        yield _threshold_advice("given_sigma_px", _ends(ball.given), policy)
+        yield _threshold_advice("given_sigma_px", _interval_of(ball.given), policy)
 
 
 def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]:
@@ -321,7 +323,7 @@ def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]
             yield _threshold_advice(f"{CALIBRATION}.{name}", ends, policy)
 
 
-def _ends(sigma: Sigma) -> tuple[float, float, float]:
+def _interval_of(sigma: Sigma) -> tuple[float, float, float]:
     return sigma.value, sigma.low, sigma.high
 
 
@@ -335,7 +337,7 @@ def _threshold_advice(name: str, found: tuple[float, float, float], policy: Poli
     return Advice(name, threshold.label, threshold.unit, present, estimate, low, high)
 
 
-def _notices(advice: Sequence[Advice], policy: Policy) -> Iterator[str]:
+def _notice_sentences(advice: Sequence[Advice], policy: Policy) -> Iterator[str]:
     if not advice:
         yield (
             "Too few views agree on a ball to estimate the noise of its annotation: the sigma of the "

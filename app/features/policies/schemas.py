@@ -13,7 +13,7 @@ from app.http.documents import Document, ListDocument
 from app.soccer.policy import Asks, CalibrationPolicy, Policy, thresholds_of
 
 
-class _PolicyHead(Document):
+class _PolicyIdentity(Document):
     name: str
     hash: str = Field(description="Digest of every value but the name.")
     calibration: CalibrationPolicy = Field(description="What a view's calibration depends on.")
@@ -22,7 +22,7 @@ class _PolicyHead(Document):
 _thresholds: dict[str, Any] = {
     item.name: (item.hint, Field(description=item.text)) for item in thresholds_of(Policy)
 }
-_PolicyFields: Any = create_model("_PolicyFields", __base__=_PolicyHead, **_thresholds)
+_PolicyFields: Any = create_model("_PolicyFields", __base__=_PolicyIdentity, **_thresholds)
 
 
 class PolicyDocument(_PolicyFields):
@@ -95,7 +95,7 @@ class PolicyStateDocument(Document):
             etag=state.etag,
             version=state.version,
             history=state.history,
-            **_described(state.policy),
+            **_policy_fields(state.policy),
         )
 
 
@@ -110,7 +110,7 @@ class ShippedPolicyDocument(Document):
     @staticmethod
     def of(policy: Policy) -> ShippedPolicyDocument:
         """The document of a shipped policy."""
-        return ShippedPolicyDocument(**_described(policy))
+        return ShippedPolicyDocument(**_policy_fields(policy))
 
 
 class PolicyFieldDocument(Document):
@@ -144,7 +144,7 @@ class PolicyCatalogue(ListDocument[ShippedPolicyDocument]):
     fields: list[PolicyFieldDocument]
 
 
-def _described(policy: Policy) -> dict[str, Any]:
+def _policy_fields(policy: Policy) -> dict[str, Any]:
     return {
         "name": policy.name,
         "hash": policy.hash,

@@ -45,7 +45,7 @@ def read_policy(store: Store, dataset: str | int) -> PolicyState:
         NotFoundError: There is no such dataset.
     """
     with store.read() as session:
-        return _read(session, dataset)
+        return _read_policy_state(session, dataset)
 
 
 def change_policy(
@@ -75,7 +75,7 @@ def apply_policy(
     session: Session, dataset: str | int, policy: Policy, *, if_match: str | None, actor: str
 ) -> PolicyState:
     """``change_policy`` within a write session."""
-    state = _read(session, dataset)
+    state = _read_policy_state(session, dataset)
     if if_match is not None:
         require_etag(state.etag, if_match, f'the policy of "{state.dataset}"')
     if policy.noise == state.policy.noise == ESTIMATED:
@@ -84,10 +84,10 @@ def apply_policy(
     if policy == state.policy:
         return state
     save_policy(session, state.dataset_id, policy, actor)
-    return _read(session, state.dataset_id)
+    return _read_policy_state(session, state.dataset_id)
 
 
-def _read(session: Session, dataset: str | int) -> PolicyState:
+def _read_policy_state(session: Session, dataset: str | int) -> PolicyState:
     found = read_dataset_head(session, dataset)
     return PolicyState(found.id, found.name, found.policy, policy_history(session, found.id))
 

@@ -108,7 +108,7 @@ def read_changes(session: Session, after: int) -> list[Change]:
     if newest - after > FAR:
         names = dataset_names(session)
         return [Change(newest, key, name, EVERYTHING, None) for key, name in names.items()]
-    return _with_names(session, changes_after_entry(session, after))
+    return _add_names_and_etags(session, changes_after_entry(session, after))
 
 
 def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) -> list[Change]:
@@ -119,14 +119,14 @@ def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) 
         for dataset_id, group_id in groups_solved_after(session, after)
         if group_id not in skipped
     ]
-    return _with_names(session, found)
+    return _add_names_and_etags(session, found)
 
 
-def _with_names(session: Session, found: Iterable[StoredChange]) -> list[Change]:
+def _add_names_and_etags(session: Session, found: Iterable[StoredChange]) -> list[Change]:
     """Changes with names and ETags; a dataset with too many of them is told as a whole."""
-    items = _merged(found)
+    items = _newest_change_of_each_group(found)
     sizes = Counter(item.dataset_id for item in items if item.group_id is not None)
-    items = _merged(
+    items = _newest_change_of_each_group(
         replace(item, group_id=None) if sizes[item.dataset_id] > MANY else item for item in items
     )
     names = dataset_names(session)
@@ -150,14 +150,14 @@ def _with_names(session: Session, found: Iterable[StoredChange]) -> list[Change]
     ]
 
 
-def _merged(found: Iterable[StoredChange]) -> list[StoredChange]:
+def _newest_change_of_each_group(found: Iterable[StoredChange]) -> list[StoredChange]:
     """The last change of each group, and the last one of each kind of each dataset, in order.
 
     A comment stands beside the change of its group, which it does not hide.
     """
-    last = {(item.dataset_id, item.group_id, _channel(item)): item for item in found}
+    last = {(item.dataset_id, item.group_id, _merge_key(item)): item for item in found}
     return sorted(last.values(), key=lambda item: item.id or 0)
 
 
-def _channel(item: StoredChange) -> str:
+def _merge_key(item: StoredChange) -> str:
     return item.kind if item.group_id is None or item.kind == COMMENT else ""

@@ -63,16 +63,16 @@ YES_NO = ("yes", "no")
 WHETHER = ("any", "none")
 
 
-def _number(name: str, column: str, meaning: str, unit: str = "", *also: str) -> QueryField:
+def _number_field(name: str, column: str, meaning: str, unit: str = "", *also: str) -> QueryField:
     others = (*also, column) if column != name else also
     return QueryField(name, "number", meaning, unit, ("none",), others, column)
 
 
-def _text(name: str, meaning: str, values: tuple[str, ...] = WHETHER) -> QueryField:
+def _text_field(name: str, meaning: str, values: tuple[str, ...] = WHETHER) -> QueryField:
     return QueryField(name, "text", meaning, values=values)
 
 
-def _flag(name: str, meaning: str) -> QueryField:
+def _flag_field(name: str, meaning: str) -> QueryField:
     return QueryField(name, "flag", meaning, values=YES_NO)
 
 
@@ -89,27 +89,27 @@ _HIDDEN_FIELDS = (
         also=("first_failing",),
     ),
     QueryField("reason", "text", "why it was rejected", values=(*WHETHER, *REASONS)),
-    _flag("stale", "changed after its verdict"),
-    _flag("solved", "has numbers"),
-    _flag("passes", "passes every gate"),
-    _flag("fixed", "edited before it was accepted"),
+    _flag_field("stale", "changed after its verdict"),
+    _flag_field("solved", "has numbers"),
+    _flag_field("passes", "passes every gate"),
+    _flag_field("fixed", "edited before it was accepted"),
     QueryField("pictures", "choice", "whether its views have a picture", values=("none", "any", "all")),
     QueryField(
         "proposal", "choice", "what was proposed from a view's paint, as long as its lines stay",
         values=(*WHETHER, *PROPOSAL_OUTCOMES),
     ),
-    _text("split", "train, test and so on, all of it"),
-    _text("match", "part of the match's name", ()),
-    _text("reviewer", "person who decided"),
-    _text("view", "key of a view, or how many views there are", ()),
-    _text("label", "part of the label or of the key, as a bare word", ()),
-    _text("key", "key of the group, all of it"),
-    _text("override", "gate that an acceptance overrides"),
+    _text_field("split", "train, test and so on, all of it"),
+    _text_field("match", "part of the match's name", ()),
+    _text_field("reviewer", "person who decided"),
+    _text_field("view", "key of a view, or how many views there are", ()),
+    _text_field("label", "part of the label or of the key, as a bare word", ()),
+    _text_field("key", "key of the group, all of it"),
+    _text_field("override", "gate that an acceptance overrides"),
     QueryField(
         "comments", "choice", "comments on it",
         values=(*WHETHER, "open", "resolved"),
     ),
-    _text("mentions", "person mentioned in an open comment, by name"),
+    _text_field("mentions", "person mentioned in an open comment, by name"),
     QueryField(
         "annotations", "choice",
         "result of its independent annotations; waiting: they differ and need a decision (reviewers)",
@@ -121,30 +121,30 @@ _HIDDEN_FIELDS = (
     ),
     QueryField("id", "ids", "groups one by one: id:12,15,19"),
     QueryField("batch", "ids", "assigned work: batch:3, in its order unless another is given"),
-    _number("jac", "min_jac", "smallest JaC of the views at 0.5 %, 0 to 1", "", "jac05"),
-    _number(
+    _number_field("jac", "min_jac", "smallest JaC of the views at 0.5 %, 0 to 1", "", "jac05"),
+    _number_field(
         "agreement", "agreement",
         "least agreement of the views' cameras with their paint, 0 to 1; none: no paint was read",
     ),
-    _number("error", "error_px", "larger reprojection error of the best pair, as its gate judges it", "px"),
-    _number("error_percent", "error_percent", "the same", "% of the image diagonal"),
-    _number("sigma", "sigma_m", "standard deviation of the ball along its worst axis", "m"),
-    _number("parallax", "parallax_degrees", "largest angle between two rays at the ball", "degrees"),
-    _number("size_ratio", "size_ratio", "diameter of the ball's box by the expected one", "", "ratio"),
-    _number("height", "height_m", "ball above the grass", "m"),
-    _number("distance", "distance_m", "from the camera of the first view to the ball", "m"),
-    _number("box", "box_px", "diameter of the ball's box in the first view that shows it", "px"),
-    _number("x", "x_m", "ball along the pitch, from its centre to the right", "m"),
-    _number("y", "y_m", "ball across the pitch, from its centre to the main camera", "m"),
-    _number(
+    _number_field("error", "error_px", "larger reprojection error of the best pair, as its gate judges it", "px"),
+    _number_field("error_percent", "error_percent", "the same", "% of the image diagonal"),
+    _number_field("sigma", "sigma_m", "standard deviation of the ball along its worst axis", "m"),
+    _number_field("parallax", "parallax_degrees", "largest angle between two rays at the ball", "degrees"),
+    _number_field("size_ratio", "size_ratio", "diameter of the ball's box by the expected one", "", "ratio"),
+    _number_field("height", "height_m", "ball above the grass", "m"),
+    _number_field("distance", "distance_m", "from the camera of the first view to the ball", "m"),
+    _number_field("box", "box_px", "diameter of the ball's box in the first view that shows it", "px"),
+    _number_field("x", "x_m", "ball along the pitch, from its centre to the right", "m"),
+    _number_field("y", "y_m", "ball across the pitch, from its centre to the main camera", "m"),
+    _number_field(
         "margin", "margin",
         "how far the deciding gate is from its threshold: 0.1 is 10 % of it, below 0 fails", "share",
     ),
-    _number(
+    _number_field(
         "value", "value", "the margin without its sign: small where a small mistake decides", "share"
     ),
-    _number("views", "views", "how many views"),
-    _number("number", "number", "place in the dataset, from 1"),
+    _number_field("views", "views", "how many views"),
+    _number_field("number", "number", "place in the dataset, from 1"),
 )  # fmt: skip
 
 ORDERS = (

@@ -57,33 +57,33 @@ _NOT: Mapping[str, Callable[[Any, Any], Any]] = {
 
 def compares(column: str, op: str, value: float | str) -> Condition:
     """A number or text against a value, by one of < <= > >= =; nothing that is absent does."""
-    condition: Condition = _COMPARED[op](_column(column), value)
+    condition: Condition = _COMPARED[op](_queue_column(column), value)
     return condition
 
 
 def is_absent(column: str) -> Condition:
     """There is no such number."""
-    return _column(column).is_(None)
+    return _queue_column(column).is_(None)
 
 
 def is_empty(column: str) -> Condition:
     """There is no such text."""
-    return or_(_column(column).is_(None), _column(column) == "")
+    return or_(_queue_column(column).is_(None), _queue_column(column) == "")
 
 
 def is_text(column: str, text: str) -> Condition:
     """A text that may be absent is this one; turned round, it is another or absent."""
-    return and_(_column(column).is_not(None), _column(column) == text)
+    return and_(_queue_column(column).is_not(None), _queue_column(column) == text)
 
 
 def is_flag(column: str, value: bool) -> Condition:
     """A flag is set, or is known not to be."""
-    return _column(column).is_(value)
+    return _queue_column(column).is_(value)
 
 
 def contains(column: str, text: str) -> Condition:
     """A text holds another."""
-    return _column(column).contains(text, autoescape=True)
+    return _queue_column(column).contains(text, autoescape=True)
 
 
 def lists(column: str, item: str) -> Condition:
@@ -144,7 +144,7 @@ def opposite(condition: Condition) -> Condition:
     return not_(condition)
 
 
-def _column(name: str) -> InstrumentedAttribute[Any]:
+def _queue_column(name: str) -> InstrumentedAttribute[Any]:
     column: InstrumentedAttribute[Any] = getattr(QueueModel, name)
     return column
 
@@ -194,7 +194,7 @@ class _SortKey:
         return further if self.present or not forward else or_(further, column.is_(None))
 
 
-def _value(column: str | ColumnElement[Any]) -> Any:
+def _order_column(column: str | ColumnElement[Any]) -> Any:
     if not isinstance(column, str):
         return column
     return _COMPUTED.get(column, getattr(QueueModel, column))
@@ -212,7 +212,7 @@ class Order:
 
     def __init__(self, column: str | ColumnElement[Any], descending: bool = False):
         name = column if isinstance(column, str) else ""
-        keys = [(_value(column), descending, name in _PRESENT)]
+        keys = [(_order_column(column), descending, name in _PRESENT)]
         if name != "number":
             keys.append((QueueModel.number, False, True))
         self._keys = [
@@ -244,13 +244,13 @@ class Order:
 
     def after(self, values: Sequence[Key]) -> ColumnElement[bool]:
         """Whether a row comes after the one with these keys."""
-        return self._beyond(values, forward=True)
+        return self._after_or_before(values, forward=True)
 
     def before(self, values: Sequence[Key]) -> ColumnElement[bool]:
         """Whether a row comes before the one with these keys."""
-        return self._beyond(values, forward=False)
+        return self._after_or_before(values, forward=False)
 
-    def _beyond(self, values: Sequence[Key], forward: bool) -> ColumnElement[bool]:
+    def _after_or_before(self, values: Sequence[Key], forward: bool) -> ColumnElement[bool]:
         alternatives = []
         for place, (key, value) in enumerate(zip(self._keys, values, strict=True)):
             pairs = zip(self._keys[:place], values, strict=False)
@@ -298,8 +298,8 @@ class Listing:
     def columns(self, names: Iterable[str], *, by_number: bool = False) -> Sequence[Any]:
         """Some columns of each group."""
         names = list(names)
-        needed = _names(self.conditions) | set(names)
-        statement = _with_index(_index_for(needed), _columns(names).where(*self._where))
+        needed = _column_names(self.conditions) | set(names)
+        statement = _with_index(_index_for(needed), _select_columns(names).where(*self._conditions))
         if by_number:
             statement = statement.order_by(QueueModel.number)
         return self.session.execute(statement).all()
@@ -307,12 +307,12 @@ class Listing:
     def rows_after(self, order: Order, keys: Sequence[Key] | None, limit: int) -> Sequence[Any]:
         """Rows in order with their keys, from the one after these keys on, or from the first."""
         after = [] if keys is None else [order.after(keys)]
-        statement = _rows(order).where(*self._where, *after).limit(limit)
+        statement = _select_rows(order).where(*self._conditions, *after).limit(limit)
         return self.session.execute(statement).all()
 
     def ids(self, order: Order, limit: int | None = None) -> list[int]:
         """Ids in order, of all or of the first."""
-        return self._scalars(self._ids.order_by(*order.ascending).limit(limit))
+        return self._read_ids(self._ids_statement.order_by(*order.ascending).limit(limit))
 
     def ids_from(self, order: Order, start: int, limit: int, total: int) -> list[int]:
         """Ids from a position on, in order, out of ``total``.
@@ -324,48 +324,53 @@ class Listing:
         if count <= 0:
             return []
         behind = total - start - count
-        ids = self._page(order, min(start, behind) + count, total)
+        ids = self._page_of_ids(order, min(start, behind) + count, total)
         if start <= behind:
-            return self._scalars(ids.order_by(*order.ascending).offset(start).limit(count))
+            return self._read_ids(ids.order_by(*order.ascending).offset(start).limit(count))
         backwards = ids.order_by(*order.backwards).offset(behind).limit(count)
-        return self._scalars(backwards)[::-1]
+        return self._read_ids(backwards)[::-1]
 
     def ids_around(
         self, order: Order, keys: Sequence[Key], limit: int, total: int
     ) -> tuple[list[int], list[int]]:
         """Ids just before some keys and just after, the nearest first, out of ``total``."""
-        ids = self._page(order, limit, total)
+        ids = self._page_of_ids(order, limit, total)
         before = ids.where(order.before(keys)).order_by(*order.backwards).limit(limit)
         after = ids.where(order.after(keys)).order_by(*order.ascending).limit(limit)
-        return self._scalars(before), self._scalars(after)
+        return self._read_ids(before), self._read_ids(after)
 
     @property
-    def _where(self) -> list[ColumnElement[bool]]:
+    def _conditions(self) -> list[ColumnElement[bool]]:
         seen = seen_in(self.dataset_id, QueueModel.group_id)
         return [QueueModel.dataset_id == self.dataset_id, *self.conditions, *seen]
 
     @property
-    def _ids(self) -> Select[int]:
-        return select(QueueModel.group_id).where(*self._where)
+    def _ids_statement(self) -> Select[int]:
+        return select(QueueModel.group_id).where(*self._conditions)
 
     def _over_all_groups(self, statement: Any, order: Order | None = None) -> Select[Any]:
         """The statement over all groups."""
-        filtered = statement.select_from(QueueModel).where(*self._where)
-        names = _names(self.conditions) | (set() if order is None else _names(order.keys))
+        filtered = statement.select_from(QueueModel).where(*self._conditions)
+        names = _column_names(self.conditions) | (
+            set() if order is None else _column_names(order.keys)
+        )
         return filtered if _is_sorted(names) else _with_index(_index_for(names), filtered)
 
-    def _page(self, order: Order, reach: int, total: int) -> Select[int]:
+    def _page_of_ids(self, order: Order, reach: int, total: int) -> Select[int]:
         """Ids of which ``reach`` are read in order, out of ``total``."""
         few = self.conditions and reach * _FEW > total
         if few:
-            return _with_index(_index_for(_names(self.conditions) | _names(order.keys)), self._ids)
-        return _with_index(order.index, self._ids)
+            return _with_index(
+                _index_for(_column_names(self.conditions) | _column_names(order.keys)),
+                self._ids_statement,
+            )
+        return _with_index(order.index, self._ids_statement)
 
-    def _scalars(self, statement: Select[int]) -> list[int]:
+    def _read_ids(self, statement: Select[int]) -> list[int]:
         return list(self.session.scalars(statement))
 
 
-def _names(expressions: Iterable[ColumnElement[Any]]) -> set[str]:
+def _column_names(expressions: Iterable[ColumnElement[Any]]) -> set[str]:
     """Columns of the queue that expressions read."""
     return {
         part.name
@@ -394,7 +399,7 @@ def _with_index(index: str | None, statement: Select[Any]) -> Select[Any]:
 
 def read_rows(session: Session, ids: Sequence[int], order: Order) -> Sequence[Any]:
     """The rows of groups in order, with their keys."""
-    return session.execute(_rows(order).where(QueueModel.group_id.in_(ids))).all()
+    return session.execute(_select_rows(order).where(QueueModel.group_id.in_(ids))).all()
 
 
 def read_columns(
@@ -402,7 +407,7 @@ def read_columns(
 ) -> Sequence[Any]:
     """Some columns of those among some groups of one dataset that fulfil conditions, by number."""
     # The dataset is not asked for: SQLite would look through all of it.
-    statement = _columns(names).where(QueueModel.group_id.in_(ids), *conditions)
+    statement = _select_columns(names).where(QueueModel.group_id.in_(ids), *conditions)
     return session.execute(statement.order_by(QueueModel.number)).all()
 
 
@@ -411,7 +416,7 @@ def columns_from(
 ) -> Sequence[Any]:
     """Some columns of the groups of a dataset by id, from the one after an id on."""
     mine = (QueueModel.dataset_id == dataset_id, QueueModel.group_id > after)
-    statement = _columns(names).where(*mine).order_by(QueueModel.group_id).limit(limit)
+    statement = _select_columns(names).where(*mine).order_by(QueueModel.group_id).limit(limit)
     return session.execute(statement).all()
 
 
@@ -469,9 +474,9 @@ def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, 
     return {(name, status): count for name, status, count in session.execute(statement)}
 
 
-def _columns(names: Iterable[str]) -> Select[Any]:
+def _select_columns(names: Iterable[str]) -> Select[Any]:
     return select(*(getattr(QueueModel, name) for name in names))
 
 
-def _rows(order: Order) -> Select[Any]:
+def _select_rows(order: Order) -> Select[Any]:
     return select(*QueueModel.__table__.columns, *order.keys).order_by(*order.ascending)

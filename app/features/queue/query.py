@@ -94,7 +94,7 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
     """
     found: list[Condition] = []
     sort, descending, batch = "", False, None
-    for negative, term in _terms(text, longest):
+    for negative, term in _parse_terms(text, longest):
         if term.field:
             _require_operator(term)
         if term.field == "sort":
@@ -104,16 +104,16 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
                     hint=_REVERSE,
                     pointer=term.pointer,
                 )
-            sort, descending = _sort(term)
+            sort, descending = _parse_sort(term)
         else:
-            condition = _condition(term)
+            condition = _condition_of_term(term)
             if term.field == "batch" and not negative and "," not in term.value:
                 batch = int(term.value)
             found.append(conditions.opposite(condition) if negative else condition)
     return Query(tuple(found), sort or "number", descending, None if sort else batch, text)
 
 
-def _terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
+def _parse_terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
     if len(text) > longest:
         raise InputError(f"a query has at most {longest} characters", pointer="/q")
     place, count = 0, 0
@@ -132,7 +132,7 @@ def _terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
         place = found.end()
 
 
-def _sort(term: _Term) -> tuple[str, bool]:
+def _parse_sort(term: _Term) -> tuple[str, bool]:
     name = term.value.removesuffix("-desc")
     if name not in SORTS:
         raise InputError(
@@ -162,33 +162,33 @@ def _require_operator(term: _Term) -> None:
         )
 
 
-def _condition(term: _Term) -> Condition:
+def _condition_of_term(term: _Term) -> Condition:
     field_ = BY_NAME.get(term.field)
     if field_ is not None and field_.name != term.field:
         term = replace(term, field=field_.name)
     if term.field in NUMBERS:
-        return _number(term)
+        return _number_condition(term)
     if term.field == "submissions" and term.value == "none":
         return conditions.has_annotations("=", 0)
     if term.field == "submissions":
-        return conditions.has_annotations("=" if term.op == ":" else term.op, _value(term))
+        return conditions.has_annotations("=" if term.op == ":" else term.op, _parse_number(term))
     if term.field == "id":
-        return _listed_groups(term)
+        return _listed_ids_condition(term)
     if term.field == "batch":
-        return conditions.is_in_batch(_id(term, text) for text in term.value.split(","))
+        return conditions.is_in_batch(_parse_id(term, text) for text in term.value.split(","))
     if field_ is not None and field_.kind == "flag":
-        return conditions.is_flag(term.field, _choice(term, term.value) == "yes")
+        return conditions.is_flag(term.field, _require_choice(term, term.value) == "yes")
     test = _TESTS[term.field]
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
     return conditions.either(test(term, value) for value in values)
 
 
-def _listed_groups(term: _Term) -> Condition:
-    return conditions.is_one_of(_id(term, text) for text in term.value.split(","))
+def _listed_ids_condition(term: _Term) -> Condition:
+    return conditions.is_one_of(_parse_id(term, text) for text in term.value.split(","))
 
 
-def _id(term: _Term, text: str) -> int:
+def _parse_id(term: _Term, text: str) -> int:
     what = "batch" if term.field == "batch" else "group"
     digits = text.isascii() and text.isdigit() and len(text) <= len(str(MAX_ID))
     if not digits or not 1 <= int(text) <= MAX_ID:
@@ -200,14 +200,14 @@ def _id(term: _Term, text: str) -> int:
     return int(text)
 
 
-def _number(term: _Term) -> Condition:
+def _number_condition(term: _Term) -> Condition:
     column = NUMBERS[term.field]
     if term.value == "none":
         return conditions.is_absent(column)
-    return conditions.compares(column, "=" if term.op == ":" else term.op, _value(term))
+    return conditions.compares(column, "=" if term.op == ":" else term.op, _parse_number(term))
 
 
-def _value(term: _Term) -> float:
+def _parse_number(term: _Term) -> float:
     try:
         value = float(term.value)
     except ValueError:
@@ -221,7 +221,7 @@ def _value(term: _Term) -> float:
     return value
 
 
-def _choice(term: _Term, value: str) -> str:
+def _require_choice(term: _Term, value: str) -> str:
     choices = BY_NAME[term.field].values
     if value not in choices:
         raise InputError(
@@ -232,88 +232,88 @@ def _choice(term: _Term, value: str) -> str:
     return value
 
 
-def _if_any(value: str, some: Condition) -> Condition:
+def _any_or_none_condition(value: str, some: Condition) -> Condition:
     """``some``; the opposite for ``none``."""
     return conditions.opposite(some) if value == "none" else some
 
 
-def _status(term: _Term, value: str) -> Condition:
-    return conditions.compares("status", "=", _choice(term, value))
+def _status_condition(term: _Term, value: str) -> Condition:
+    return conditions.compares("status", "=", _require_choice(term, value))
 
 
-def _finding(term: _Term, value: str) -> Condition:
+def _finding_condition(term: _Term, value: str) -> Condition:
     column = "dismissed" if term.field == "dismissed" else "findings"
     if value in ("any", "none"):
         return conditions.compares(column, "=" if value == "none" else ">", "")
-    return conditions.lists(column, _choice(term, value))
+    return conditions.lists(column, _require_choice(term, value))
 
 
-def _gate(term: _Term, value: str) -> Condition:
+def _gate_condition(term: _Term, value: str) -> Condition:
     """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
     if value == "unsolved":
         return conditions.is_flag("solved", False)
     if value == "none":
         return conditions.is_flag("passes", True)
-    return conditions.compares("gate", "=", _choice(term, value))
+    return conditions.compares("gate", "=", _require_choice(term, value))
 
 
-def _pictures(term: _Term, value: str) -> Condition:
+def _pictures_condition(term: _Term, value: str) -> Condition:
     """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
-    choice = _choice(term, value)
+    choice = _require_choice(term, value)
     if choice == "all":
         return conditions.has_all_pictures()
     return conditions.compares("pictures", "=" if choice == "none" else ">", 0)
 
 
-def _proposal(term: _Term, value: str) -> Condition:
+def _proposal_condition(term: _Term, value: str) -> Condition:
     """What was proposed for a view that has no camera yet."""
-    choice = _choice(term, value)
+    choice = _require_choice(term, value)
     if choice in ("any", "none"):
-        return _if_any(choice, conditions.has_open_proposal())
+        return _any_or_none_condition(choice, conditions.has_open_proposal())
     return conditions.has_open_proposal(choice)
 
 
-def _comments(term: _Term, value: str) -> Condition:
+def _comments_condition(term: _Term, value: str) -> Condition:
     """Whether people say something to each other about it, and whether that is settled."""
-    choice = _choice(term, value)
+    choice = _require_choice(term, value)
     if choice in ("any", "none"):
-        return _if_any(choice, conditions.has_thread())
+        return _any_or_none_condition(choice, conditions.has_thread())
     return conditions.has_thread(choice)
 
 
-def _annotations(term: _Term, value: str) -> Condition:
+def _annotations_condition(term: _Term, value: str) -> Condition:
     """What people's own annotations of it came to."""
-    choice = _choice(term, value)
+    choice = _require_choice(term, value)
     if choice in ("any", "none"):
-        return _if_any(choice, conditions.has_annotations(">", 0))
+        return _any_or_none_condition(choice, conditions.has_annotations(">", 0))
     return conditions.has_outcome("open" if choice == "waiting" else choice)
 
 
-def _mentions(_term: _Term, value: str) -> Condition:
+def _mentions_condition(_term: _Term, value: str) -> Condition:
     """Whom an open thread mentions."""
     if value in ("any", "none"):
-        return _if_any(value, conditions.mentions())
+        return _any_or_none_condition(value, conditions.mentions())
     return conditions.mentions(value.lower())
 
 
-def _view(_term: _Term, value: str) -> Condition:
+def _view_condition(_term: _Term, value: str) -> Condition:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
         return conditions.compares("views", "=", int(value[:9]))
     return conditions.lists("view_keys", value)
 
 
-def _match(_term: _Term, value: str) -> Condition:
+def _match_condition(_term: _Term, value: str) -> Condition:
     return conditions.contains("match", value)
 
 
-def _text(_term: _Term, value: str) -> Condition:
+def _text_condition(_term: _Term, value: str) -> Condition:
     return conditions.either(
         (conditions.contains("label", value), conditions.contains("key", value))
     )
 
 
-def _exact(term: _Term, value: str) -> Condition:
+def _exact_text_condition(term: _Term, value: str) -> Condition:
     if value in ("any", "none"):
         missing = conditions.is_empty(term.field)
         return missing if value == "none" else conditions.opposite(missing)
@@ -321,18 +321,18 @@ def _exact(term: _Term, value: str) -> Condition:
 
 
 _TESTS: dict[str, Callable[[_Term, str], Condition]] = {
-    "status": _status,
-    "finding": _finding,
-    "dismissed": _finding,
-    "gate": _gate,
-    "view": _view,
-    "pictures": _pictures,
-    "proposal": _proposal,
-    "comments": _comments,
-    "mentions": _mentions,
-    "annotations": _annotations,
-    "match": _match,
-    "label": _text,
-    "": _text,
-    **dict.fromkeys(("split", "key", "reviewer", "reason", "override"), _exact),
+    "status": _status_condition,
+    "finding": _finding_condition,
+    "dismissed": _finding_condition,
+    "gate": _gate_condition,
+    "view": _view_condition,
+    "pictures": _pictures_condition,
+    "proposal": _proposal_condition,
+    "comments": _comments_condition,
+    "mentions": _mentions_condition,
+    "annotations": _annotations_condition,
+    "match": _match_condition,
+    "label": _text_condition,
+    "": _text_condition,
+    **dict.fromkeys(("split", "key", "reviewer", "reason", "override"), _exact_text_condition),
 }

@@ -43,7 +43,7 @@ from app.features.people.alias_queries import shown_actor
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import (
     SolutionKey,
-    fitting_solution,
+    current_solution_id,
     read_solutions,
     read_summary,
 )
@@ -94,14 +94,14 @@ _NUMBERS = [
 def refresh_queue(session: Session, group_ids: Sequence[int]) -> None:
     """Project groups, views, verdicts and solutions onto the queue's rows, anew for each group."""
     for start in range(0, len(group_ids), _BATCH):
-        _refresh(session, group_ids[start : start + _BATCH])
+        _replace_rows(session, group_ids[start : start + _BATCH])
 
 
 def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
     """Bring only what verdicts say in step: a fraction of the work of ``refresh_queue``."""
     for start in range(0, len(group_ids), _BATCH):
         ids = group_ids[start : start + _BATCH]
-        verdicts = _verdicts(session, ids)
+        verdicts = _newest_verdicts_by_group(session, ids)
         edited = edited_groups(session, ids)
         heads = session.execute(
             select(GroupModel.id, GroupModel.inputs_hash, QueueModel.passes)
@@ -109,7 +109,7 @@ def refresh_verdicts(session: Session, group_ids: Sequence[int]) -> None:
             .where(GroupModel.id.in_(ids))
         )
         values = [
-            {"of": head.id, **_verdict_values(head, verdicts.get(head.id), edited, head.passes)}
+            {"of": head.id, **_verdict_columns(head, verdicts.get(head.id), edited, head.passes)}
             for head in heads.all()
         ]
         if values:
@@ -139,8 +139,8 @@ def update_row(
     edited = {stored.id} if stored.edited else set[int]()
     values = {
         "changed": stored.changed,
-        **_verdict_values(stored, verdict, edited, summary.passes),
-        **_computed(summary, noticed),
+        **_verdict_columns(stored, verdict, edited, summary.passes),
+        **_solution_columns(summary, noticed),
     }
     session.execute(_ROW, {"row": stored.id, **values})
 
@@ -150,7 +150,7 @@ def update_verdict(
 ) -> None:
     """Show a new verdict in a group's row; the rest of it is in step."""
     edited = {stored.id} if stored.edited else set[int]()
-    session.execute(_ROW, {"row": stored.id, **_verdict_values(stored, verdict, edited, passes)})
+    session.execute(_ROW, {"row": stored.id, **_verdict_columns(stored, verdict, edited, passes)})
 
 
 def differing_rows(session: Session) -> tuple[int, list[int]]:
@@ -166,33 +166,35 @@ def differing_rows(session: Session) -> tuple[int, list[int]]:
         present = session.execute(select(_QUEUE).where(_QUEUE.c.group_id.in_(some)))
         found = {row.group_id: dict(row._mapping) for row in present}
         apart += [
-            row["group_id"] for row in _rows(session, some) if row != found.get(row["group_id"])
+            row["group_id"]
+            for row in _queue_rows(session, some)
+            if row != found.get(row["group_id"])
         ]
     return len(ids), apart
 
 
-def _refresh(session: Session, ids: Sequence[int]) -> None:
-    rows = _rows(session, ids)
+def _replace_rows(session: Session, ids: Sequence[int]) -> None:
+    rows = _queue_rows(session, ids)
     if rows:
         session.execute(_REPLACE, rows)
 
 
-def _rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
+def _queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of groups as they follow from everything else."""
-    views, verdicts = _views(session, ids), _verdicts(session, ids)
+    views, verdicts = _views_by_group(session, ids), _newest_verdicts_by_group(session, ids)
     (findings, dismissals), edited = read_import_findings(session, ids), edited_groups(session, ids)
-    checked = _checked(session, dismissals, findings)
+    checked = _findings_by_dismissal(session, dismissals, findings)
     rows = []
-    for head, summary in _heads(session, ids):
+    for head, summary in _groups_with_summaries(session, ids):
         passes = None if summary is None else summary.passes
-        judged = _verdict_values(head, verdicts.get(head.id), edited, passes)
-        row = {**_head_values(head, views[head.id]), **judged}
-        row.update(_computed(summary, [item.kind for item in findings[head.id]]))
+        judged = _verdict_columns(head, verdicts.get(head.id), edited, passes)
+        row = {**_group_columns(head, views[head.id]), **judged}
+        row.update(_solution_columns(summary, [item.kind for item in findings[head.id]]))
         rows.append(row | checked.get(head.id, {}))
     return rows
 
 
-def _checked(
+def _findings_by_dismissal(
     session: Session,
     dismissals: Mapping[int, GroupDismissals],
     noticed: Mapping[int, Sequence[Any]],
@@ -209,7 +211,7 @@ def _checked(
             SolutionModel.solver_version,
         )
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .join(SolutionModel, SolutionModel.id == fitting_solution())
+        .join(SolutionModel, SolutionModel.id == current_solution_id())
         .where(GroupModel.id.in_(list(dismissals)))
     )
     solutions = read_solutions(session, [SolutionKey(*key) for key in keys], markings=False)
@@ -219,11 +221,16 @@ def _checked(
         own = [Finding(row.kind, row.sentence, view=row.view) for row in noticed[group]]
         found = [*(() if solved is None else solved.findings), *own]
         opened, closed = dismissed_kinds(found, dismissed)
-        checked[group] = {"findings": _list(opened), "dismissed": _list(closed)}
+        checked[group] = {
+            "findings": _comma_separated(opened),
+            "dismissed": _comma_separated(closed),
+        }
     return checked
 
 
-def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSummary | None]]:
+def _groups_with_summaries(
+    session: Session, ids: Sequence[int]
+) -> list[tuple[Any, SolutionSummary | None]]:
     """Groups with the summary of the newest solution of their present state, if there is one.
 
     That of an earlier solver counts until the group is solved again: its numbers stay in the queue.
@@ -231,7 +238,7 @@ def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSumm
     statement = (
         select(*GroupModel.__table__.columns, SolutionModel.summary)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
-        .outerjoin(SolutionModel, SolutionModel.id == fitting_solution())
+        .outerjoin(SolutionModel, SolutionModel.id == current_solution_id())
         .where(GroupModel.id.in_(ids))
     )
     return [
@@ -240,7 +247,7 @@ def _heads(session: Session, ids: Sequence[int]) -> list[tuple[Any, SolutionSumm
     ]
 
 
-def _views(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+def _views_by_group(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
     statement = (
         select(ViewModel.group_id, ViewModel.id, ViewModel.key, ViewModel.media_path)
         .where(ViewModel.group_id.in_(ids))
@@ -252,7 +259,7 @@ def _views(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
     return views
 
 
-def _verdicts(session: Session, ids: Sequence[int]) -> dict[int, Any]:
+def _newest_verdicts_by_group(session: Session, ids: Sequence[int]) -> dict[int, Any]:
     newest = (
         select(func.max(VerdictModel.id))
         .where(VerdictModel.group_id.in_(ids))
@@ -286,7 +293,7 @@ def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]
     return read_import_findings(session, ids)[0]
 
 
-def _head_values(head: Any, views: Sequence[Any]) -> dict[str, Any]:
+def _group_columns(head: Any, views: Sequence[Any]) -> dict[str, Any]:
     main = views[0].id if views and views[0].media_path is not None else None
     names = ("dataset_id", "number", "key", "label", "match", "split", "changed")
     return {
@@ -294,7 +301,7 @@ def _head_values(head: Any, views: Sequence[Any]) -> dict[str, Any]:
         "group_id": head.id,
         "views": len(views),
         "pictures": sum(view.media_path is not None for view in views),
-        "view_keys": _list([view.key for view in views]),
+        "view_keys": _comma_separated([view.key for view in views]),
         "main_view": main,
     }
 
@@ -329,7 +336,7 @@ def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
     return bool(verdict.fixed and accepted and edited and passes is not False)
 
 
-def _verdict_values(
+def _verdict_columns(
     head: Any, verdict: Any, edited: Collection[int], passes: bool | None
 ) -> dict[str, Any]:
     if verdict is None or verdict.state == "unreviewed":
@@ -345,19 +352,19 @@ def _verdict_values(
     }
 
 
-def _computed(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[str, Any]:
+def _solution_columns(summary: SolutionSummary | None, noticed: Sequence[str]) -> dict[str, Any]:
     if summary is None:
         nothing: dict[str, Any] = {**dict.fromkeys(_NUMBERS), "dismissed": ""}
-        return {**nothing, "solved": False, "passes": None, "findings": _list(noticed)}
+        return {**nothing, "solved": False, "passes": None, "findings": _comma_separated(noticed)}
     values = {name: getattr(summary, name) for name in _NUMBERS}
     return {
         **values,
         "passes": summary.passes,
         "solved": True,
-        "findings": _list([*summary.findings, *noticed]),
+        "findings": _comma_separated([*summary.findings, *noticed]),
         "dismissed": "",
     }
 
 
-def _list(items: Sequence[str]) -> str:
+def _comma_separated(items: Sequence[str]) -> str:
     return f",{','.join(dict.fromkeys(items))}," if items else ""

@@ -26,7 +26,7 @@ from app.geometry.arrays import FloatArray, IntArray
 
 def encode(query: Query, keys: Sequence[Key]) -> str:
     """The cursor that continues after the row with these keys."""
-    text = json_text([_name(query), *keys], ascii_=True, compact=True)
+    text = json_text([_cursor_name(query), *keys], ascii_=True, compact=True)
     return base64.urlsafe_b64encode(text.encode()).decode().rstrip("=")
 
 
@@ -39,7 +39,7 @@ def decode(query: Query, cursor: str) -> list[Key]:
     except (binascii.Error, ValueError, TypeError) as error:
         raise InputError("the cursor is invalid", pointer="/cursor") from error
     sound = all(map(_is_key, values))
-    if name != _name(query) or len(values) != len(query.order.keys) or not sound:
+    if name != _cursor_name(query) or len(values) != len(query.order.keys) or not sound:
         raise InputError(
             "this cursor belongs to another query; request the first page without a cursor",
             pointer="/cursor",
@@ -47,7 +47,7 @@ def decode(query: Query, cursor: str) -> list[Key]:
     return list(values)
 
 
-def _name(query: Query) -> str:
+def _cursor_name(query: Query) -> str:
     """What tells a query from others: its order, and a digest of its conditions."""
     order = query.sort + ("-desc" if query.descending else "")
     if query.batch is not None:
@@ -208,12 +208,12 @@ def list_groups(
     following = encode(parsed, order.keys_of(rows[-1])) if more else None
     found = [
         replace(
-            _row(row, comments),
+            _group_row(row, comments),
             submissions=annotations.get(row.group_id, 0),
             annotations=states.get(row.group_id),
         )
         if annotations
-        else _row(row, comments)
+        else _group_row(row, comments)
         for row in rows
     ]
     return Page(found, following, total)
@@ -263,17 +263,17 @@ _STORED = [
 ]
 
 
-def _row(row: Any, comments: Mapping[int, int]) -> GroupRow:
+def _group_row(row: Any, comments: Mapping[int, int]) -> GroupRow:
     return GroupRow(
         id=row.group_id,
-        findings=_kinds(row.findings),
-        dismissed=_kinds(row.dismissed),
+        findings=_split_kinds(row.findings),
+        dismissed=_split_kinds(row.dismissed),
         comments=comments.get(row.group_id, 0),
         **{name: getattr(row, name) for name in _STORED},
     )
 
 
-def _kinds(text: str) -> tuple[str, ...]:
+def _split_kinds(text: str) -> tuple[str, ...]:
     """A list between commas."""
     return tuple(text.strip(",").split(",")) if text else ()
 

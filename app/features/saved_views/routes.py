@@ -34,7 +34,7 @@ def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
     return SavedViewList(items=found)
 
 
-def _saved(view: SavedView) -> Response:
+def _saved_view_response(view: SavedView) -> Response:
     headers = {"Location": f"/api/v1/saved-views/{view.id}"}
     return document(view, 201, headers)
 
@@ -53,7 +53,7 @@ def _saved(view: SavedView) -> Response:
     },
 )
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
-@responds(_saved)
+@responds(_saved_view_response)
 def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor) -> SavedView:
     """Keep a query under a name; 409 when the name is taken."""
     values = view.model_dump()

@@ -50,7 +50,11 @@ def list_saved_views(store: Store, dataset_id: int) -> list[SavedView]:
     """The saved views of a dataset, by name, each with the number of groups that match."""
     with store.read() as session:
         rows = dataset_saved_views(session, dataset_id)
-        return [_saved_view(row, _matching(session, row)) for row in rows if _is_visible(row)]
+        return [
+            _saved_view(row, _count_matching_groups(session, row))
+            for row in rows
+            if _is_visible(row)
+        ]
 
 
 def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -> SavedView:
@@ -80,7 +84,7 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
                 hint="Delete one of yours first.",
             )
         identity = insert_saved_view(session, dataset_id, name=name, query=q.strip(), actor=actor)
-        saved = _read(session, identity)
+        saved = _read_visible_view(session, identity)
         session.respond(saved)
     return saved
 
@@ -88,7 +92,7 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
 def get_view(store: Store, view_id: int) -> SavedView:
     """A saved view; raises NotFoundError when there is none."""
     with store.read() as session:
-        return _read(session, view_id)
+        return _read_visible_view(session, view_id)
 
 
 def delete_view(store: Store, view_id: int) -> SavedView:
@@ -98,17 +102,17 @@ def delete_view(store: Store, view_id: int) -> SavedView:
         NotFoundError: There is none.
     """
     with store.write() as session:
-        view = _read(session, view_id)
+        view = _read_visible_view(session, view_id)
         delete_saved_view(session, view_id)
         session.respond(view)
     return view
 
 
-def _read(session: Session, view_id: int) -> SavedView:
+def _read_visible_view(session: Session, view_id: int) -> SavedView:
     row = find_saved_view(session, view_id)
     if row is None or not _is_visible(row):
         raise NotFoundError(f"there is no saved view {view_id}")
-    return _saved_view(row, _matching(session, row))
+    return _saved_view(row, _count_matching_groups(session, row))
 
 
 def _is_visible(row: Any) -> bool:
@@ -116,7 +120,7 @@ def _is_visible(row: Any) -> bool:
     return judges_in(row.dataset_id) or not reads_hidden_work(row.query)
 
 
-def _matching(session: Session, row: Any) -> int:
+def _count_matching_groups(session: Session, row: Any) -> int:
     """How many groups match; none where a query of an older version is no longer understood."""
     try:
         conditions = parse_query(row.query).conditions

@@ -32,7 +32,7 @@ def to_json(value: Any) -> Any:
     A field that came later (``metadata``) stands there only where it says something, so that what
     was computed before it came is the same bytes.
     """
-    return _codec(type(value))[0](value)
+    return _codec_of_type(type(value))[0](value)
 
 
 def from_json(kind: type[T], value: Any) -> T:
@@ -42,7 +42,7 @@ def from_json(kind: type[T], value: Any) -> T:
         DamagedError: It is not what ``to_json`` makes.
     """
     with as_written():
-        result: T = _codec(kind)[1](value)
+        result: T = _codec_of_type(kind)[1](value)
     return result
 
 
@@ -51,27 +51,27 @@ def dumps(value: Any) -> str:
     try:
         return json.dumps(value, separators=(",", ":"), allow_nan=False)
     except ValueError:
-        return json.dumps(_named(value), separators=(",", ":"), allow_nan=False)
+        return json.dumps(_name_non_finite(value), separators=(",", ":"), allow_nan=False)
 
 
-def _named(value: Any) -> Any:
+def _name_non_finite(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, dict):
-        return {key: _named(item) for key, item in value.items()}
-    return [_named(item) for item in value] if isinstance(value, list | tuple) else value
+        return {key: _name_non_finite(item) for key, item in value.items()}
+    return [_name_non_finite(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _identity(value: Any) -> Any:
     return value
 
 
-def _codec(hint: Any) -> Codec:
-    return _compiled(hint)
+def _codec_of_type(hint: Any) -> Codec:
+    return _make_codec(hint)
 
 
 @cache
-def _compiled(hint: Any) -> Codec:
+def _make_codec(hint: Any) -> Codec:
     if hint is float:
         # ``float`` also reads the names of numbers that are not finite.
         return _identity, float
@@ -95,7 +95,7 @@ def _compiled(hint: Any) -> Codec:
 
 def _dataclass_codec(kind: Any) -> Codec:
     hints = typing.get_type_hints(kind)
-    codecs = [(item.name, *_codec(hints[item.name])) for item in dataclasses.fields(kind)]
+    codecs = [(item.name, *_codec_of_type(hints[item.name])) for item in dataclasses.fields(kind)]
     later = {
         item.name: item.default for item in dataclasses.fields(kind) if "later" in item.metadata
     }
@@ -120,23 +120,23 @@ def _dataclass_codec(kind: Any) -> Codec:
             # The name of a number that is not finite is no number to it.
             return decode(value)
 
-    if not _is_plain(kind):
+    if not _is_plain_json_type(kind):
         return encode if later else whole, decode
     look_through(kind)
     return encode if later else whole, decode_plain
 
 
-def _is_plain(hint: Any) -> bool:
+def _is_plain_json_type(hint: Any) -> bool:
     """Whether JSON holds a type as a library reads it; a camera has a codec of its own."""
     if hint is Camera:
         return False
     hints = typing.get_type_hints(hint).values() if dataclasses.is_dataclass(hint) else ()
-    return all(map(_is_plain, (*hints, *typing.get_args(hint))))
+    return all(map(_is_plain_json_type, (*hints, *typing.get_args(hint))))
 
 
 def _optional_codec(arguments: tuple[Any, ...]) -> Codec:
     (inner,) = (item for item in arguments if item is not type(None))
-    to, back = _codec(inner)
+    to, back = _codec_of_type(inner)
     return (
         lambda value: None if value is None else to(value),
         lambda value: None if value is None else back(value),
@@ -145,14 +145,14 @@ def _optional_codec(arguments: tuple[Any, ...]) -> Codec:
 
 def _tuple_codec(arguments: tuple[Any, ...]) -> Codec:
     if len(arguments) == 2 and arguments[1] is Ellipsis:
-        to, back = _codec(arguments[0])
+        to, back = _codec_of_type(arguments[0])
         if to is _identity:
             return list, lambda value: tuple(map(back, value))
         return (
             lambda value: [to(item) for item in value],
             lambda value: tuple(map(back, value)),
         )
-    codecs = [_codec(item) for item in arguments]
+    codecs = [_codec_of_type(item) for item in arguments]
     return (
         lambda value: [to(item) for (to, _), item in zip(codecs, value, strict=True)],
         lambda value: tuple(back(item) for (_, back), item in zip(codecs, value, strict=True)),

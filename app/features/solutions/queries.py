@@ -80,7 +80,7 @@ def is_solved() -> ColumnElement[bool]:
     )
 
 
-def fitting_solution() -> ScalarSelect[int]:
+def current_solution_id() -> ScalarSelect[int]:
     """Id of the solution of a group's present state under its dataset's policy: of this solver, else of
     the newest one that solved it.
 
@@ -187,7 +187,7 @@ def insert_solutions(
     if solutions:
         session.execute(
             insert(_SOLUTION).on_conflict_do_nothing(),
-            [_row(key, encoded) for key, encoded in solutions],
+            [_solution_columns(key, encoded) for key, encoded in solutions],
         )
 
 
@@ -206,7 +206,7 @@ def insert_calibrations(session: Session, bodies: Mapping[str, bytes]) -> None:
         )
 
 
-def _row(key: SolutionKey, encoded: EncodedSolution) -> dict[str, object]:
+def _solution_columns(key: SolutionKey, encoded: EncodedSolution) -> dict[str, object]:
     return {
         "group_id": key.group_id,
         "inputs_hash": key.inputs_hash,
@@ -248,7 +248,8 @@ def read_solutions(
     calibrations = {key: decode(body) for key, body in bodies.items()}
     with as_written():
         return {
-            row.group_id: with_calibrations(_bare_solution(row.body), calibrations) for row in rows
+            row.group_id: with_calibrations(_solution_without_calibrations(row.body), calibrations)
+            for row in rows
         }
 
 
@@ -266,7 +267,7 @@ def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration
 
 
 @lru_cache(maxsize=128)
-def _bare_solution(body: bytes) -> Solution:
+def _solution_without_calibrations(body: bytes) -> Solution:
     return value_codec.from_json(Solution, parse(inflate(body)))
 
 
@@ -294,12 +295,12 @@ def undetermined(session: Session, keys: Collection[str]) -> set[str]:
         _SEEN.clear()
     for start in range(0, len(unseen), _BATCH):
         bodies = read_calibration_bodies(session, unseen[start : start + _BATCH])
-        found.update((key, _leaves_open(body)) for key, body in bodies.items())
+        found.update((key, _is_undetermined(body)) for key, body in bodies.items())
     _SEEN.update(found)
     return {key for key, is_open in found.items() if is_open}
 
 
-def _leaves_open(body: bytes) -> bool:
+def _is_undetermined(body: bytes) -> bool:
     """Told from the text: to decode it would take ten times as long."""
     text = inflate(body)
     return b'"camera":null' in text or b'"unobservable":[]' not in text

@@ -161,12 +161,12 @@ def rethreshold_task(task: RethresholdTask) -> list[Result]:
     What is damaged is left out, like all others: it is solved.
     """
     try:
-        return [result for kept in _by_policy(task) for result in _rethreshold(task, kept)]
+        return [result for kept in _kept_by_policy(task) for result in _rethreshold(task, kept)]
     except DamagedError:
         return []
 
 
-def _by_policy(task: RethresholdTask) -> Iterator[list[KeptSolution]]:
+def _kept_by_policy(task: RethresholdTask) -> Iterator[list[KeptSolution]]:
     for digest in task.before:
         kept = [item for item in task.kept if item.policy_hash == digest]
         if kept:
@@ -286,7 +286,7 @@ def solve_dataset(
     report = SolveReport(total=len(ids))
 
     def keep(results: Sequence[Result]) -> None:
-        _save(store, results, report)
+        _save_results(store, results, report)
         if progress is not None:
             progress(report.solved + len(report.failed), report.total)
 
@@ -296,20 +296,22 @@ def solve_dataset(
     if report.solved:
         left = set(stale_groups(store, dataset))
         ids = [number for number in ids if number in left]
-    _calibrate_shared(store, found)
+    _calibrate_static_cameras(store, found)
     largest = CHUNK if executor is not None else min(CHUNK, CHUNK_HERE)
-    tasks = (_task(store, found, chunk) for chunk in _chunks(ids, largest))
+    tasks = (_make_task(store, found, chunk) for chunk in _split_into_chunks(ids, largest))
     for results in fan_out(solve_task, tasks, executor, stop):
         keep(results)
     if report.failing["jac"]:
         with store.read() as session:
-            off = contradicted_cameras(_shared(session, found.id), found.policy)
+            off = contradicted_cameras(
+                _static_cameras_with_pitches(session, found.id), found.policy
+            )
         where = f"{report.failing['jac']:,} of {report.solved:,} groups fail first at the gate jac"
         report.advice = sentence_of(off, where, _AGAIN) if off else ""
     return report
 
 
-def _chunks(ids: Sequence[int], largest: int) -> Iterator[Sequence[int]]:
+def _split_into_chunks(ids: Sequence[int], largest: int) -> Iterator[Sequence[int]]:
     start, size = 0, FIRST_CHUNK
     while start < len(ids):
         yield ids[start : start + size]
@@ -333,7 +335,7 @@ def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Cali
     return Result(key, group.key, solution.passes, encoded)
 
 
-def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
+def _save_results(store: Store, results: Sequence[Result], report: SolveReport) -> None:
     solutions = [(item.key, item.solution) for item in results if item.solution is not None]
     if not results:
         return
@@ -347,7 +349,7 @@ def _save(store: Store, results: Sequence[Result], report: SolveReport) -> None:
     report.failed += [(item.group, item.problem) for item in results if item.solution is None]
 
 
-def _task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Task:
+def _make_task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Task:
     with store.read() as session:
         policy = read_dataset_head(session, dataset.id).policy
         stored = read_groups(session, ids, extras=False).values()
@@ -360,13 +362,13 @@ def _task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Task:
     return Task(groups, policy, known)
 
 
-def _calibrate_shared(store: Store, dataset: DatasetHead) -> None:
+def _calibrate_static_cameras(store: Store, dataset: DatasetHead) -> None:
     """Calibrate each static camera once, before the chunks that all need it are sent out."""
     policy = dataset.policy
     with store.read() as session:
         cameras = {
             calibration_key(station, pitch, policy.calibration): (station, pitch)
-            for station, pitch in _shared(session, dataset.id)
+            for station, pitch in _static_cameras_with_pitches(session, dataset.id)
         }
         known = read_calibration_bodies(session, cameras)
     bodies = {
@@ -379,7 +381,9 @@ def _calibrate_shared(store: Store, dataset: DatasetHead) -> None:
             insert_calibrations(session, bodies)
 
 
-def _shared(session: Session, dataset_id: int) -> Iterable[tuple[Station, Pitch]]:
+def _static_cameras_with_pitches(
+    session: Session, dataset_id: int
+) -> Iterable[tuple[Station, Pitch]]:
     """Static cameras with each size of pitch that their groups have."""
     places = station_pitches(session, dataset_id)
     stations = read_stations(session, {station for station, _ in places})

@@ -48,11 +48,11 @@ class KeptSolution:
         Raises:
             DamagedError: It is not what was written.
         """
-        bare: Solution = value_codec.from_json(Solution, self._value)
+        bare: Solution = value_codec.from_json(Solution, self._body_json)
         return bare
 
     @cached_property
-    def _value(self) -> Json:
+    def _body_json(self) -> Json:
         return parse(inflate(self.body))
 
     def encode(self, solution: Solution) -> EncodedSolution:
@@ -66,9 +66,11 @@ class KeptSolution:
         before = self.solution
         with as_written():
             value = {
-                **self._value,
-                "gates": _changed(self._value["gates"], before.gates, solution.gates),
-                "findings": _changed(self._value["findings"], before.findings, solution.findings),
+                **self._body_json,
+                "gates": _json_of_changed(self._body_json["gates"], before.gates, solution.gates),
+                "findings": _json_of_changed(
+                    self._body_json["findings"], before.findings, solution.findings
+                ),
                 "policy_hash": solution.policy_hash,
             }
             keys = tuple(parse(self.calibrations))
@@ -76,7 +78,9 @@ class KeptSolution:
         return EncodedSolution({}, keys, summary, compress(value), self.facts)
 
 
-def _changed(values: Sequence[Json], before: Sequence[object], now: Sequence[object]) -> list[Json]:
+def _json_of_changed(
+    values: Sequence[Json], before: Sequence[object], now: Sequence[object]
+) -> list[Json]:
     """JSON values of what was before, with those of what is another value now."""
     return [
         value if old is new else value_codec.to_json(new)
@@ -171,23 +175,23 @@ def decode_row(session: Session, row: Any) -> Solution:
 def damaged_calibrations(session: Session) -> Iterator[tuple[str, bool]]:
     """The key of every calibration, and whether it is no longer what was written."""
     statement = select(CalibrationModel.key, CalibrationModel.body)
-    for row in _streamed(session, statement):
-        yield row.key, not _reads(unpack, row.body)
+    for row in _stream_rows(session, statement):
+        yield row.key, not _is_readable(unpack, row.body)
 
 
 def damaged_readings(session: Session) -> Iterator[tuple[str, bool]]:
     """The digest of everything that was read of paint, and whether it is that of its content no
     longer."""
     statement = select(PaintEvidenceModel.digest, PaintEvidenceModel.body)
-    for row in _streamed(session, statement):
-        yield row.digest, not _reads(reading_of, row.digest, row.body)
+    for row in _stream_rows(session, statement):
+        yield row.digest, not _is_readable(reading_of, row.digest, row.body)
 
 
-def _streamed(session: Session, statement: Select[*tuple[Any, ...]]) -> Iterator[Any]:
+def _stream_rows(session: Session, statement: Select[*tuple[Any, ...]]) -> Iterator[Any]:
     return iter(session.execute(statement, execution_options={"yield_per": _BATCH}))
 
 
-def _reads(read: Callable[..., object], *stored: object) -> bool:
+def _is_readable(read: Callable[..., object], *stored: object) -> bool:
     try:
         read(*stored)
     except StorageError:

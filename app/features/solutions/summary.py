@@ -57,34 +57,34 @@ class SolutionSummary:
 def summarize(group: Group, solution: Solution) -> SolutionSummary:
     """The summary of a group's solution."""
     ball = solution.ball
-    error_px, error_percent = _error(group, solution)
+    error_px, error_percent = _reprojection_error(group, solution)
     return SolutionSummary(
-        **_decided(solution),
-        min_jac=_min_jac(solution),
+        **_gate_columns(solution),
+        min_jac=_smallest_jac(solution),
         error_px=error_px,
         error_percent=error_percent,
-        sigma_m=_finite(ball.sigma_m) if ball else None,
+        sigma_m=_finite_or_none(ball.sigma_m) if ball else None,
         parallax_degrees=ball.parallax_degrees if ball else None,
-        size_ratio=_size_ratio(solution),
+        size_ratio=_worst_size_ratio(solution),
         height_m=height_above_grass(ball.point[2]) if ball else None,
         findings=tuple(dict.fromkeys(finding.kind for finding in solution.findings)),
-        distance_m=_distance(solution),
-        box_px=_box(group, solution),
+        distance_m=_ball_distance(solution),
+        box_px=_box_diameter(group, solution),
         x_m=ball.point[0] if ball else None,
         y_m=ball.point[1] if ball else None,
-        agreement=_agreement(group, solution),
+        agreement=_paint_agreement(group, solution),
     )
 
 
 def summarize_gates(before: SolutionSummary, solution: Solution) -> SolutionSummary:
     """The summary of a solution that is that of ``before`` but for what its gates say."""
-    return replace(before, **_decided(solution))
+    return replace(before, **_gate_columns(solution))
 
 
-def _decided(solution: Solution) -> dict[str, Any]:
+def _gate_columns(solution: Solution) -> dict[str, Any]:
     """What a summary says of gates."""
     failing = solution.first_failing
-    decisive = failing or _nearest(solution.gates)
+    decisive = failing or _gate_nearest_to_failing(solution.gates)
     margin = decisive.margin if decisive else None
     return {
         "passes": solution.passes,
@@ -100,11 +100,11 @@ COUNTED = frozenset({"calibratable", "two_views", "ball"})
 """Gates that count views."""
 
 
-def _finite(value: float | None) -> float | None:
+def _finite_or_none(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
+def _gate_nearest_to_failing(gates: tuple[Gate, ...]) -> Gate | None:
     """Of gates that pass, the one nearest to failing; two views of two are enough, not near."""
     measured = [
         gate
@@ -114,19 +114,19 @@ def _nearest(gates: tuple[Gate, ...]) -> Gate | None:
     return min(measured, key=lambda gate: gate.margin or 0.0, default=None)
 
 
-def _min_jac(solution: Solution) -> float | None:
+def _smallest_jac(solution: Solution) -> float | None:
     # The first of GAMMAS_PERCENT is the one that curation speaks of.
     measured = (view.calibration.jac for view in solution.views)
     return min((jac[0] for jac in measured if jac), default=None)
 
 
-def _agreement(group: Group, solution: Solution) -> float | None:
+def _paint_agreement(group: Group, solution: Solution) -> float | None:
     used = {view.key for view in group.views if view.included}
     found = (view.calibration.agreement for view in solution.views if view.view in used)
     return min((value for value in found if value is not None), default=None)
 
 
-def _error(group: Group, solution: Solution) -> tuple[float | None, float | None]:
+def _reprojection_error(group: Group, solution: Solution) -> tuple[float | None, float | None]:
     """What the gate of the reprojection judges, in pixels and in per cent of its view's diagonal."""
     judged = (gate.value for gate in solution.gates if gate.name == "reprojection")
     error = next(judged, None)
@@ -135,10 +135,10 @@ def _error(group: Group, solution: Solution) -> tuple[float | None, float | None
             view = group.view(key)
             if apart == error and view is not None:
                 return error, 100.0 * apart / view.size.diagonal
-    return _finite(error), None
+    return _finite_or_none(error), None
 
 
-def _fits(solution: Solution) -> list[BallFit]:
+def _ball_fits(solution: Solution) -> list[BallFit]:
     """Fits of the views that the ball comes from."""
     if solution.ball is None:
         return []
@@ -146,30 +146,30 @@ def _fits(solution: Solution) -> list[BallFit]:
     return [view.ball for view in views if view.ball is not None]
 
 
-def _size_ratio(solution: Solution) -> float | None:
-    ratios = [fit.size_ratio for fit in _fits(solution) if fit.size_ratio]
+def _worst_size_ratio(solution: Solution) -> float | None:
+    ratios = [fit.size_ratio for fit in _ball_fits(solution) if fit.size_ratio]
     return max(ratios, key=lambda ratio: abs(math.log(ratio)), default=None)
 
 
-def _first(solution: Solution) -> ViewSolution | None:
+def _first_ball_view(solution: Solution) -> ViewSolution | None:
     """The first view that the ball comes from, most often the main camera's."""
     return solution.view(solution.ball.views[0]) if solution.ball is not None else None
 
 
-def _distance(solution: Solution) -> float | None:
-    first, ball = _first(solution), solution.ball
+def _ball_distance(solution: Solution) -> float | None:
+    first, ball = _first_ball_view(solution), solution.ball
     if first is None or ball is None or first.calibration.camera is None:
         return None
     return math.dist(ball.point, first.calibration.camera.position.tolist())
 
 
-def _box(group: Group, solution: Solution) -> float | None:
+def _box_diameter(group: Group, solution: Solution) -> float | None:
     annotated = {
         view.key: view.ball.box.diameter if view.ball.box is not None else None
         for view in group.views
         if view.included and view.ball is not None
     }
-    first = _first(solution)
+    first = _first_ball_view(solution)
     if first is None:
         return next((diameter for diameter in annotated.values() if diameter is not None), None)
     optimized = first.ball.optimized_diameter_px if first.ball is not None else None

@@ -262,7 +262,7 @@ def solve_work(store: Store, pool: Pool, progress: JobProgress) -> Json:
     actor, edited = progress.job.actor, bool((progress.job.request or {}).get(EDITED))
     found = get_dataset_head(store, progress.dataset_id)
     progress(0, None, f"Solving {found.name}.")
-    stale, whole = len(stale_groups(store, found.id)), _group_count(store, found.id)
+    stale, whole = len(stale_groups(store, found.id)), _count_groups(store, found.id)
     # A change of the policy may have met an edit's job that waited.
     follow = not edited or stale > MOSTLY * whole
     large = stale >= WORTH_A_POOL or len(stale_matches(store, found.id)) >= MATCHES_WORTH_A_POOL
@@ -271,15 +271,15 @@ def solve_work(store: Store, pool: Pool, progress: JobProgress) -> Json:
         report = solve_fully(store, found.id, executor, counter, actor=actor, follow=follow)
     count_yield(store, found.id, report, progress)
     progress(report.total, report.total, report.sentence)
-    return {"policy": found.policy.name, **_report(report)}
+    return {"policy": found.policy.name, **_report_values(report)}
 
 
-def _group_count(store: Store, dataset_id: int) -> int:
+def _count_groups(store: Store, dataset_id: int) -> int:
     with store.read() as session:
         return len(group_ids(session, dataset_id))
 
 
-def _report(report: SolveReport) -> Json:
+def _report_values(report: SolveReport) -> Json:
     named = [{"group": key, "problem": problem} for key, problem in report.failed[:NAMED]]
     return {
         "groups": report.total,

@@ -86,7 +86,7 @@ def patch_lines(
     """
     edit = SetStationLines(lines.points(), tuple(lines.proposed), tuple(lines.not_visible))
     change = partial(submit_station, edit=edit)
-    return _change(services, station, group, change, if_match, actor)
+    return _change_station(services, station, group, change, if_match, actor)
 
 
 @router.patch(
@@ -107,7 +107,7 @@ def patch_station(
 ) -> GroupState:
     """Choose whether the given calibration counts or the lines; If-Match as for lines."""
     edited = partial(submit_station, edit=SetStationCalibration(change.calibration))
-    return _change(services, station, group, edited, if_match, actor)
+    return _change_station(services, station, group, edited, if_match, actor)
 
 
 @router.post(
@@ -126,7 +126,7 @@ def undo(
     group: GroupOfStation = None,
 ) -> GroupState:
     """Take the last edit of a static camera back; 409 when there is none."""
-    return _change(services, station, group, undo_station, if_match, actor)
+    return _change_station(services, station, group, undo_station, if_match, actor)
 
 
 @router.post(
@@ -145,10 +145,10 @@ def redo(
     group: GroupOfStation = None,
 ) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""
-    return _change(services, station, group, redo_station, if_match, actor)
+    return _change_station(services, station, group, redo_station, if_match, actor)
 
 
-def _change(
+def _change_station(
     services: Services,
     station: int,
     group: int | None,

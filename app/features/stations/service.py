@@ -63,7 +63,7 @@ class StationState:
 
 
 @dataclass(frozen=True)
-class _Change:
+class _StationChange:
     kind: str
     body: Json
     station: Station
@@ -83,7 +83,7 @@ class _EditOptions(TypedDict):
     shown: NotRequired[int | None]
 
 
-_Plan = Callable[[Session, StationState], _Change]
+_Plan = Callable[[Session, StationState], _StationChange]
 _Trial = tuple[StoredGroup, Group, Mapping[str, Calibration]]
 
 
@@ -120,7 +120,7 @@ def submit_station(
         InputError: The edit says something impossible.
     """
 
-    return _change(store, station_id, _plan_edit(edit), **how)
+    return _change_station(store, station_id, _plan_edit(edit), **how)
 
 
 def submit_stations(
@@ -162,7 +162,7 @@ def undo_stations(store: Store, states: Sequence[StationState], *, actor: str) -
 def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: str) -> None:
     groups: set[int] = set()
     for station_id, plan, etag in steps:
-        state, change = _planned(session, station_id, plan, etag)
+        state, change = _plan_change(session, station_id, plan, etag)
         if change.station != state.station:
             _save(session, state, change, actor)
             groups.update(state.groups)
@@ -171,15 +171,15 @@ def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: 
 
 def undo_station(store: Store, station_id: int, **how: Unpack[_EditOptions]) -> StationState:
     """Take the last edit of a static camera back; raises ConflictError without one."""
-    return _change(store, station_id, _plan_step("undo"), **how)
+    return _change_station(store, station_id, _plan_step("undo"), **how)
 
 
 def redo_station(store: Store, station_id: int, **how: Unpack[_EditOptions]) -> StationState:
     """Do again what undo took back last; raises ConflictError without such an edit."""
-    return _change(store, station_id, _plan_step("redo"), **how)
+    return _change_station(store, station_id, _plan_step("redo"), **how)
 
 
-def _change(
+def _change_station(
     store: Store,
     station_id: int,
     plan: _Plan,
@@ -189,14 +189,14 @@ def _change(
     shown: int | None = None,
 ) -> StationState:
     with store.read() as session:
-        state, change = _planned(session, station_id, plan, if_match)
+        state, change = _plan_change(session, station_id, plan, if_match)
         if change.station == state.station:
             return state
-        trial = None if shown is None else _trial(session, shown, change.station)
+        trial = None if shown is None else _trial_group(session, shown, change.station)
     solutions = [] if trial is None else [_solved(*trial)]
     with store.write() as session:
         # Planned once more: others may have edited it while the group was solved.
-        state, change = _planned(session, station_id, plan, if_match)
+        state, change = _plan_change(session, station_id, plan, if_match)
         _save(session, state, change, actor)
         insert_solutions(session, solutions)
         refresh_queue(session, state.groups)
@@ -206,9 +206,9 @@ def _change(
     return replace(load_station(store, station_id), shown=saved)
 
 
-def _planned(
+def _plan_change(
     session: Session, station_id: int, plan: _Plan, if_match: str
-) -> tuple[StationState, _Change]:
+) -> tuple[StationState, _StationChange]:
     state = _read(session, station_id)
     if not state.station.shared:
         raise ConflictError(
@@ -219,7 +219,7 @@ def _planned(
     return state, plan(session, state)
 
 
-def _trial(session: Session, group_id: int, station: Station) -> _Trial:
+def _trial_group(session: Session, group_id: int, station: Station) -> _Trial:
     """A group with another station, and what is known of its calibrations."""
     stored = read_record(session, group_id).stored
     view = next(view for view in stored.group.views if view.station.key == station.key)
@@ -234,7 +234,7 @@ def _solved(
     return key, solve_encoded(group, stored.policy, known)[1]
 
 
-def _save(session: Session, state: StationState, change: _Change, actor: str) -> None:
+def _save(session: Session, state: StationState, change: _StationChange, actor: str) -> None:
     save_station(session, state.stored, change.station)
     refresh_inputs_hashes(session, state.groups)
     entry = Entry(change.kind, actor, now(), change.body, state.dataset_id, station_id=state.id)
@@ -261,12 +261,12 @@ def _read(session: Session, station_id: int) -> StationState:
 
 
 def _plan_edit(edit: StationEdit) -> _Plan:
-    def plan(_session: Session, state: StationState) -> _Change:
+    def plan(_session: Session, state: StationState) -> _StationChange:
         station = state.station
         if isinstance(edit, SetStationLines):
             require_point_limits(f"camera {station.key}", station.lines, edit.lines)
         body = edit_and_inverse_to_json(edit, edit.inverse(station))
-        return _Change("station_edit", body, edit.apply(station))
+        return _StationChange("station_edit", body, edit.apply(station))
 
     return plan
 
@@ -274,10 +274,10 @@ def _plan_edit(edit: StationEdit) -> _Plan:
 def _plan_step(kind: str) -> _Plan:
     """Undo or redo."""
 
-    def plan(session: Session, state: StationState) -> _Change:
+    def plan(session: Session, state: StationState) -> _StationChange:
         stacks = read_station_stacks(session, state.id)
         body = undo_entry_body(session, stacks, kind, "for this camera")
         station = station_edit_from_json(body["edit"]).apply(state.station)
-        return _Change(f"station_{kind}", body, station)
+        return _StationChange(f"station_{kind}", body, station)
 
     return plan

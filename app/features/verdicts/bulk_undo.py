@@ -68,7 +68,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
             batch = _active_batch(session, batch_id)
             left = chunks(batch.spans)[number:]
             # What another run has taken back is not taken back again: it is not the newest.
-            verdicts = _restore(session, batch, *left[0], actor) if left else []
+            verdicts = _restore_chunk(session, batch, *left[0], actor) if left else []
             spans = with_span(batch.undo_spans or (), [item.id for item in verdicts])
             update_batch(session, batch_id, undo_spans=spans)
             restored += len({item.group_id for item in verdicts})
@@ -126,7 +126,7 @@ def read_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
     return batch
 
 
-def _restore(
+def _restore_chunk(
     session: Session, batch: StoredBulkVerdict, first: int, last: int, actor: str
 ) -> list[StoredVerdict]:
     """Take one chunk back; returns the verdicts that do it, of groups not judged since."""
@@ -193,14 +193,14 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
         verdict = check_verdict(batch.state, batch.reason, batch.note)
         run = BatchRun(batch.dataset_id, batch.query, verdict, actor, batch_id)
         begun = run.resume(session)
-    spans = _spans(batch) if begun is None else begun["left"]
+    spans = _undo_spans(batch) if begun is None else begun["left"]
     refused: Counter[str] = Counter({} if begun is None else begun["refused"])
     if not spans:
-        return _report(batch, run, refused)
+        return _redo_report(batch, run, refused)
     for number, (first, last) in enumerate(spans, 1):
         with store.write() as session:
             run.batch = _unfinished_redo(session, batch_id, actor)
-            ids = _unchanged(session, batch.spans, first, last)
+            ids = _groups_unchanged_since(session, batch.spans, first, last)
             rows = read_columns(session, ids, (), ASKED)
             found = select_groups(session, batch.dataset_id, rows, verdict)
             run.save(session, found.change)
@@ -212,18 +212,18 @@ def redo_batch(store: Store, batch_id: int, *, actor: str) -> RedoReport:
                 run.interrupt(session, {"left": left, "refused": dict(refused)})
             else:
                 run.close(session)
-                report = _report(batch, run, refused)
+                report = _redo_report(batch, run, refused)
                 session.respond(report)
     return report
 
 
-def _report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
+def _redo_report(batch: StoredBulkVerdict, run: BatchRun, refused: Counter[str]) -> RedoReport:
     kept = batch.changed - run.changed - refused.total()
     reasons = tuple(Refusal(reason, groups) for reason, groups in refused.items())
     return RedoReport(run.batch, run.changed, kept, reasons)
 
 
-def _spans(batch: StoredBulkVerdict) -> Spans:
+def _undo_spans(batch: StoredBulkVerdict) -> Spans:
     """First and last id of the verdicts that took a batch back, chunk by chunk."""
     if batch.undone is None:
         raise ConflictError("this batch was not undone, so there is nothing to redo")
@@ -252,7 +252,7 @@ def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:
     return again.id
 
 
-def _unchanged(session: Session, given: Spans, first: int, last: int) -> list[int]:
+def _groups_unchanged_since(session: Session, given: Spans, first: int, last: int) -> list[int]:
     """Groups of one chunk that nobody has judged since it was taken back, or edited."""
     ids = newest_between(session, first, last)
     judged: dict[int, str] = {}

@@ -63,17 +63,17 @@ _LAST_OF_EACH = (
 
 def read_verdicts(session: Session, group_ids: Sequence[int]) -> dict[int, list[StoredVerdict]]:
     """All verdicts of groups, the newest first; groups without one are left out."""
-    return _by_group(session.execute(_OF_GROUPS, {"ids": list(group_ids)}))
+    return _verdicts_by_group(session.execute(_OF_GROUPS, {"ids": list(group_ids)}))
 
 
 def read_last_verdicts(
     session: Session, group_ids: Sequence[int]
 ) -> dict[int, list[StoredVerdict]]:
     """Like ``read_verdicts``, but of each person the last alone, under the name that is shown."""
-    return _by_group(session.execute(_LAST_OF_EACH, {"ids": list(group_ids)}))
+    return _verdicts_by_group(session.execute(_LAST_OF_EACH, {"ids": list(group_ids)}))
 
 
-def _by_group(rows: Iterable[Any]) -> dict[int, list[StoredVerdict]]:
+def _verdicts_by_group(rows: Iterable[Any]) -> dict[int, list[StoredVerdict]]:
     verdicts: dict[int, list[StoredVerdict]] = {}
     for row in rows:
         verdicts.setdefault(row.group_id, []).append(StoredVerdict(**row._mapping))
@@ -224,34 +224,34 @@ def read_batches(
     statement = _BATCHES.where(model.dataset_id == dataset_id).order_by(model.id.desc())
     if before is not None:
         statement = statement.where(model.id < before)
-    return [_batch(row) for row in session.execute(statement.limit(limit))]
+    return [_batch_from_row(row) for row in session.execute(statement.limit(limit))]
 
 
 def find_batch(session: Session, batch_id: int) -> StoredBulkVerdict | None:
     """A batch by its id."""
     row = session.execute(_BATCHES.where(VerdictBatchModel.id == batch_id)).one_or_none()
-    return None if row is None else _batch(row)
+    return None if row is None else _batch_from_row(row)
 
 
 def insert_batch(session: Session, **values: Any) -> int:
     """Insert a batch, from fields of ``StoredBulkVerdict`` but its id; returns its id."""
     identity = next_id(session, VerdictBatchModel)
-    session.execute(insert(VerdictBatchModel), [{**_row(values), "id": identity}])
+    session.execute(insert(VerdictBatchModel), [{**_batch_columns(values), "id": identity}])
     return identity
 
 
 def update_batch(session: Session, batch_id: int, **values: Any) -> None:
     """Change fields of a batch."""
     mine = VerdictBatchModel.id == batch_id
-    session.execute(update(VerdictBatchModel).where(mine).values(_row(values)))
+    session.execute(update(VerdictBatchModel).where(mine).values(_batch_columns(values)))
 
 
-def _batch(row: Any) -> StoredBulkVerdict:
+def _batch_from_row(row: Any) -> StoredBulkVerdict:
     spans = {name: parse(getattr(row, name) or "null") for name in _SPANS}
     return StoredBulkVerdict(**{**row._mapping, **spans})
 
 
-def _row(values: dict[str, Any]) -> dict[str, Any]:
+def _batch_columns(values: dict[str, Any]) -> dict[str, Any]:
     return {name: json_text(item) if name in _SPANS else item for name, item in values.items()}
 
 

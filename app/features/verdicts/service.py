@@ -64,15 +64,15 @@ def set_verdict(
         # Accepting weighs the gates, so they must be known.
         record, solution = read_solved(store, group_id, needed=state == "accepted")
         stored, what = record.stored, f"group {record.stored.group.key}"
-        override = _override(solution, verdict)
-        _require_usable(solution, verdict)
-        _require_seen(stored.group, verdict)
+        override = _overridden_gate(solution, verdict)
+        _require_usable_ball(solution, verdict)
+        _require_visible_group(stored.group, verdict)
         with store.write() as session:
             policy_hash = require_unchanged(session, group_id, if_match, what)
             require_content(session, group_id, record.content, if_match, what)
             # Under another policy other gates may fail.
             if policy_hash == stored.policy.hash:
-                given = _insert(session, stored, verdict, override, actor)
+                given = _make_verdict(session, stored, verdict, override, actor)
                 insert_verdicts(session, stored.dataset_id, [given], actor=actor, at=given.at)
                 passes = None if solution is None else solution.passes
                 update_verdict(session, stored, given, passes)
@@ -100,7 +100,7 @@ def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
     return Verdict(state, reason, note)
 
 
-def _override(solution: Solution | None, verdict: Verdict) -> str | None:
+def _overridden_gate(solution: Solution | None, verdict: Verdict) -> str | None:
     """The gate that an acceptance overrides, or None."""
     if verdict.state != "accepted" or solution is None or solution.passes:
         return None
@@ -115,7 +115,7 @@ def _override(solution: Solution | None, verdict: Verdict) -> str | None:
     return gate.name if gate is not None else "unknown"
 
 
-def _require_usable(solution: Solution | None, verdict: Verdict) -> None:
+def _require_usable_ball(solution: Solution | None, verdict: Verdict) -> None:
     """Refuse a bare acceptance of a group whose ball nobody can use, though it passes."""
     found = None if solution is None else solution.unusable_ball
     if verdict.state == "accepted" and verdict.note is None and found is not None:
@@ -127,7 +127,7 @@ def _require_usable(solution: Solution | None, verdict: Verdict) -> None:
         )
 
 
-def _require_seen(group: Group, verdict: Verdict) -> None:
+def _require_visible_group(group: Group, verdict: Verdict) -> None:
     """Refuse a bare acceptance of a group that nobody can have looked at."""
     seen = any(view.media is not None for view in group.views)
     if verdict.state == "accepted" and verdict.note is None and not seen:
@@ -139,7 +139,7 @@ def _require_seen(group: Group, verdict: Verdict) -> None:
         )
 
 
-def _insert(
+def _make_verdict(
     session: Session, stored: StoredGroup, verdict: Verdict, override: str | None, actor: str
 ) -> StoredVerdict:
     return StoredVerdict(

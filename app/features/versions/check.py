@@ -39,35 +39,35 @@ def examine_versions(store: Store) -> list[Check]:
     with store.read() as session:
         restore = dialect_in(session).restoring
         versions = all_versions(session)
-        apart = [*_differing(session, versions)]
-        count, changed = _frozen(session)
+        apart = [*_differing_versions(session, versions)]
+        count, changed = _check_frozen_contents(session)
         return [
             compared("frozen versions", f"{len(versions):,}, as frozen", apart, WRONG, restore),
             compared("frozen content", f"{count:,}, as frozen", changed, WRONG, restore),
         ]
 
 
-def _differing(session: Session, versions: Any) -> Iterator[str]:
+def _differing_versions(session: Session, versions: Any) -> Iterator[str]:
     """Each version that is not what was frozen, with what is wrong with it."""
     try:
         with as_written():
-            logged = _logged(session)
+            logged = _logged_freezes(session)
     except StorageError:
         # Nothing follows from a log that cannot be read, which is named by itself.
         logged = None
     for row in versions:
         entry = None if logged is None else logged.pop(row.id, None)
         why = None
-        if logged is not None and not _is_logged(row, entry):
+        if logged is not None and not _matches_log(row, entry):
             why = "the log says otherwise"
-        why = why or _wrong(session, row)
+        why = why or _fault_of_version(session, row)
         if why is not None:
             yield f"{row.dataset}/{row.name} ({why})"
     for entry in (logged or {}).values():
         yield f"{entry.body.get('name')} of dataset {entry.dataset_id} (it is gone)"
 
 
-def _logged(session: Session) -> dict[int, LogEntry]:
+def _logged_freezes(session: Session) -> dict[int, LogEntry]:
     """What the log says of each version by its id, but for datasets that were deleted."""
     found: dict[int, LogEntry] = {}
     entries = entries_of_kinds(session, ("freeze", "dataset_deleted"))
@@ -79,7 +79,7 @@ def _logged(session: Session) -> dict[int, LogEntry]:
     return found
 
 
-def _is_logged(row: Any, entry: LogEntry | None) -> bool:
+def _matches_log(row: Any, entry: LogEntry | None) -> bool:
     if entry is None:
         return False
     logged = (
@@ -92,7 +92,7 @@ def _is_logged(row: Any, entry: LogEntry | None) -> bool:
     return logged == (row.dataset_id, row.name, row.hash, row.created, row.actor)
 
 
-def _wrong(session: Session, row: Any) -> str | None:
+def _fault_of_version(session: Session, row: Any) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
     rows = [item._mapping for item in annotation_rows(session, row.id)]
     try:
@@ -115,7 +115,7 @@ def _wrong(session: Session, row: Any) -> str | None:
     return f"frozen content is missing, of {without[0]} first" if without else None
 
 
-def _frozen(session: Session) -> tuple[int, list[str]]:
+def _check_frozen_contents(session: Session) -> tuple[int, list[str]]:
     """How many frozen contents there are, and which of them are damaged or missing."""
     count, apart = 0, lost_calibrations(session)
     for rows in frozen_batches(session):
@@ -123,7 +123,7 @@ def _frozen(session: Session) -> tuple[int, list[str]]:
         named: dict[int, set[str]] = {}
         for row in rows:
             try:
-                named.setdefault(row.dataset_id, set()).update(_named(row.key, row.body))
+                named.setdefault(row.dataset_id, set()).update(_keys_named_in(row.key, row.body))
             except StorageError:
                 apart.append(row.key)
         for dataset_id, keys in named.items():
@@ -131,7 +131,7 @@ def _frozen(session: Session) -> tuple[int, list[str]]:
     return count, list(dict.fromkeys(apart))
 
 
-def _named(key: str, body: bytes | None) -> set[str]:
+def _keys_named_in(key: str, body: bytes | None) -> set[str]:
     """Keys of what a content names.
 
     Raises:

@@ -132,9 +132,9 @@ def diff(older: VersionName, newer: VersionName, dataset: Dataset, json_: Json =
     for line in changelog_lines(found):
         say(line)
     for sign, passages in (("+", found.added), ("-", found.dropped)):
-        _say_some([f"{sign} {item.group}: {item.why}" for item in passages])
-    _say_some([f"~ {item.group}: {', '.join(item.what)}" for item in found.changed])
-    _say_some([f"> {item.group}: {item.metres:.3g} m" for item in found.moved])
+        _print_first_lines([f"{sign} {item.group}: {item.why}" for item in passages])
+    _print_first_lines([f"~ {item.group}: {', '.join(item.what)}" for item in found.changed])
+    _print_first_lines([f"> {item.group}: {item.metres:.3g} m" for item in found.moved])
 
 
 @commands.command()
@@ -160,7 +160,7 @@ def verify(
     print_values(report.values(), json_)
     if not report.ok:
         if not json_:
-            _say_some([f"  {_difference(item)}" for item in report.differences])
+            _print_first_lines([f"  {_difference_sentence(item)}" for item in report.differences])
         print_error(report.sentence)
         raise typer.Exit(1)
 
@@ -173,11 +173,11 @@ def version_values(version: Version) -> dict[str, Any]:
     return {name: values[name] for name in VERSION}
 
 
-def _difference(item: Any) -> str:
+def _difference_sentence(item: Any) -> str:
     return f"{item.group or 'version'}, {item.place}: {item.frozen} frozen, {item.now} now"
 
 
-def _say_some(lines: list[str]) -> None:
+def _print_first_lines(lines: list[str]) -> None:
     for line in lines[:SHOWN]:
         say(line)
     if len(lines) > SHOWN:

@@ -105,10 +105,10 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     before, after = (
         {row.key: row for row in annotation_rows(session, item.id)} for item in (older, newer)
     )
-    both = [key for key, row in after.items() if row.member and _is_in(before, key)]
-    changes = (_change(before[key], after[key]) for key in both)
+    both = [key for key, row in after.items() if row.member and _is_member(before, key)]
+    changes = (_change_of_group(before[key], after[key]) for key in both)
     changed = [change for change in changes if change.what]
-    moved = [move for key in both if (move := _move(before[key], after[key])) is not None]
+    moved = [move for key in both if (move := _ball_move(before[key], after[key])) is not None]
     touched = {item.group for item in changed} | {item.group for item in moved}
     return VersionDiff(
         older=older,
@@ -117,7 +117,7 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
         dropped=_membership_changes(before, after, GONE),
         moved=tuple(sorted(moved, key=lambda item: -item.metres)),
         changed=tuple(changed),
-        settings=tuple(_settings(older, newer)),
+        settings=tuple(_changed_settings(older, newer)),
         unchanged=len(both) - len(touched),
     )
 
@@ -132,7 +132,7 @@ def read_changelog(session: Session, version: Version) -> list[str]:
     """``changelog`` within a session."""
     if version.previous is None:
         counts = version.counts
-        groups, balls = _groups(counts["groups"]), plural(counts["balls"], "ball")
+        groups, balls = _count_of_groups(counts["groups"]), plural(counts["balls"], "ball")
         return [f"First version: {groups}, {balls} in views."]
     return changelog_lines(read_diff(session, read_version(session, version.previous), version))
 
@@ -142,9 +142,11 @@ def changelog_lines(diff: VersionDiff) -> list[str]:
     lines = [f"Since {diff.older.name}:"]
     for items, verb, when in ((diff.added, "added", "before"), (diff.dropped, "dropped", "now")):
         if items:
-            lines.append(f"{_groups(len(items))} {verb} ({when}: {_reasons_sentence(items)}).")
+            lines.append(
+                f"{_count_of_groups(len(items))} {verb} ({when}: {_reasons_sentence(items)})."
+            )
     for what, count in sorted(Counter(w for item in diff.changed for w in item.what).items()):
-        lines.append(f"{_groups(count)} with {_CHANGES[what]}.")
+        lines.append(f"{_count_of_groups(count)} with {_CHANGES[what]}.")
     if diff.moved:
         metres = [item.metres for item in diff.moved]
         lines.append(
@@ -166,7 +168,7 @@ _CHANGES = {
 }
 
 
-def _is_in(rows: dict[str, Any], key: str) -> bool:
+def _is_member(rows: dict[str, Any], key: str) -> bool:
     return key in rows and bool(rows[key].member)
 
 
@@ -177,7 +179,7 @@ def _membership_changes(
     return tuple(
         MembershipChange(key, elsewhere[key].why if key in elsewhere else absent)
         for key, row in there.items()
-        if row.member and not _is_in(elsewhere, key)
+        if row.member and not _is_member(elsewhere, key)
     )
 
 
@@ -201,7 +203,7 @@ def _setting_text(value: Any) -> str:
     return str(value)
 
 
-def _change(before: Any, after: Any) -> ChangedGroup:
+def _change_of_group(before: Any, after: Any) -> ChangedGroup:
     differ = {
         "annotations": before.said != after.said,
         "verdict": before.verdict != after.verdict,
@@ -211,20 +213,25 @@ def _change(before: Any, after: Any) -> ChangedGroup:
     return ChangedGroup(after.key, tuple(name for name, differs in differ.items() if differs))
 
 
-def _move(before: Any, after: Any) -> BallMove | None:
+def _ball_move(before: Any, after: Any) -> BallMove | None:
     if before.ball is None or after.ball is None or before.ball == after.ball:
         return None
-    then, now = _point(before.ball), _point(after.ball)
+    then, now = _parse_point(before.ball), _parse_point(after.ball)
     return BallMove(after.key, math.dist(then, now), then, now)
 
 
-def _point(text: str) -> tuple[float, float, float]:
+def _parse_point(text: str) -> tuple[float, float, float]:
     x, y, z = parse(text)
     return x, y, z
 
 
-def _settings(older: Version, newer: Version) -> Iterable[Setting]:
-    pairs = [(_flat(policy_to_json(older.policy)), _flat(policy_to_json(newer.policy)))]
+def _changed_settings(older: Version, newer: Version) -> Iterable[Setting]:
+    pairs = [
+        (
+            _flatten_policy(policy_to_json(older.policy)),
+            _flatten_policy(policy_to_json(newer.policy)),
+        )
+    ]
     pairs.append(({"solver": older.solver_version}, {"solver": newer.solver_version}))
     pairs.append(({"groups": older.groups}, {"groups": newer.groups}))
     pairs.append(({"split": older.split.values()}, {"split": newer.split.values()}))
@@ -234,7 +241,7 @@ def _settings(older: Version, newer: Version) -> Iterable[Setting]:
                 yield Setting(name, before.get(name), after.get(name))
 
 
-def _flat(policy: Json) -> dict[str, Json]:
+def _flatten_policy(policy: Json) -> dict[str, Json]:
     part = {f"calibration.{name}": value for name, value in policy["calibration"].items()}
     rest = {name: value for name, value in policy.items() if name != "calibration"}
     return {f"policy {name}": value for name, value in {**rest, **part}.items()}
@@ -245,5 +252,5 @@ def _reasons_sentence(items: Sequence[MembershipChange]) -> str:
     return ", ".join(f"{count} {why}" for why, count in sorted(counts.items()))
 
 
-def _groups(count: int) -> str:
+def _count_of_groups(count: int) -> str:
     return plural(count, "group")

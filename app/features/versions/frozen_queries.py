@@ -52,7 +52,7 @@ def freeze_annotations(group: Group) -> FrozenAnnotations:
     texts = {PAINT + reading.digest: reading.text for reading in group.paint.values()}
     views = []
     for view in group.views:
-        station = _station(view.station)
+        station = _station_json_without_mirroring(view.station)
         if view.station.shared:
             text = canonical(station)
             station = STATION + digest_of(text.encode())
@@ -65,7 +65,7 @@ def freeze_annotations(group: Group) -> FrozenAnnotations:
     return FrozenAnnotations(key, {**texts, key: text})
 
 
-def _station(station: Station) -> Json:
+def _station_json_without_mirroring(station: Station) -> Json:
     # Whether the frames are mirrored is about the frames, not about what was said.
     return {name: value for name, value in station_to_json(station).items() if name != "flipped"}
 
@@ -275,12 +275,12 @@ def members_without_content(session: Session, version_id: int) -> list[str]:
         select(group.key)
         .join(VersionModel, VersionModel.id == group.version_id)
         .where(group.version_id == version_id, group.member)
-        .where(or_(~_is_there(group.said), ~_is_there(group.solution)))
+        .where(or_(~_is_frozen(group.said), ~_is_frozen(group.solution)))
         .order_by(group.position)
     )
     return list(session.scalars(statement))
 
 
-def _is_there(key: Any) -> ColumnElement[bool]:
+def _is_frozen(key: Any) -> ColumnElement[bool]:
     mine = FrozenModel.dataset_id == VersionModel.dataset_id
     return exists().where(mine, FrozenModel.key == key)

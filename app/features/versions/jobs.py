@@ -62,7 +62,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
 
     def freezing(progress: JobProgress) -> Json:
         # The server may have stopped between the version and the record of its job.
-        done = _frozen_by(jobs, store, progress.job, _request_of(progress.job))
+        done = _find_version_of_job(jobs, store, progress.job, _request_of(progress.job))
         return freeze_work(store, progress) if done is None else version_result(done)
 
     jobs.register_resume(FREEZE, freezing)
@@ -77,7 +77,7 @@ def freeze_work(store: Store, progress: JobProgress) -> Json:
         store,
         "freezing",
         "the freeze",
-        _freeze,
+        _freeze_in_worker,
         progress.dataset_id,
         request,
         job.actor,
@@ -95,7 +95,7 @@ def verify_work(store: Store, progress: JobProgress) -> Json:
             store,
             "verifying",
             "the verification",
-            _verify,
+            _verify_in_worker,
             version.id,
             actor,
             dataset_id=version.dataset_id,
@@ -118,13 +118,13 @@ def version_result(version: Version) -> dict[str, Any]:
     }
 
 
-def _freeze(
+def _freeze_in_worker(
     store: Store, dataset_id: int, request: FreezeRequest, actor: str, progress: ReportProgress
 ) -> Json:
     return version_result(freeze(store, dataset_id, request, actor=actor, progress=progress))
 
 
-def _verify(store: Store, version_id: int, actor: str, progress: ReportProgress) -> Json:
+def _verify_in_worker(store: Store, version_id: int, actor: str, progress: ReportProgress) -> Json:
     report = verify_and_keep(store, version_id, progress=progress, actor=actor)
     return {"version_id": version_id, **report.values()}
 
@@ -141,7 +141,9 @@ def _version_title(request: FreezeRequest) -> str:
     return request.name or "the next version"
 
 
-def _frozen_by(jobs: Jobs, store: Store, job: Job, request: FreezeRequest) -> Version | None:
+def _find_version_of_job(
+    jobs: Jobs, store: Store, job: Job, request: FreezeRequest
+) -> Version | None:
     """The version that a job has made already; None: it has made none."""
     dataset_id = job.dataset_id or 0
     done = jobs.find(dataset_id=dataset_id, kinds=(FREEZE,), states=(DONE,), limit=MOST_LOOKED_AT)

@@ -54,7 +54,7 @@ class Candidate:
 
 def read_candidates(session: Session, dataset_id: int, rule: str) -> list[Candidate]:
     """Every group of a dataset, by match and key: an order that no machine changes."""
-    found = [_candidate(row, rule) for row in candidate_rows(session, dataset_id)]
+    found = [_candidate_from_row(row, rule) for row in candidate_rows(session, dataset_id)]
     return sorted(found, key=lambda item: (item.match, natural(item.key), item.key))
 
 
@@ -77,8 +77,8 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
         )
 
 
-def _candidate(row: Any, rule: str) -> Candidate:
-    why = _accepted(row) if rule == "accepted" else _passing(row)
+def _candidate_from_row(row: Any, rule: str) -> Candidate:
+    why = _why_not_accepted(row) if rule == "accepted" else _why_not_passing(row)
     return Candidate(
         id=row.group_id,
         key=row.key,
@@ -86,12 +86,12 @@ def _candidate(row: Any, rule: str) -> Candidate:
         split=row.split,
         views=tuple(row.view_keys.strip(",").split(",")),
         why=why,
-        verdict=_verdict(row),
+        verdict=_verdict_json(row),
         unsolved=why == UNSOLVED,
     )
 
 
-def _verdict(row: Any) -> Json:
+def _verdict_json(row: Any) -> Json:
     if row.status == "unreviewed":
         return None
     return {
@@ -102,27 +102,27 @@ def _verdict(row: Any) -> Json:
     }
 
 
-def _accepted(row: Any) -> str | None:
+def _why_not_accepted(row: Any) -> str | None:
     if row.status != "accepted":
-        return _decided(row) or "unreviewed"
+        return _why_rejected_or_deferred(row) or "unreviewed"
     if row.stale:
         return "changed after its verdict"
-    return _verdict_of(row)
+    return _why_not_passed(row)
 
 
-def _passing(row: Any) -> str | None:
+def _why_not_passing(row: Any) -> str | None:
     if row.status in ("rejected", "deferred"):
-        return _decided(row)
-    return _verdict_of(row)
+        return _why_rejected_or_deferred(row)
+    return _why_not_passed(row)
 
 
-def _decided(row: Any) -> str | None:
+def _why_rejected_or_deferred(row: Any) -> str | None:
     if row.status == "rejected":
         return f"rejected: {row.reason}"
     return "deferred" if row.status == "deferred" else None
 
 
-def _verdict_of(row: Any) -> str | None:
+def _why_not_passed(row: Any) -> str | None:
     if not row.solved:
         return UNSOLVED
     # An override speaks of the gate that failed then, of no other that fails now.

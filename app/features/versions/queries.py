@@ -107,7 +107,7 @@ def read_page(
         .order_by(model.position)
         .limit(limit)
     )
-    return [_row(row) for row in session.execute(statement)]
+    return [_version_group(row) for row in session.execute(statement)]
 
 
 def annotation_rows(session: Session, version_id: int) -> Iterator[Any]:
@@ -174,7 +174,7 @@ def candidate_rows(session: Session, dataset_id: int) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
-def _row(row: Any) -> VersionGroup:
+def _version_group(row: Any) -> VersionGroup:
     ball = None if row.ball is None else parse(row.ball)
     return VersionGroup(
         position=row.position,
@@ -232,9 +232,9 @@ def read_verifications(session: Session, versions: list[int]) -> dict[int, Verif
     """The last verification of versions, by id; those that nobody verified are left out."""
     model = VersionCheckModel
     statement = select(*model.__table__.columns).where(model.version_id.in_(versions))
-    return {row.version_id: _verification(row) for row in session.execute(statement)}
+    return {row.version_id: _verification_from_row(row) for row in session.execute(statement)}
 
 
-def _verification(row: Any) -> Verification:
+def _verification_from_row(row: Any) -> Verification:
     report = None if row.report is None else parse(row.report)
     return Verification(row.at, row.actor, row.solver_version, report, row.problem)

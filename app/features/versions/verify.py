@@ -159,7 +159,7 @@ def verify(
         frozen_tracks = read_frozen(session, version.dataset_id, version.tracks.values())
         matches = version_matches(session, version.id)
     done = 0
-    for results in fan_out(verify_task, _Tasks(store, version, matches), executor):
+    for results in fan_out(verify_task, _VerifyTasks(store, version, matches), executor):
         for found in results:
             report.add(found)
             report.equal += not found
@@ -209,7 +209,7 @@ def keep_failure(store: Store, version_id: int, problem: str, *, actor: str) -> 
 def verify_task(task: VerifyTask) -> list[list[VersionDifference]]:
     """The differences of each group of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.known.items()}
-    return [list(islice(_differences(row, task, known), _A_GROUP)) for row in task.rows]
+    return [list(islice(_group_differences(row, task, known), _A_GROUP)) for row in task.rows]
 
 
 def _version_differences(session: Session, version: Version) -> Iterator[VersionDifference]:
@@ -235,16 +235,18 @@ def _track_differences(stretch: str, key: str, body: bytes | None) -> Iterator[V
         now = track_again(value)
         for name, frozen in value["track"].items():
             if canonical(now[name]) != canonical(frozen):
-                yield VersionDifference(None, f"{place}.{name}", _brief(frozen), _brief(now[name]))
+                yield VersionDifference(
+                    None, f"{place}.{name}", _shorten_value(frozen), _shorten_value(now[name])
+                )
 
 
-def _brief(value: Json) -> Json:
+def _shorten_value(value: Json) -> Json:
     """A value for a report: long lists are told by their length and digest."""
     text = canonical(value)
     return value if len(text) < 200 else f"{len(text):,} characters, {digest_of(text.encode())}"
 
 
-class _Tasks:
+class _VerifyTasks:
     """The tasks of one verification, made as workers become free.
 
     Each is read in a transaction of its own: what is frozen does not change in between.
@@ -260,27 +262,31 @@ class _Tasks:
         while True:
             with self._store.read() as session:
                 rows = read_page(session, self._version.id, after, CHUNK, members=True)
-                frozen = self._frozen(session, rows)
+                frozen = self._read_frozen_chunk(session, rows)
             if not rows:
                 return
             after = rows[-1].position
-            yield self._task(tuple(rows), frozen)
+            yield self._make_task(tuple(rows), frozen)
 
-    def _frozen(self, session: Session, rows: Sequence[VersionGroup]) -> dict[str, bytes]:
+    def _read_frozen_chunk(
+        self, session: Session, rows: Sequence[VersionGroup]
+    ) -> dict[str, bytes]:
         """Everything that a chunk consists of."""
         wanted = {key for row in rows for key in (row.said, row.solution) if key}
         frozen = read_frozen(session, self._version.dataset_id, wanted)
         more = {name for row in rows for name in _named_parts(row, frozen)}
         return frozen | read_frozen(session, self._version.dataset_id, more)
 
-    def _task(self, rows: tuple[VersionGroup, ...], frozen: Mapping[str, bytes]) -> VerifyTask:
-        sound = (row for row in rows if not _missing(row, frozen))
+    def _make_task(self, rows: tuple[VersionGroup, ...], frozen: Mapping[str, bytes]) -> VerifyTask:
+        sound = (row for row in rows if not _missing_keys(row, frozen))
         annotations = (json_of(frozen[row.said or ""]) for row in sound)
-        known = self._known([thaw_group(value, _texts(value, frozen)) for value in annotations])
+        known = self._calibrate_static_cameras(
+            [thaw_group(value, _named_values(value, frozen)) for value in annotations]
+        )
         policy = self._version.policy
         return VerifyTask(rows, frozen, known, policy, self._splitter)
 
-    def _known(self, groups: Sequence[Group]) -> dict[str, bytes]:
+    def _calibrate_static_cameras(self, groups: Sequence[Group]) -> dict[str, bytes]:
         """Calibrations of the static cameras of groups, each computed once."""
         policy, keys = self._version.policy.calibration, set()
         for group in groups:
@@ -303,27 +309,27 @@ def _named_parts(row: VersionGroup, frozen: Mapping[str, bytes]) -> set[str]:
     return names
 
 
-def _missing(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
+def _missing_keys(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
     """Keys of frozen parts that a group needs and that are not there."""
     wanted = {key for key in (row.said, row.solution) if key} | _named_parts(row, frozen)
     return sorted(wanted - frozen.keys())
 
 
-def _texts(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
+def _named_values(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
     return {key: json_of(frozen[key]) for key in named_texts(annotations)}
 
 
-def _differences(
+def _group_differences(
     row: VersionGroup, task: VerifyTask, known: Mapping[str, Calibration]
 ) -> Iterator[VersionDifference]:
-    missing = _missing(row, task.frozen)
+    missing = _missing_keys(row, task.frozen)
     if missing:
         yield from (VersionDifference(row.key, "missing", key, None) for key in missing)
         return
     try:
         yield from _frozen_differences(row, task)
         annotations = json_of(task.frozen[row.said or ""])
-        group = thaw_group(annotations, _texts(annotations, task.frozen))
+        group = thaw_group(annotations, _named_values(annotations, task.frozen))
         yield from _split_differences(row, group, task.splitter)
         yield from _solution_differences(row, group, task, known)
     except Exception as error:
@@ -367,26 +373,26 @@ def _solution_differences(
     for place, then, now in pairs:
         # Texts, not bytes: another zlib may pack the same text in another way.
         if text_of(then) != text_of(now):
-            yield from _unequal(row.key, place, _parsed(then), _parsed(now))
+            yield from _unequal_leaves(row.key, place, _parse_frozen(then), _parse_frozen(now))
     point = json_of(encoded.body)["ball"]
     if row.ball != (tuple(point["point"]) if point else None):
         yield VersionDifference(row.key, "ball", row.ball, point and point["point"])
 
 
-def _parsed(body: bytes) -> Json:
+def _parse_frozen(body: bytes) -> Json:
     try:
         return json.loads(text_of(body))
     except ValueError as error:
         raise StorageError("a frozen part is damaged") from error
 
 
-def _unequal(group: str, place: str, then: Json, now: Json) -> Iterator[VersionDifference]:
+def _unequal_leaves(group: str, place: str, then: Json, now: Json) -> Iterator[VersionDifference]:
     """Leaves at which two JSON values differ."""
     if isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys():
         for name in then:
-            yield from _unequal(group, f"{place}{name}.", then[name], now[name])
+            yield from _unequal_leaves(group, f"{place}{name}.", then[name], now[name])
     elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
         for index, (one, other) in enumerate(zip(then, now, strict=True)):
-            yield from _unequal(group, f"{place}{index}.", one, other)
+            yield from _unequal_leaves(group, f"{place}{index}.", one, other)
     elif repr(then) != repr(now):
         yield VersionDifference(group, place.rstrip("."), then, now)

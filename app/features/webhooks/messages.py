@@ -91,17 +91,20 @@ def read_messages(session: Session, webhook: Any, dataset: str) -> list[Message]
     entries = entries_since(session, webhook.dataset_id, webhook.log_id, MOST)
     place = (webhook.jobs_until, webhook.job_id)
     jobs = jobs_ended_since(session, webhook.dataset_id, *place, _OF_JOBS)
-    return [*_of_log(webhook.id, dataset, entries), *_of_jobs(webhook.id, dataset, jobs)]
+    return [
+        *_messages_of_log(webhook.id, dataset, entries),
+        *_messages_of_jobs(webhook.id, dataset, jobs),
+    ]
 
 
 def ping(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
     """A message that says nothing."""
     stamp = "".join(letter for letter in at if letter.isdigit())
-    body = _body(Kind.PING, at, {"dataset": dataset, "actor": actor})
+    body = _message_body(Kind.PING, at, {"dataset": dataset, "actor": actor})
     return Message(f"msg_{webhook_id}_ping{stamp}", Kind.PING, body)
 
 
-def _of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[Message]:
+def _messages_of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[Message]:
     """Entries of one kind by one person that follow each other become one message."""
 
     def what(row: Any) -> tuple[Kind, str]:
@@ -124,12 +127,12 @@ def _of_log(webhook_id: int, dataset: str, entries: Sequence[Any]) -> Iterator[M
         yield Message(
             f"msg_{webhook_id}_log{first}-{last}",
             kind,
-            _body(kind, found[-1].at, data),
+            _message_body(kind, found[-1].at, data),
             log_id=last,
         )
 
 
-def _of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Iterator[Message]:
+def _messages_of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Iterator[Message]:
     for row in jobs:
         kind = _OF_JOBS[row.state]
         data = {
@@ -137,12 +140,12 @@ def _of_jobs(webhook_id: int, dataset: str, jobs: Sequence[Any]) -> Iterator[Mes
             "actor": row.actor,
             "job": {"id": row.id, "kind": row.kind, "title": row.title, "state": row.state},
         }
-        body = _body(kind, row.ended, data)
+        body = _message_body(kind, row.ended, data)
         name = f"msg_{webhook_id}_job{row.id}"
         yield Message(name, kind, body, ended=row.ended, job_id=row.id)
 
 
-def _body(kind: Kind, at: str, data: Json) -> str:
+def _message_body(kind: Kind, at: str, data: Json) -> str:
     return canonical({"type": str(kind), "timestamp": at, "data": data})
 
 

@@ -204,16 +204,16 @@ def arrived_since(session: Session, webhook_id: int, at: str) -> bool:
 
 def has_old_deliveries(session: Session, before: str) -> bool:
     """Whether anything arrived or was given up before a time."""
-    return session.scalar(select(DeliveryModel.id).where(*_over(before)).limit(1)) is not None
+    return session.scalar(select(DeliveryModel.id).where(*_is_over(before)).limit(1)) is not None
 
 
 def forget_deliveries(session: Session, before: str) -> int:
     """Delete what arrived or was given up before a time; returns how many."""
-    gone = session.execute(delete(DeliveryModel).where(*_over(before)))
+    gone = session.execute(delete(DeliveryModel).where(*_is_over(before)))
     return int(cast(Any, gone).rowcount)
 
 
-def _over(before: str) -> tuple[ColumnElement[bool], ...]:
+def _is_over(before: str) -> tuple[ColumnElement[bool], ...]:
     return DeliveryModel.next_at.is_(None), DeliveryModel.created < before
 
 

@@ -27,7 +27,7 @@ router = APIRouter(
 )
 
 
-def _with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
+def _webhook_with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
     webhook, secret = made
     return WebhookWithSecret(webhook=webhook, secret=secret)
 
@@ -52,7 +52,9 @@ def make_webhook(
     dataset: DatasetPath, new: NewWebhook, store: AppStore, actor: Actor
 ) -> WebhookWithSecret:
     """Tell an address what happens from now on; the secret is shown this once."""
-    return _with_secret(webhooks.make_webhook(store, dataset, new.url, new.kinds, actor=actor))
+    return _webhook_with_secret(
+        webhooks.make_webhook(store, dataset, new.url, new.kinds, actor=actor)
+    )
 
 
 @router.patch(
@@ -86,7 +88,7 @@ def renew_secret(
     dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor
 ) -> WebhookWithSecret:
     """Another secret; what is sent from now on is signed with it."""
-    return _with_secret(webhooks.renew_secret(store, dataset, webhook, actor=actor))
+    return _webhook_with_secret(webhooks.renew_secret(store, dataset, webhook, actor=actor))
 
 
 @router.post(

@@ -65,12 +65,12 @@ def read_address(text: str, pointer: str | None = None) -> Address:
         parts = urlsplit(text)
         port = parts.port
     except ValueError:
-        raise _refusal(text, pointer) from None
-    if len(text) > LONGEST or not _is_plain(text, parts):
-        raise _refusal(text, pointer)
+        raise _address_error(text, pointer) from None
+    if len(text) > LONGEST or not _is_unambiguous_address(text, parts):
+        raise _address_error(text, pointer)
     host = (parts.hostname or "").removesuffix(".")
     if not all(host.split(".")):
-        raise _refusal(text, pointer)
+        raise _address_error(text, pointer)
     return Address(parts.scheme, host, port or _PORTS[parts.scheme], parts.path or "/")
 
 
@@ -95,7 +95,7 @@ def require_allowed(text: str, allowed: Iterable[str], pointer: str | None = Non
         )
 
 
-def _is_plain(text: str, parts: SplitResult) -> bool:
+def _is_unambiguous_address(text: str, parts: SplitResult) -> bool:
     # Some servers cut parameters off a segment (RFC 3986, 3.3): "..;x" is ".." to them.
     decoded = parts.path.lower().replace("%2e", ".").replace("%3b", ";")
     segments = [segment.partition(";")[0] for segment in decoded.split("/")]
@@ -113,7 +113,7 @@ def _is_plain(text: str, parts: SplitResult) -> bool:
     )
 
 
-def _refusal(text: str, pointer: str | None) -> InputError:
+def _address_error(text: str, pointer: str | None) -> InputError:
     return InputError(
         f"{text[:100]!r} is no address that messages can be sent to",
         hint="Like https://hooks.example.org/touchline: http or https, without user, # and dots.",
@@ -177,7 +177,9 @@ class WebhookSender:
     def start(self) -> None:
         """Begin to follow the log."""
         self._store.listen(self._wake.set)
-        self._thread = threading.Thread(target=self._run, name="webhooks", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run_until_stopped, name="webhooks", daemon=True
+        )
         self._thread.start()
 
     def wake(self) -> None:
@@ -228,18 +230,18 @@ class WebhookSender:
         now = self._clock()
         with self._store.read() as session:
             due = due_deliveries(session, text_of(now), TOGETHER, OF_ONE)
-        answers = asyncio.run(self._try_all(due)) if due else []
+        answers = asyncio.run(self._send_all_due(due)) if due else []
         if answers:
             with self._store.write() as session:
                 for row, answer in answers:
                     self._save_attempt(session, row, answer)
         return len(answers)
 
-    async def _try_all(self, due: Sequence[Any]) -> list[tuple[Any, Attempt]]:
+    async def _send_all_due(self, due: Sequence[Any]) -> list[tuple[Any, Attempt]]:
         async with httpx.AsyncClient(
-            timeout=SECONDS, follow_redirects=False, trust_env=False, verify=_trusted()
+            timeout=SECONDS, follow_redirects=False, trust_env=False, verify=_tls_context()
         ) as client:
-            tries = {asyncio.ensure_future(self._send(client, row)): row for row in due}
+            tries = {asyncio.ensure_future(self._send_delivery(client, row)): row for row in due}
             left = set(tries)
             while left and not self._closing.is_set():
                 _, left = await asyncio.wait(left, timeout=GLANCE_SECONDS)
@@ -248,7 +250,7 @@ class WebhookSender:
             await asyncio.gather(*left, return_exceptions=True)
         return [(row, task.result()) for task, row in tries.items() if task not in left]
 
-    def _run(self) -> None:
+    def _run_until_stopped(self) -> None:
         while not self._closing.is_set():
             self._wake.clear()
             wait = POLL_SECONDS
@@ -268,9 +270,9 @@ class WebhookSender:
         self.look_for_stalls()
         while not self._closing.is_set() and self.send():
             pass
-        return self._pause()
+        return self._seconds_until_next_due()
 
-    def _pause(self) -> float:
+    def _seconds_until_next_due(self) -> float:
         """Seconds until something waits to be sent again."""
         with self._store.read() as session:
             due = next_due(session)
@@ -279,11 +281,11 @@ class WebhookSender:
         seconds = (datetime.fromisoformat(due) - self._clock()).total_seconds()
         return min(max(seconds, 0.0), POLL_SECONDS)
 
-    async def _send(self, client: httpx.AsyncClient, row: Any) -> Attempt:
+    async def _send_delivery(self, client: httpx.AsyncClient, row: Any) -> Attempt:
         """One try; whatever goes wrong with one address is its own answer."""
         try:
             async with asyncio.timeout(SECONDS):
-                status = await self._post(client, row)
+                status = await self._post_delivery(client, row)
         except ReviewError as error:
             return Attempt(None, error.message)
         except (TimeoutError, httpx.TimeoutException):
@@ -298,7 +300,7 @@ class WebhookSender:
         redirected = " (redirects are not followed)" if 300 <= status < 400 else ""
         return Attempt(status, f"it answered {status}{redirected}")
 
-    async def _post(self, client: httpx.AsyncClient, row: Any) -> int:
+    async def _post_delivery(self, client: httpx.AsyncClient, row: Any) -> int:
         settings = self._store.settings
         require_allowed(row.url, settings.webhooks)
         headers = sign(webhook_secret(settings, row.salt), row.message, self._clock(), row.body)
@@ -318,9 +320,9 @@ class WebhookSender:
             values["state"] = FAILED
         update_delivery(session, row.id, values)
         if values.get("state") == FAILED:
-            self._turn_off(session, row, answer)
+            self._turn_off_if_failing(session, row, answer)
 
-    def _turn_off(self, session: Session, row: Any, answer: Attempt) -> None:
+    def _turn_off_if_failing(self, session: Session, row: Any, answer: Attempt) -> None:
         """Tell nobody any more who wants nothing, or has taken nothing for as long as one tries."""
         if answer.status == GONE:
             update_webhook(
@@ -332,7 +334,7 @@ class WebhookSender:
 
 
 @cache
-def _trusted() -> ssl.SSLContext:
+def _tls_context() -> ssl.SSLContext:
     """Certificates of public authorities, read once: that takes some 20 ms of a processor."""
     return httpx.create_ssl_context(trust_env=False)
 

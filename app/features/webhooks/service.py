@@ -90,7 +90,7 @@ class Delivery:
 def list_webhooks(store: Store, dataset: str) -> list[Webhook]:
     """The webhooks of a dataset."""
     with store.read() as session:
-        return _webhooks_of(session, dataset_id(store, dataset))
+        return _read_webhooks(session, dataset_id(store, dataset))
 
 
 def make_webhook(
@@ -112,7 +112,7 @@ def make_webhook(
             )
         made = insert_webhook(session, number, url, _checked_kinds(kinds), salt=salt, by=actor)
         add_audit_event(session, actor, "webhook made", number, url=url)
-        return _webhook_of(session, number, made), secret
+        return _read_webhook(session, number, made), secret
 
 
 def change_webhook(
@@ -134,19 +134,19 @@ def change_webhook(
         require_allowed(url, store.settings.webhooks, "/url")
     number = dataset_id(store, dataset)
     with store.write() as session:
-        found = _webhook_of(session, number, webhook_id)
+        found = _read_webhook(session, number, webhook_id)
         values: dict[str, Any] = {}
         if url is not None:
             values["url"] = url
         if kinds is not None:
             values["kinds"] = canonical(_checked_kinds(kinds))
         if on is not None and on != (found.off is None):
-            values |= _turned_on(session) if on else {"off": OFF}
+            values |= _turn_on_columns(session) if on else {"off": OFF}
         if values:
             update_webhook(session, webhook_id, values)
             did = "webhook turned off" if on is False else "webhook changed"
             add_audit_event(session, actor, did, number, url=url or found.url)
-        return _webhook_of(session, number, webhook_id)
+        return _read_webhook(session, number, webhook_id)
 
 
 def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> tuple[Webhook, str]:
@@ -154,17 +154,17 @@ def renew_secret(store: Store, dataset: str, webhook_id: int, *, actor: str) -> 
     number, salt = dataset_id(store, dataset), new_salt()
     secret = webhook_secret(store.settings, salt)
     with store.write() as session:
-        found = _webhook_of(session, number, webhook_id)
+        found = _read_webhook(session, number, webhook_id)
         update_webhook(session, webhook_id, {"salt": salt})
         add_audit_event(session, actor, "webhook's secret renewed", number, url=found.url)
-        return _webhook_of(session, number, webhook_id), secret
+        return _read_webhook(session, number, webhook_id), secret
 
 
 def remove_webhook(store: Store, dataset: str, webhook_id: int, *, actor: str) -> None:
     """Tell an address nothing more, and forget what it was told."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        found = _webhook_of(session, number, webhook_id)
+        found = _read_webhook(session, number, webhook_id)
         delete_webhook(session, webhook_id)
         add_audit_event(session, actor, "webhook deleted", number, url=found.url)
 
@@ -175,43 +175,43 @@ def list_deliveries(
     """What a webhook was told, newest first, from below an id."""
     number = dataset_id(store, dataset)
     with store.read() as session:
-        _webhook_of(session, number, webhook_id)
-        return [_delivery(row) for row in deliveries_of(session, webhook_id, before, most)]
+        _read_webhook(session, number, webhook_id)
+        return [_delivery_from_row(row) for row in deliveries_of(session, webhook_id, before, most)]
 
 
 def send_again(store: Store, dataset: str, webhook_id: int, delivery_id: int) -> Delivery:
     """Send a message once more, at once; its tries are counted anew."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_on(_webhook_of(session, number, webhook_id))
+        _require_turned_on(_read_webhook(session, number, webhook_id))
         if delivery_of(session, webhook_id, delivery_id) is None:
             raise NotFoundError(f"this webhook has no delivery {delivery_id}")
         update_delivery(session, delivery_id, {"state": WAITING, "attempts": 0, "next_at": now()})
-        return _delivery(delivery_of(session, webhook_id, delivery_id))
+        return _delivery_from_row(delivery_of(session, webhook_id, delivery_id))
 
 
 def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Delivery:
     """Send a message that says nothing, to see whether messages arrive; one that waits is sent now."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_on(_webhook_of(session, number, webhook_id))
+        _require_turned_on(_read_webhook(session, number, webhook_id))
         waiting = waiting_of_kind(session, webhook_id, Kind.PING)
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
-            return _delivery(delivery_of(session, webhook_id, waiting.id))
+            return _delivery_from_row(delivery_of(session, webhook_id, waiting.id))
         message = ping(webhook_id, dataset_name(session, number), now(), actor)
         insert_delivery(session, webhook_id, message.id, message.kind, message.body)
-        return _delivery(deliveries_of(session, webhook_id, None, 1)[0])
+        return _delivery_from_row(deliveries_of(session, webhook_id, None, 1)[0])
 
 
-def _require_on(webhook: Webhook) -> None:
+def _require_turned_on(webhook: Webhook) -> None:
     if webhook.off is not None:
         raise ConflictError(
             f"the server does not send to this address: {webhook.off}", hint="Turn it on first."
         )
 
 
-def _turned_on(session: Session) -> Mapping[str, Any]:
+def _turn_on_columns(session: Session) -> Mapping[str, Any]:
     return {"off": None, "log_id": newest_entry(session), "jobs_until": now()}
 
 
@@ -226,20 +226,20 @@ def _checked_kinds(kinds: Iterable[Kind]) -> list[str]:
     return chosen
 
 
-def _webhook_of(session: Session, dataset: int, webhook_id: int) -> Webhook:
+def _read_webhook(session: Session, dataset: int, webhook_id: int) -> Webhook:
     row = webhook_of(session, dataset, webhook_id)
     if row is None:
         raise NotFoundError(f"this dataset has no webhook {webhook_id}")
-    return _webhook(row, count_deliveries(session, [webhook_id]))
+    return _webhook_from_row(row, count_deliveries(session, [webhook_id]))
 
 
-def _webhooks_of(session: Session, dataset: int) -> list[Webhook]:
+def _read_webhooks(session: Session, dataset: int) -> list[Webhook]:
     rows = webhooks_of(session, dataset)
     counts = count_deliveries(session, [row.id for row in rows])
-    return [_webhook(row, counts) for row in rows]
+    return [_webhook_from_row(row, counts) for row in rows]
 
 
-def _webhook(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhook:
+def _webhook_from_row(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhook:
     waiting, delivered, failed = (
         counts.get((row.id, state), 0) for state in (WAITING, DELIVERED, FAILED)
     )
@@ -248,6 +248,6 @@ def _webhook(row: Any, counts: Mapping[tuple[int, str], int]) -> Webhook:
     return Webhook(row.id, row.url, kinds, row.off, *made, waiting, delivered, failed)
 
 
-def _delivery(row: Any) -> Delivery:
+def _delivery_from_row(row: Any) -> Delivery:
     values = {name: getattr(row, name) for name in Delivery.__dataclass_fields__}
     return Delivery(**{**values, "kind": Kind(row.kind)})

@@ -127,14 +127,14 @@ class TestBackUp:
         sample = own_store.settings.home / "sample"
         sample.mkdir()
         (sample / "1.png").touch()
-        add = backup_module._add
+        add = backup_module._add_file
 
         def meanwhile(backup: zipfile.ZipFile, name: str, *arguments: Any) -> Any:
             if name.startswith("sample"):
                 place(own_store, ".7.zip.x1.partial")
             return add(backup, name, *arguments)
 
-        monkeypatch.setattr(backup_module, "_add", meanwhile)
+        monkeypatch.setattr(backup_module, "_add_file", meanwhile)
         manifest = back_up(own_store.settings, tmp_path / "b.zip", ("sample", *EXPORTS))
         assert list(manifest.files) == ["touchline.db", "sample/1.png", "exports/a.zip"]
 

@@ -107,7 +107,7 @@ class TestRestore:
         def kill(*_arguments):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("app.db.restore._move_in", kill)
+        monkeypatch.setattr("app.db.restore._move_into_home", kill)
         with pytest.raises(KeyboardInterrupt):
             restore(own_store.settings, backup)
         monkeypatch.undo()

@@ -43,7 +43,7 @@ from app.log import log_to_stderr
 from app.main import create_app
 from app.soccer.policy import PAPER
 from app.terminal.remote_files import write_evaluation
-from app.terminal.server import ABLE, ServerPlace, _explained, connected, read_token
+from app.terminal.server import ABLE, ServerPlace, _command_error, connected, read_token
 from app.terminal.terminal import INTERRUPTED
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
@@ -438,9 +438,9 @@ class TestRefusals:
     def test_an_answer_that_only_sounds_like_it_is_told_as_it_is(self) -> None:
         server = ServerPlace("http://127.0.0.1:8000", None)
         said = RequestError("there is no dataset crossland", None, 404)
-        assert _explained(server, said).message == "there is no dataset crossland"
+        assert _command_error(server, said).message == "there is no dataset crossland"
         broken = UnreachableError("the SSL handshake failed")
-        assert "cannot prove its identity" in _explained(server, broken).message
+        assert "cannot prove its identity" in _command_error(server, broken).message
 
     @pytest.mark.parametrize("named", ["tables", "figures"])
     def test_no_name_of_a_server_leads_out_of_the_folder(self, tmp_path: Path, named: str) -> None:

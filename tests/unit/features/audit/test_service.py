@@ -18,7 +18,7 @@ from app.features.groups.replay import _STEPS
 from app.features.groups.submit import load, submit, submit_all
 from app.features.groups.undo import redo, undo
 from app.features.jobs.service import Jobs
-from app.features.people.links import use
+from app.features.people.links import use_link
 from app.features.people.logins import Logins
 from app.features.people.members import give_role
 from app.features.people.roles import DatasetRoles, Role
@@ -35,7 +35,7 @@ def said(store: Store, fill, make_group) -> int:
     """A group of which anna and a token of hers have said something, and bob was let in."""
     (group,) = fill(make_group())
     bob, link = invite(store, "bob", Role.NONE, actor="anna")
-    use(store, link.token, "three plain words")
+    use_link(store, link.token, "three plain words")
     Logins(store).log_in("bob", "three plain words", address="192.0.2.7")
     give_role(store, "demo", bob.id, Role.LEAD, actor="anna")
     begin_thread(store, group, "Behind the post?", actor="anna (token lens)")

@@ -15,7 +15,7 @@ from app.features.groups.replay import rebuild, replay
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, preview, submit
 from app.features.groups.undo import redo, undo
-from app.features.groups.view_paint import PaintUpdater
+from app.features.groups.view_paint import PaintFollower
 from app.features.paint.service import take_back_paint
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
@@ -48,8 +48,8 @@ class Frames:
 
 
 @pytest.fixture
-def paint(painted) -> PaintUpdater:
-    return PaintUpdater(Frames(painted.settings))
+def paint(painted) -> PaintFollower:
+    return PaintFollower(Frames(painted.settings))
 
 
 def without_a_line(store, number=1):
@@ -120,7 +120,7 @@ class TestFollow:
         ids=["too many wait", "its process ended", "it took too long"],
     )
     def test_where_no_frame_can_be_read_the_edit_is_saved_all_the_same(self, painted, problem):
-        broken = PaintUpdater(Frames(painted.settings, problem))
+        broken = PaintFollower(Frames(painted.settings, problem))
         after = change(painted, broken, without_a_line(painted))
         assert after.solution.views[0].calibration.source == "lines"
         assert kinds(painted) == ["no_paint"]

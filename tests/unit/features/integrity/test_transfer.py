@@ -83,7 +83,7 @@ class TestTransfer:
         self, source: Settings, databases, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         target = source.model_copy(update={"database_url": databases.new()})
-        monkeypatch.setattr(module, "_digest", lambda connection, _: (id(connection), ""))
+        monkeypatch.setattr(module, "_digest_rows", lambda connection, _: (id(connection), ""))
         with pytest.raises(DamagedError, match="is not equal"):
             transfer(source, target)
         monkeypatch.undo()

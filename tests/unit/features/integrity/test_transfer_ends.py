@@ -8,7 +8,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError
-from app.features.integrity.transfer import ends_of
+from app.features.integrity.transfer import settings_of_both_databases
 
 ADDRESS = "postgresql://ann:secret@db/touchline"
 
@@ -30,7 +30,7 @@ def file(tmp_path: Path) -> Path:
 def test_a_home_that_goes_into_a_database_keeps_its_files(
     settings: Settings, file: Path, tmp_path: Path
 ) -> None:
-    begin, end = ends_of(str(tmp_path / "home"), str(file), settings)
+    begin, end = settings_of_both_databases(str(tmp_path / "home"), str(file), settings)
     assert (begin.home, begin.database_url) == (tmp_path / "home", None)
     assert (end.home, end.database_url) == (tmp_path / "home", ADDRESS)
 
@@ -38,7 +38,9 @@ def test_a_home_that_goes_into_a_database_keeps_its_files(
 def test_a_database_that_goes_into_a_home_makes_a_new_home(
     settings: Settings, tmp_path: Path
 ) -> None:
-    begin, end = ends_of("postgresql://db/touchline", str(tmp_path / "new"), settings)
+    begin, end = settings_of_both_databases(
+        "postgresql://db/touchline", str(tmp_path / "new"), settings
+    )
     assert begin.database_url == "postgresql://db/touchline"
     assert (end.home, end.database_url) == (tmp_path / "new", None)
 
@@ -46,18 +48,18 @@ def test_a_database_that_goes_into_a_home_makes_a_new_home(
 @pytest.mark.parametrize("address", [ADDRESS, "postgresql://db/touchline?user=ann&password=secret"])
 def test_a_password_that_everybody_could_read_is_refused(settings: Settings, address: str) -> None:
     with pytest.raises(InputError, match="can read the password in FROM"):
-        ends_of(address, "home", settings)
+        settings_of_both_databases(address, "home", settings)
     with pytest.raises(InputError, match="can read the password in TO"):
-        ends_of("home", address, settings)
+        settings_of_both_databases("home", address, settings)
 
 
 def test_a_file_that_others_may_read_is_refused(settings: Settings, file: Path) -> None:
     file.chmod(0o640)
     with pytest.raises(InputError, match="other users can read"):
-        ends_of(str(file), "home", settings)
+        settings_of_both_databases(str(file), "home", settings)
 
 
 def test_a_file_without_an_address_is_refused(settings: Settings, file: Path) -> None:
     file.write_text("db/touchline")
     with pytest.raises(InputError, match="holds no address of a database"):
-        ends_of("home", str(file), settings)
+        settings_of_both_databases("home", str(file), settings)

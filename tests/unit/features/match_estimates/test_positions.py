@@ -240,14 +240,14 @@ class TestSharePositions:
         assert other.current is False
 
     def test_a_group_that_leaves_while_it_is_estimated_gets_nothing(self, shared, monkeypatch):
-        whole = editing._estimate
+        whole = editing._estimate_match
         first, *_ = match()
 
         def estimate(task):
             ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
             return whole(task)
 
-        monkeypatch.setattr(editing, "_estimate", estimate)
+        monkeypatch.setattr(editing, "_estimate_match", estimate)
         share_positions(shared, "demo", [MATCH], actor="ann")
         assert load(shared, 1).group.positions == {}
 

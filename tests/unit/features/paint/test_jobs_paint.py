@@ -62,8 +62,8 @@ def test_a_reading_that_is_taken_back_while_it_runs_gives_nothing_more(
     asked: Store, monkeypatch
 ) -> None:
     monkeypatch.setattr(editing, "_PER_WORKER", 1)
-    jobs, looked = Jobs(asked), Held(editing._readings, calls=2)
-    monkeypatch.setattr(editing, "_readings", looked)
+    jobs, looked = Jobs(asked), Held(editing._read_pictures, calls=2)
+    monkeypatch.setattr(editing, "_read_pictures", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
     assert get_paint(asked, "demo").items[0].read > 0
@@ -80,8 +80,8 @@ def test_one_that_is_stopped_before_it_gave_anything_takes_no_earlier_one_along(
     jobs = Jobs(asked)
     first = PAINT.request(jobs, asked, "demo", None, actor="ann")
     assert jobs.wait(first.id, SECONDS).state == "done"
-    looked = Held(editing._readings, calls=1)
-    monkeypatch.setattr(editing, "_readings", looked)
+    looked = Held(editing._read_pictures, calls=1)
+    monkeypatch.setattr(editing, "_read_pictures", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
     PAINT.take_back(jobs, asked, "demo", actor="ann")
@@ -95,8 +95,8 @@ def test_one_that_runs_goes_on_where_the_take_back_is_not_kept(asked: Store, mon
     def full(_session, _job):
         raise StorageError("the disk is full")
 
-    jobs, looked = Jobs(asked), Held(editing._readings, calls=1)
-    monkeypatch.setattr(editing, "_readings", looked)
+    jobs, looked = Jobs(asked), Held(editing._read_pictures, calls=1)
+    monkeypatch.setattr(editing, "_read_pictures", looked)
     job = PAINT.request(jobs, asked, "demo", None, actor="ann")
     looked.wait()
     with pytest.raises(StorageError), stored_by(full):

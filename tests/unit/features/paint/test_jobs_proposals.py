@@ -61,8 +61,8 @@ def test_a_job_is_asked_for_without_a_count_of_every_match(gone: Store, monkeypa
 
 def test_what_a_search_finds_after_all_is_forgotten_is_not_kept(gone: Store, monkeypatch) -> None:
     monkeypatch.setattr(editing, "_PER_WORKER", 2)
-    jobs, looked = Jobs(gone), Held(editing._answers, calls=2)
-    monkeypatch.setattr(editing, "_answers", looked)
+    jobs, looked = Jobs(gone), Held(editing._run_tasks, calls=2)
+    monkeypatch.setattr(editing, "_run_tasks", looked)
     job = PROPOSALS.request(jobs, gone, "demo", None, actor="ann")
     waiting = PROPOSALS.request(jobs, gone, "demo", None, actor="ann")
     looked.wait()

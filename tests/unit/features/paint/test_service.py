@@ -217,7 +217,7 @@ class TestReadPaint:
         assert load(painted, 1).solution.view(rows[0].gate_view).failed == "agreement"
 
     def test_what_was_read_is_not_read_again(self, painted, here, looked, monkeypatch):
-        monkeypatch.setattr(media, "_pixels", lambda *_: pytest.fail("it was decoded again"))
+        monkeypatch.setattr(media, "_decode_pixels", lambda *_: pytest.fail("it was decoded again"))
         read_paint(painted, "demo", actor="ann")
         assert (here.read, looked, stale_groups(painted, "demo")) == (4, [], [])
         assert [entry.kind for entry in history(painted, 1)] == ["import", "paint"]
@@ -298,7 +298,7 @@ class TestReadPaint:
         ingest(painted, "demo", [bare, other], source="files", actor="ann")
         # What a process was at while that happened is given afterwards.
         with painted.write() as session:
-            editing._give(session, 1, {1: reading}, "ann", {"run": "late"})
+            editing._give_readings(session, 1, {1: reading}, "ann", {"run": "late"})
         solve_dataset(painted, "demo")
         assert state(painted).old == 2
         assert [item.source for item in calibrations(painted)] == ["lines", "lines"]

@@ -21,7 +21,7 @@ from app.features.people.invitations import (
     read_list,
     renew_one,
 )
-from app.features.people.links import look
+from app.features.people.links import find_link_holder
 from app.features.people.roles import Role
 from app.features.people.service import list_people
 from app.mail import MailServer, read_mail_server
@@ -81,7 +81,7 @@ class TestInviteMany:
         assert problems[6].startswith("the role is missing")
         assert names(store) == ["anna", "ben"]
         assert [person.role for person in list_people(store)] == [Role.LEAD, Role.ANNOTATOR]
-        assert look(store, token_of(report[0].link or "")).name == "anna"
+        assert find_link_holder(store, token_of(report[0].link or "")).name == "anna"
 
     def test_a_dry_run_says_the_same_and_makes_nobody(self, store: Store) -> None:
         with serving(MailBox()) as box:
@@ -125,7 +125,7 @@ class TestPost:
         assert letter["Subject"] == "Your account on Touchline at touchline.example.org"
         text = letter.get_content()
         assert f"berta invites you to Touchline at {URL} as lead." in text
-        assert look(store, token_of(text)).name == "anna"
+        assert find_link_holder(store, token_of(text)).name == "anna"
 
     def test_a_letter_that_is_refused_shows_its_link_and_why(self, store: Store) -> None:
         with serving(MailBox(refuses=frozenset({"anna@example.org"}))) as box:
@@ -133,7 +133,7 @@ class TestPost:
             (row,) = invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         assert (row.state, row.mailed) == ("invited", False)
         assert row.problem == "the mail server refuses the letter (550: 5.1.1 no such box)"
-        assert look(store, token_of(row.link or "")).name == "anna"
+        assert find_link_holder(store, token_of(row.link or "")).name == "anna"
 
     def test_a_server_that_does_not_know_its_address_sends_no_link(self, store: Store) -> None:
         with serving(MailBox()) as box:
@@ -148,7 +148,7 @@ class TestPost:
             address = "anna@example.org"
             renew_one(store, person.id, address, post, actor="berta")
             again, row = renew_one(store, person.id, None, post, actor="berta")
-            links.use(store, token_of(row.link or ""), "three plain words")
+            links.use_link(store, token_of(row.link or ""), "three plain words")
             _, reset = renew_one(store, person.id, address, post, actor="berta")
         assert (first.state, row.state, reset.state) == ("invited", "invited", "reset")
         assert reset.mailed and not again.joined
@@ -156,7 +156,7 @@ class TestPost:
         assert invited["Subject"] == "Your account on Touchline at touchline.example.org"
         assert other["Subject"] == "A new password for Touchline at touchline.example.org"
         assert "invites you" not in other.get_content()
-        assert look(store, token_of(other.get_content())).joined
+        assert find_link_holder(store, token_of(other.get_content())).joined
 
     def test_addresses_stand_in_no_table(self, store: Store) -> None:
         with serving(MailBox()) as box:

@@ -11,7 +11,7 @@ from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.solutions import codec as value_codec
 from app.features.solutions.queries import (
     SolutionKey,
-    _leaves_open,
+    _is_undetermined,
     decode_calibration,
     decode_camera,
     encode_calibration,
@@ -150,7 +150,7 @@ class TestRoundTrip:
         ]
         for item in told:
             is_open = item.camera is None or item.unobservable != ()
-            assert _leaves_open(encode_calibration(item)) == is_open
+            assert _is_undetermined(encode_calibration(item)) == is_open
 
     def test_known_calibrations_are_not_encoded_again(self, full_group, solution) -> None:
         encoded = encode_solution(full_group, solution, known={"key-a"})

@@ -338,7 +338,7 @@ class TestUndoBatch:
     def test_what_another_run_took_back_before_it_was_stopped_is_counted(
         self, store, ids, monkeypatch
     ) -> None:
-        restore = bulk_undo._restore
+        restore = bulk_undo._restore_chunk
 
         def stopped(session: Session, batch: Any, first: int, last: int, actor: str) -> Any:
             if actor == "eve" and first == 3:
@@ -350,7 +350,7 @@ class TestUndoBatch:
                 undo_batch(store, batch, actor="eve")
 
         monkeypatch.setattr(bulk, "CHUNK", 1)
-        monkeypatch.setattr(bulk_undo, "_restore", stopped)
+        monkeypatch.setattr(bulk_undo, "_restore_chunk", stopped)
         batch = give_verdicts(store, 1, "", "deferred", actor="ben").batch
         before_write(store, monkeypatch, 2, somebody_else_begins)
         undone = undo_batch(store, batch, actor="ann")

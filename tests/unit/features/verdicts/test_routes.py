@@ -227,7 +227,7 @@ class TestStoppedBetweenChunks:
     def test_a_batch_is_taken_back_whole(self, app, api, monkeypatch) -> None:
         api.post(VERDICTS, json=self.BODY)
         with monkeypatch.context() as patch:
-            patch.setattr(bulk_undo, "_restore", Stop(bulk_undo._restore, after=2))
+            patch.setattr(bulk_undo, "_restore_chunk", Stop(bulk_undo._restore_chunk, after=2))
             undo = "/api/v1/verdict-batches/1/undo"
             assert api.post(undo, headers=self.KEY).status_code == 500
         done = api.post(undo, headers=self.KEY).json()

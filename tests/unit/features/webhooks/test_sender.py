@@ -120,7 +120,7 @@ class TestTelling:
         monkeypatch.setattr(
             ssl, "create_default_context", lambda **asked: found.append(asked) or read(**asked)
         )
-        module._trusted.cache_clear()
+        module._tls_context.cache_clear()
         for verdict in ("accepted", "deferred"):
             state = judge(allowed, state, verdict)
             assert (sender.look(), sender.send()) == (1, 1)
