@@ -18,6 +18,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {number[]} annotated frames whose lines were known
  * @property {number[]} unusable frames with too few lines
  * @property {boolean} turned whether a person turned them by half a turn of the pitch
+ * @property {{other: {length: number, width: number} | null} | null} pitch that its frames show together; `other` where it certainly is not that of the match
  */
 /**
  * @typedef {object} ShotCamerasJson

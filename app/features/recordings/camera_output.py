@@ -40,7 +40,11 @@ def camera_output(store: Store, found: ShotCameras, form: str) -> tuple[str, byt
     with TemporaryDirectory() as place:
         # Samples carry the name of their folder.
         folder, out = Path(place) / title, Path(place) / "out"
-        write_cameras(folder, frames, {"frames": [frame_row(frame) for frame in frames]})
+        write_cameras(
+            folder,
+            frames,
+            {"frames": [frame_row(frame) for frame in frames], "pitch": found.summary.pitch},
+        )
         if form == "npz":
             export_cameras(folder, out, form)
             return f"{title}.npz", out.read_bytes()

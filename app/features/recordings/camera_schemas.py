@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.file_tools.track import frame_row
+from app.features.groups.schemas import PitchSize
 from app.features.recordings.cameras import CameraSummary
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
@@ -40,6 +41,31 @@ class CamerasChange(BaseModel):
     )
 
 
+class ShownPitchSigma(BaseModel):
+    """Standard deviations of a pitch that frames show together, metres."""
+
+    length: float | None = Field(description="Null where the length is not shown.")
+    width: float | None = Field(description="Null where the width is not shown.")
+    crown: float = Field(description="Of the crown of the grass.")
+    inward: float = Field(description="Of how far the paint lies inside the plan.")
+    tripod: float = Field(description="Of the tripod's position, in the worst direction.")
+
+
+class ShownPitch(BaseModel):
+    """The pitch that the frames of a stretch show together: an estimate, which changes nothing."""
+
+    length: float | None = Field(description="Metres; null where the frames do not show it.")
+    width: float | None = Field(description="Metres; null where the frames do not show it.")
+    crown: float = Field(description="How far the grass is raised along the middle, metres.")
+    inward: float = Field(description="How far the paint lies inside the plan, metres.")
+    tripod: tuple[float, float, float] = Field(description="Where the camera stands, metres.")
+    sigma: ShownPitchSigma = Field(description="Standard deviations of these.")
+    frames: int = Field(description="How many frames it rests on.")
+    other: PitchSize | None = Field(
+        description="The size, where it certainly is not that of the match's pitch."
+    )
+
+
 class CameraSummaryDocument(Document, shows=CameraSummary):
     """What became of the frames of a stretch."""
 
@@ -55,6 +81,9 @@ class CameraSummaryDocument(Document, shows=CameraSummary):
     unusable: tuple[int, ...] = Field(description="Frames with too few lines for a camera.")
     turned: bool = Field(
         description="Whether a person turned them by half a turn of the pitch against what the tracker gave."
+    )
+    pitch: ShownPitch | None = Field(
+        default=None, description="The pitch that its frames show together."
     )
 
 

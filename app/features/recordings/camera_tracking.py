@@ -18,7 +18,7 @@ from app.durable import replace_file
 from app.errors import ConflictError, InputError, StorageError
 from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.service import get_dataset_head
-from app.features.file_tools.track import count_outcomes
+from app.features.file_tools.track import count_outcomes, pitch_row
 from app.features.pitches.queries import edited_pitches
 from app.features.recordings.camera_groups import give_cameras, views_of_stretch
 from app.features.recordings.camera_queries import (
@@ -58,12 +58,13 @@ MOST_FRAMES = 15_000
 class Tracked:
     """What the process that tracks returns: a camera of each frame, and which lines were of no use.
 
-    ``turned``: as of ``CameraSummary``.
+    ``turned`` and ``pitch``: as of ``CameraSummary``.
     """
 
     frames: list[FrameCamera]
     unusable: tuple[int, ...]
     turned: bool = False
+    pitch: dict[str, Any] | None = None
 
 
 def require_stretch(recording: Recording, first: int, last: int) -> None:
@@ -149,7 +150,16 @@ def _on_its_side(store: Store, recording: Recording, tracked: Tracked) -> Tracke
     before = cameras_at(store, recording, range(first, last + 1))
     if not stand_opposite(tracked.frames, before):
         return tracked
-    return Tracked([turned_frame(frame) for frame in tracked.frames], tracked.unusable, True)
+    frames = [turned_frame(frame) for frame in tracked.frames]
+    return Tracked(frames, tracked.unusable, True, _turned_pitch(tracked.pitch))
+
+
+def _turned_pitch(pitch: dict[str, Any] | None) -> dict[str, Any] | None:
+    """A pitch that is shown, after half a turn: its tripod stands opposite."""
+    if pitch is None:
+        return None
+    x, y, z = pitch["tripod"]
+    return {**pitch, "tripod": [-x, -y, z]}
 
 
 def turn_cameras(
@@ -181,7 +191,7 @@ def turn_cameras(
         store,
         get_recording(store, recording_id),
         (found.first, found.last),
-        Tracked(frames, found.summary.unusable, turned),
+        Tracked(frames, found.summary.unusable, turned, _turned_pitch(found.summary.pitch)),
         found.summary.annotated,
         actor,
         turned_from=found,
@@ -230,7 +240,8 @@ def track_stretch(
     usable = {number: drawn for number, drawn in lines.items() if makes_camera(drawn)}
     total = last - first + 1
     found = track_clip(clip, usable, pitch, policy, tell)
-    return Tracked(found.frames, tuple(sorted(set(lines) - set(usable))))
+    unusable = tuple(sorted(set(lines) - set(usable)))
+    return Tracked(found.frames, unusable, pitch=pitch_row(found.shown, on_shown=False))
 
 
 def save_cameras(
@@ -352,6 +363,7 @@ def _outside(settings: Settings, old: ShotCameras, first: int, last: int) -> lis
             part,
             tuple(one for one in old.summary.unusable if part[0].number <= one <= part[-1].number),
             old.summary.turned,
+            old.summary.pitch,
         )
         for part in parts
         if part
@@ -369,4 +381,5 @@ def _summary(tracked: Tracked, annotated: Sequence[int]) -> CameraSummary:
         annotated=tuple(annotated),
         unusable=tracked.unusable,
         turned=tracked.turned,
+        pitch=tracked.pitch,
     )

@@ -40,6 +40,7 @@ class CameraSummary:
         annotated: Frames whose lines were known.
         unusable: Frames that have lines, too few of them to make a camera.
         turned: Whether a person turned them by half a turn of the pitch against what the tracker took to be its side.
+        pitch: The pitch that its frames show together, as ``track.json`` has it; None where they show none.
     """
 
     frames: int
@@ -51,6 +52,7 @@ class CameraSummary:
     annotated: tuple[int, ...]
     unusable: tuple[int, ...]
     turned: bool = False
+    pitch: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,7 @@ export function CameraCard({ one, cameras }) {
 	const { stretch, job, error, busy, before } = cameras;
 	const fresh = stretch ? stretch.drawn.filter((frame) => !stretch.summary.annotated.includes(frame)) : [];
 	const useless = stretch?.summary.unusable ?? [];
+	const other = stretch?.summary.pitch?.other;
 	return html`
 		<section class="card camera" aria-label="Cameras">
 			<h2>Cameras${stretch ? html`<span class="card__aside">frames ${stretch.first} to ${stretch.last}</span>` : null}</h2>
@@ -44,6 +45,7 @@ export function CameraCard({ one, cameras }) {
 			${stretch?.stale ? html`<p class="form__error">The video is another one since: track the shot again.</p>` : null}
 			${fresh.length ? html`<p role="status">${fresh.length === 1 ? `Frame ${fresh[0]} has` : `${plural(fresh.length, 'frame')} have`} lines since. Track again, and the shot follows them.</p>` : null}
 			${useless.length ? html`<p class="form__error">Frame ${useless.join(', ')} has too few lines for a camera, and was not used.</p>` : null}
+			${other ? html`<p role="status">Its frames show a pitch of ${other.length} × ${other.width} m. Give the match that size under Statistics, and track again.</p>` : null}
 			<p class="buttons">
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens its lines'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>

@@ -81,12 +81,14 @@ class Tracker:
         self.lost: set[int] = set()
         self.off = 0.0
         self.asked: dict[int, Any] = {}
+        self.pitch: dict[str, Any] | None = None
 
     def __call__(self, path: Path, work: Any, *arguments: Any, **_: Any) -> Tracked:
         assert work is track_stretch
         first, last, lines = arguments[2:5]
         self.asked = lines
-        return Tracked([self.frame(number, lines) for number in range(first, last + 1)], ())
+        frames = [self.frame(number, lines) for number in range(first, last + 1)]
+        return Tracked(frames, (), pitch=self.pitch)
 
     def frame(self, number: int, lines: Any) -> FrameCamera:
         lost = number in self.lost
@@ -553,6 +555,28 @@ def test_cameras_are_written_for_other_tools(
         sample = json.loads(archive.read("sample_05.json"))
         assert sample["timing"]["sequenceNumber"] == 5
         assert sample["tracker"]["status"] == "tracked"
+
+
+def test_the_pitch_that_is_shown_is_told_and_kept(
+    api: Any, recording: str, finished: Finished, tracker: Tracker
+) -> None:
+    track(api, recording, finished)
+    sigma = {"length": 0.2, "width": None, "crown": 0.01, "inward": 0.02, "tripod": 0.2}
+    shown = {
+        "length": 101.2,
+        "width": None,
+        "crown": 0.17,
+        "inward": 0.07,
+        "tripod": [0.2, 66.5, -15.7],
+    }
+    shown |= {"sigma": sigma, "frames": 24, "other": {"length": 101.2, "width": 68.0}}
+    tracker.pitch = {**shown, "cameras": "plan"}
+    track(api, recording, finished)
+    (one,) = api.get(f"{recording}/cameras").json()["items"]
+    assert one["summary"]["pitch"] == shown and one["before"]["pitch"] is None
+    answer = api.get(f"{recording}/cameras/5/file?format=soccernet")
+    archive = zipfile.ZipFile(io.BytesIO(answer.content))
+    assert json.loads(archive.read("track.json"))["pitch"] == tracker.pitch
 
 
 def test_no_camera_is_no_file(
