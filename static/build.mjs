@@ -20,7 +20,7 @@ const ENTRIES = ['ahead.js', 'main.js'];
 /** What tests, and whoever looks into a running page from the console, import by name: the very modules that run there. */
 const DOORS = ['api/events.js', 'state/documents.js', 'state/facets.js', 'state/me.js'];
 /** What brings a library as large as all of the application. */
-const APART = ['./panel.js'];
+const APART = ['./panel.js', '../scene3d/track_panel.js'];
 const IMPORT = /\bimport\((['"])(\.{1,2}\/[^'"]+)\1\)/g;
 
 /** Paths of all modules of the application, in the order of their characters. */

@@ -9,6 +9,8 @@ PITCH_SIZE = "pitch_size"
 """The one finding that is of a match; it stands at the first group of it."""
 PICTURE_GEOMETRY = "picture_geometry"
 """Lines that fit a stretched or cropped picture, or a picture of another shape than declared."""
+TRACK_DISAGREES = "track_disagrees"
+"""A ball of one view that the track over the group's stretch does not explain."""
 FINDING_KINDS = (
     "wrong_label",
     "sides_swapped",
@@ -30,6 +32,7 @@ FINDING_KINDS = (
     "several_balls",
     "upstream_changed",
     PITCH_SIZE,
+    TRACK_DISAGREES,
 )
 """Every kind of finding."""
 
@@ -44,7 +47,7 @@ class Fix:
     """What a finding or a suggestion proposes to do.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
-    ``include_view``, ``exclude_view``, ``free_picture``, ``hide_marking`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
+    ``include_view``, ``exclude_view``, ``free_picture``, ``hide_marking``, ``move_ball`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
     say where a person should look and draw: what was computed there is no evidence for itself.
     ``read_paint`` asks for its picture to be read, which is no edit either.
     """
@@ -74,6 +77,19 @@ class Finding:
     def is_unusable_ball(self) -> bool:
         """Whether nobody can use the ball of which it is said: accepting it needs a reason."""
         return makes_unusable(self.kind, self.number)
+
+
+@dataclass(frozen=True)
+class PlacedFinding(Finding):
+    """A finding that knows where its ball would be.
+
+    It is no part of a solution: tracks make it, of many groups together.
+
+    Attributes:
+        place: Pixels of the annotated size, x and y; None where nothing says.
+    """
+
+    place: tuple[float, float] | None = None
 
 
 def makes_unusable(kind: str, number: float | None) -> bool:

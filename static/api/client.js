@@ -94,7 +94,7 @@ export async function getFrame(url) {
 	return response.blob();
 }
 
-/** @param {Record<string, string | number | null | undefined>} values @returns {string} "?…", or "" */
+/** @param {Record<string, string | number | boolean | null | undefined>} values @returns {string} "?…", or "" */
 export function queryText(values) {
 	const search = new URLSearchParams();
 	for (const [name, value] of Object.entries(values)) {

@@ -62,9 +62,14 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  * @property {Contradiction[]} contradicted
  */
 
-/** @param {string} dataset @param {AbortSignal} [signal] @returns {Promise<{items: TrackJson[]}>} */
-export function getTracks(dataset, signal) {
-	return request(`/datasets/${encodeURIComponent(dataset)}/tracks`, { signal });
+/** @typedef {TrackJson & {batches: number[], assigned: string[]}} ListedTrackJson   open batches that it is in, and whom these are given to */
+/** @typedef {{verdict?: 'accepted' | 'rejected' | 'none', stale?: boolean, assigned?: string, batch?: number, sort?: 'match' | 'worst' | 'gaps'}} TrackChoice */
+
+/** @typedef {TrackFrames & {reason: string | null}} TrackAround   why no track comes of these frames */
+
+/** @param {string} dataset @param {TrackChoice} [choice] @param {AbortSignal} [signal] @returns {Promise<{items: ListedTrackJson[]}>} */
+export function getTracks(dataset, choice = {}, signal = undefined) {
+	return request(`/datasets/${encodeURIComponent(dataset)}/tracks${queryText(choice)}`, { signal });
 }
 
 /** @param {string} dataset @returns {Promise<JobJson>} */
@@ -80,6 +85,16 @@ export function getTrack(id, signal) {
 /** @param {number} id @param {number} first @param {AbortSignal} [signal] @returns {Promise<TrackFrames>} */
 export function getTrackFrames(id, first, signal) {
 	return request(`/tracks/${id}/frames${queryText({ first })}`, { signal });
+}
+
+/** The tracks that a group is in, and its frame there. @param {number} group @param {AbortSignal} [signal] @returns {Promise<{items: {track: TrackJson, frame: number}[]}>} */
+export function getTracksOfGroup(group, signal) {
+	return request(`/groups/${group}/tracks`, { signal });
+}
+
+/** The frames around one as they come out of the groups as they are now. @param {number} id @param {number} frame @param {AbortSignal} [signal] @returns {Promise<TrackAround>} */
+export function getTrackAround(id, frame, signal) {
+	return request(`/tracks/${id}/around${queryText({ frame })}`, { signal });
 }
 
 /** @param {TrackJson} track @param {{verdict?: 'accepted' | 'rejected' | 'none', corrections?: Correction[]}} body @returns {Promise<TrackJson>} */

@@ -1,6 +1,7 @@
 // @ts-check
 /** What the card on the right speaks about, pointed out on the picture. */
 
+import { ballCenter } from '../geometry/preview.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
 import { shortMarking } from '../lib/format.js';
@@ -19,8 +20,10 @@ export function drawSuggestionMarks(context, scene) {
 	const { meant } = scene;
 	// Nothing is pointed out that has no words: undrawn lines and missing balls stand there already.
 	if (!meant?.caption) return;
-	const { marking, caption, guide } = meant;
+	const { marking, caption, guide, edit } = meant;
+	const ball = edit?.kind === 'ball' && edit.ball ? ballCenter(edit.ball) : null;
 	if (guide?.looks) look(context, scene, guide.looks, caption);
+	else if (ball) look(context, scene, [ball.x, ball.y], caption);
 	else if (marking && typeof meant.index === 'number') point(context, scene, meant);
 	else if (marking) line(context, scene, marking, caption);
 	else plate(context, caption);

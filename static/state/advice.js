@@ -28,6 +28,7 @@ const TITLES = /** @type {Record<string, string>} */ ({
 	several_balls: 'View @ has several balls',
 	upstream_changed: 'The imported file has changed',
 	pitch_size: 'The pitch of this match has another size',
+	track_disagrees: 'The ball of @ contradicts its track',
 });
 
 /** A finding in a few words. @param {GroupDocument} group @param {FindingJson} finding */

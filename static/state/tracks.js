@@ -15,7 +15,7 @@ export const MODES = /** @type {Record<BallMode, {name: string, letter: string}>
 	roll: { name: 'rolls', letter: 'R' }, flight: { name: 'flies', letter: 'F' }, held: { name: 'is held', letter: 'H' }, out: { name: 'is out', letter: 'O' }, '': { name: 'not known', letter: '' },
 });
 export const EVENTS = /** @type {{kind: EventKind, key: string, letter: string}[]} */ ([
-	{ kind: 'kick', key: 'k', letter: 'K' }, { kind: 'bounce', key: 'b', letter: 'B' }, { kind: 'out', key: 'o', letter: 'O' },
+	{ kind: 'kick', key: '1', letter: 'K' }, { kind: 'bounce', key: '2', letter: 'B' }, { kind: 'out', key: '3', letter: 'O' },
 ]);
 
 /**
@@ -50,6 +50,11 @@ export function curvesOf(frames, axis) {
 	/** @param {number} by */
 	const edge = (by) => values.map((value, place) => (value === null ? null : value + by * (sigma[place] ?? 0)));
 	return { values, low: edge(-2), high: edge(2), raw: frames.raw.map((one) => (one ? sign * one[axis] : null)) };
+}
+
+/** Values of some frames where others are shown, null where they have none. @param {number[]} shown @param {{frame: number[]}} around @param {(number | null)[]} values one for each frame of `around` */
+export function amid(shown, { frame }, values) {
+	return shown.map((number) => values[number - frame[0]] ?? null);
 }
 
 /** The largest error that a curve shows: few are far larger than all others, and would flatten them. @param {(number | null)[]} values */

@@ -21,10 +21,18 @@ function tickText(place) {
 	return place.toLocaleString('en-GB', { maximumFractionDigits: 6 }).replace('-', '−');
 }
 
-/** @param {string} label @param {Record<ChartColour, string>} colours @param {number} size pixels @param {boolean} [compact] @returns {uPlot.Axis} */
-function axis(label, colours, size, compact) {
+/** Height of a line of numbers, and the width of one digit with what stands between two numbers, CSS pixels. */
+const [LINE, DIGIT, BETWEEN] = [24, 7.5, 16];
+
+/** Room that the numbers below a picture need side by side. @param {uPlot} _plot @param {number} _axis @param {number} low @param {number} high */
+function roomBeside(_plot, _axis, low, high) {
+	return BETWEEN + DIGIT * Math.max(...[low, high].map((end) => tickText(Math.round(end)).length));
+}
+
+/** @param {string} label @param {Record<ChartColour, string>} colours @param {number} size pixels @param {boolean} [compact] @param {uPlot.Axis.Space} [space] of two numbers, where it is compact @returns {uPlot.Axis} */
+function axis(label, colours, size, compact, space = LINE) {
 	const lines = { stroke: colours['chart-grid'], width: 1 };
-	const named = compact ? { size: size - 8, space: 24 } : { label, labelFont: FONT, labelSize: 20, size };
+	const named = compact ? { size: size - 8, space } : { label, labelFont: FONT, labelSize: 20, size };
 	return { ...named, font: FONT, stroke: colours.muted, grid: lines, ticks: { ...lines, size: 4 }, values: (_plot, places) => places.map(tickText) };
 }
 
@@ -100,7 +108,7 @@ export function chartOptions(props, { width, height, colours, setAt }) {
 			x: { time: false, range: (_plot, low, high) => rangeX(props.current.xRange, low, high) },
 			y: { range: (_plot, low, high) => rangeY(props.current.yRange, low ?? 0, high ?? 1) },
 		},
-		axes: [axis(xLabel, colours, 34, compact), axis(yLabel, colours, 52, compact)],
+		axes: [axis(xLabel, colours, 34, compact, roomBeside), axis(yLabel, colours, 52, compact)],
 		series: [{}, ...curves.map((curve) => seriesOf(curve, colours))],
 		hooks: {
 			draw: [(plot) => drawOver(plot, props.current, colours)],

@@ -3,10 +3,12 @@
 
 import { html } from 'htm/preact';
 
+import { address } from '../lib/router.js';
 import { findingTitle } from '../state/advice.js';
 import { dismiss } from '../state/dismissals.js';
 import { suggestions, shownFinding } from '../state/suggestions.js';
 import { openFindings } from '../state/open_findings.js';
+import { groupTrack } from '../state/group_track.js';
 import { pointTo } from '../state/workspace.js';
 import { Letter } from './letter.js';
 import { pageAddress } from './dataset_menu.js';
@@ -29,7 +31,7 @@ function Finding({ group, finding }) {
 				${checked ? html`<s><strong>${title}${sure}.</strong> ${finding.sentence}</s>` : html`<strong>${title}${sure}.</strong> ${finding.sentence}`}
 			</p>
 			${checked ? html`<p class="finding__checked">Dismissed${checked.by === 'local' ? '' : ` by ${checked.by}`}, <${When} at=${checked.at} />${checked.note ? ` · “${checked.note}”` : ''}</p>` : null}
-			${finding.kind === 'pitch_size' ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
+			<${FindingLink} finding=${finding} dataset=${group.dataset.name} />
 			${html`
 				<p class="finding__fixes">
 					<button type="button" data-needs="review" class="button button--small" title=${checked ? 'Make this finding flag the group again' : 'You checked this finding and it is fine: it no longer flags the group'} onClick=${() => dismiss(finding, !checked)}>${checked ? 'Reopen' : 'Dismiss'}<span class="hidden-text"> ${title}</span></button>
@@ -39,9 +41,12 @@ function Finding({ group, finding }) {
 	`;
 }
 
-/** Where the size of a match's pitch is accepted. @param {{dataset: string}} props */
-export function PitchLink({ dataset }) {
-	return html`<p><a class="link" href=${pageAddress(dataset, 'statistics')}>Pitch sizes under Statistics</a></p>`;
+/** Where something is seen whole that a finding says of a match or a track. @param {{finding: FindingJson | undefined, dataset: string}} props */
+export function FindingLink({ finding, dataset }) {
+	if (finding?.kind === 'pitch_size') return html`<p><a class="link" href=${pageAddress(dataset, 'statistics')}>Pitch sizes under Statistics</a></p>`;
+	const at = finding?.kind === 'track_disagrees' ? groupTrack.value : null;
+	if (!at) return null;
+	return html`<p><a class="link" href=${address(`/tracks/${at.track.id}`, { frame: String(at.frame) })}>Its track at frame ${at.frame}</a>${at.track.stale ? ' (stale: groups have changed since it was made)' : ''}</p>`;
 }
 
 /** @param {{group: GroupDocument, solution: SolutionJson}} props */

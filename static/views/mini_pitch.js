@@ -91,7 +91,7 @@ function rayOf({ x, y, ray }, { pitch }, { left, top, width, height }) {
 const drawn = new Map();
 
 /** The lines of a pitch as paths, made once for each size. @param {number} length @param {number} width */
-function linesOf(length, width) {
+export function linesOf(length, width) {
 	const key = `${length} ${width}`;
 	const lines = drawn.get(key) ?? [...pitchMarkings(length, width).values()].map(pathFromAbove);
 	drawn.set(key, lines);

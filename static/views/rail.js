@@ -20,6 +20,7 @@ import { ViewTable } from './view_table.js';
 
 const FirstSteps = lazy(async () => (await import('./first_steps.js')).FirstSteps);
 const CommentsCard = lazy(async () => (await import('./comments/comments_card.js')).CommentsCard);
+const TrackCard = lazy(async () => (await import('./track_card.js')).TrackCard);
 const LessonCard = lazy(async () => (await import('./lesson_card.js')).LessonCard);
 
 /**
@@ -41,6 +42,7 @@ export function Rail({ group, solution, pictures, live }) {
 					<${PairTable} group=${group} solution=${solution} />
 					<${Findings} group=${group} solution=${solution} />
 				` : null}
+				<${TrackCard} />
 				<${ViewLines} group=${group} pictures=${pictures} />
 				<${CommentsCard} group=${group} />
 				<${FirstSteps} dataset=${group.dataset.name} />

@@ -9,7 +9,7 @@ import { suggestion, shownFinding } from '../state/suggestions.js';
 import { REASONS } from '../state/reasons.js';
 import { isBlind } from '../state/verdicts.js';
 import { pointTo } from '../state/workspace.js';
-import { PitchLink } from './findings.js';
+import { FindingLink } from './findings.js';
 import { headline } from './verdict_text.js';
 import { SuggestionBox } from './suggestion_box.js';
 
@@ -48,7 +48,7 @@ export function VerdictCard({ group, solution, live }) {
 			<h1>${title}</h1>
 			<p class="verdict-card__text">${text}${sure === null ? '' : html` <span class="verdict-card__sure">${Math.round(sure * 100)} % sure.</span>`}</p>
 			${remarks.map((remark) => html`<p class="verdict-card__text" data-remark=${remark.letter}><${RemarkLink} group=${group} solution=${solution} remark=${remark} />${' '}${remark.text}</p>`)}
-			${solution?.findings.some(({ kind, sentence }) => kind === 'pitch_size' && sentence === text) ? html`<${PitchLink} dataset=${group.dataset.name} />` : null}
+			<${FindingLink} finding=${solution?.findings.find(({ sentence }) => sentence === text)} dataset=${group.dataset.name} />
 			<${SuggestionBox} group=${group} solution=${solution} />
 			${shownFinding.value ? html`<p class="verdict-card__checked"><button class="button button--small" type="button" data-needs="review" title="You checked this finding and it is fine; Ctrl Z reopens it" onClick=${dismissShown}>Dismiss finding <kbd>⇧S</kbd></button></p>` : null}
 			${isBlind(group) ? html`<p><span class="pill" data-status="no-picture">no picture</span> <span data-grade="warn">No view of this group has a picture to look at.</span></p>` : null}

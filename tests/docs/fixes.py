@@ -28,6 +28,7 @@ ACTIONS: dict[str, tuple[str, str | None]] = {
     "swap_sides": ("every marking under the name of its twin", "set_lines"),
     "pick_ball": ("one of several balls is the one in play: one offer for each", "set_balls"),
     "free_picture": ("the lines say how the picture was stretched or cropped", "set_picture"),
+    "move_ball": ("the ball goes to where its track is seen", "set_balls"),
     "move_point": ("a point of a marking goes where `point` says", "set_lines"),
     "drop_point": ("a point of a marking goes", "set_lines"),
     "drop_marking": ("a marking goes", "set_lines"),
@@ -76,6 +77,10 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "several_balls": (("pick_ball",), ""),
     "upstream_changed": ((), "keep it, or send what the files say: `PATCH /views/{id}/...`"),
     "pitch_size": ((), "`PATCH /datasets/{id}/pitches` with the size that is proposed"),
+    "track_disagrees": (
+        ("move_ball", "exclude_view"),
+        "`offers` has its other balls too; then make the track again: `POST /datasets/{id}/tracks`",
+    ),
 }
 """By the kind of a finding: what it proposes, and what else there is to do."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tests.e2e.film import write_film
+from tests.e2e.flown import fill_flights
 from tests.e2e.season import fill_season
 from tests.e2e.service import run_touchline
 
@@ -32,6 +33,11 @@ def build_film(folder: Path) -> None:
         f"import issia {files} --dataset film",
         "solve --dataset film --workers 1",
     )
+
+
+def build_flights(folder: Path) -> None:
+    """Two matches of one flight of the ball, solved and tracked, in ``home``."""
+    fill_flights(folder / "home")
 
 
 def build_season(folder: Path) -> None:

@@ -26,6 +26,7 @@ from tests.e2e.test_pages import TOO_WIDE
 from tests.flights import FIRST, KICK, flight_groups
 
 OpenPage = Callable[..., Page]
+ANOTHER_FRAME = """(frame) => Number(document.querySelector('.track__rail [data-frame]').dataset.frame) > frame"""
 COUNT = 70
 
 
@@ -92,7 +93,7 @@ class TestTracks:
         before = events.count()
         page.keyboard.press("d")
         expect(events).to_have_count(before - 1)
-        page.keyboard.press("k")
+        page.keyboard.press("1")
         expect(events).to_have_count(before)
 
         page.keyboard.press("a")
@@ -111,6 +112,30 @@ class TestTracks:
         track.keyboard.press("Enter")
         track.wait_for_url("**/review/*")
         expect(track.get_by_role("banner")).to_contain_text(str(frame))
+
+    def test_is_played_by_the_keys_of_recordings(self, track: Page) -> None:
+        frame = track.locator(".track__rail [data-frame]")
+        track.keyboard.press("w")
+        track.keyboard.press("Shift+ArrowLeft")
+        begun = int(frame.get_attribute("data-frame") or 0)
+        track.keyboard.press("l")
+        track.wait_for_function(ANOTHER_FRAME, arg=begun)
+        track.keyboard.press("k")
+        expect(track.get_by_role("button", name="Play")).to_be_visible()
+        stood = int(frame.get_attribute("data-frame") or 0)
+        assert stood > begun
+        track.wait_for_url(f"**/tracks/*?frame={stood}")
+        track.reload()
+        shows(track, stood)
+        track.keyboard.press("Space")
+        expect(track.get_by_role("button", name="Stop")).to_be_visible()
+        # At its end it stands by itself.
+        shows(track, FIRST + COUNT - 1)
+        expect(track.get_by_role("button", name="Play")).to_be_visible()
+
+    def test_the_address_leads_to_a_frame(self, track: Page) -> None:
+        track.goto(f"{track.url.partition('?')[0]}?frame={FIRST + 31}")
+        shows(track, FIRST + 31)
 
     def test_its_pages_are_accessible_in_every_size(self, track: Page) -> None:
         for selector in (".track__band", ".table"):

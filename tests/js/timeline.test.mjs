@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { binned, heightOf, toIndex, topOf, toX } from '../../static/views/timeline/drawing.js';
+import { binned, drawCurve, heightOf, toIndex, topOf, toX } from '../../static/views/timeline/drawing.js';
 
 /** A timeline of errors; null is not solved. */
 function columnsOf(errors, status = []) {
@@ -22,6 +22,26 @@ describe('toX and toIndex', () => {
 
 	it('keep a single frame at the start', () => {
 		assert.equal(toIndex({ from: 0, to: 0 }, 700, toX({ from: 0, to: 0 }, 700, 0)), 0);
+	});
+});
+
+describe('drawCurve', () => {
+	it('marks what a track leaves out where an edit was made', () => {
+		const drawn = [];
+		const context = new Proxy({}, {
+			get: (_, name) => (...numbers) => { if (name === 'lineTo') drawn.push(numbers); },
+			set: () => true,
+		});
+		const curve = { columns: columnsOf(Array(10).fill(1)), span: { from: 0, to: 9 }, limit: 22, position: -1 };
+		const size = { width: 100, height: 60 };
+		drawCurve(context, size, curve, {});
+		const before = drawn.length;
+		drawCurve(context, size, { ...curve, leftOut: new Map([[3, 5], [4, 9000]]) }, {});
+		const x = toX(curve.span, 100, 3);
+		const marks = drawn.slice(2 * before);
+		assert.equal(marks.length, 8);
+		assert.deepEqual(marks.slice(0, 4).map(([left]) => left - x), [0, 4, 0, -4]);
+		assert.ok(marks.every(([, y]) => y >= 0 && y <= 60));
 	});
 });
 

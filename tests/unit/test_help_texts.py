@@ -24,7 +24,7 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
-    estimates etag orphan
+    around assign estimates etag listing orphan player
     3d accept access account action actions actors address adjudicate adjust adjustments admission adopt advice
     after ahead anchor annotate app arrays arrival ask attempt axis backup bar bars batches before best binned block
     blocks bodies body boxes browser bulk bundle button buttons cache calibrate candidate canonical canvas caption

@@ -17,6 +17,8 @@ from sqlalchemy import (
     exists,
     func,
     insert,
+    literal,
+    or_,
     select,
     update,
 )
@@ -24,12 +26,19 @@ from sqlalchemy import (
 from app.db.dialects.statements import insert as upsert
 from app.db.log import LogModel
 from app.db.session import Session
-from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel, LeaseModel
+from app.features.batches.tables import (
+    BatchGroupModel,
+    BatchModel,
+    BatchPersonModel,
+    BatchTrackModel,
+    LeaseModel,
+)
 from app.features.datasets.tables import DatasetModel
 from app.features.independent_annotations.tables import IndependentAnnotationModel
 from app.features.people.tables import PersonModel
 from app.features.people.visibility_queries import seen_in
 from app.features.queue.tables import QueueModel
+from app.features.tracks.tables import TrackModel
 from app.soccer.choices import BatchState
 
 OPEN: BatchState = "open"
@@ -73,6 +82,18 @@ _COUNT = (
     .where(BatchGroupModel.batch_id.in_(_IDS))
     .group_by(BatchGroupModel.batch_id)
 )
+_COUNT_TRACKS = (
+    select(
+        BatchTrackModel.batch_id,
+        func.count().label("groups"),
+        literal(0).label("submitted"),
+        func.count(TrackModel.verdict).label("settled"),
+        func.max(TrackModel.judged_at).label("last"),
+    )
+    .join(TrackModel, TrackModel.id == BatchTrackModel.track_id)
+    .where(BatchTrackModel.batch_id.in_(_IDS))
+    .group_by(BatchTrackModel.batch_id)
+)
 _DONE_KINDS = ("edit", "undo", "redo", "verdict")
 """Entries of the log that show that somebody works on a group."""
 
@@ -96,12 +117,18 @@ def datasets_with_batches(session: Session) -> list[int]:
 
 
 def batches_that_wait(session: Session, dataset_ids: Collection[int]) -> list[int]:
-    """Ids of the open batches of datasets in which a group waits."""
+    """Ids of the open batches of datasets in which a group or a track waits."""
     waits = exists().where(
         BatchGroupModel.batch_id == BatchModel.id, BatchGroupModel.settled.is_(None)
     )
+    open_tracks = exists().where(
+        BatchTrackModel.batch_id == BatchModel.id,
+        TrackModel.id == BatchTrackModel.track_id,
+        TrackModel.verdict.is_(None),
+    )
     mine = (BatchModel.dataset_id.in_(dataset_ids), BatchModel.state == OPEN)
-    return list(session.scalars(select(BatchModel.id).where(*mine, waits).order_by(BatchModel.id)))
+    found = select(BatchModel.id).where(*mine, or_(waits, open_tracks)).order_by(BatchModel.id)
+    return list(session.scalars(found))
 
 
 def insert_batch(session: Session, values: Mapping[str, Any]) -> int:
@@ -142,6 +169,29 @@ def insert_groups(session: Session, batch_id: int, group_ids: Sequence[int]) -> 
     ]
     if rows:
         session.execute(insert(BatchGroupModel), rows)
+
+
+def insert_tracks(session: Session, batch_id: int, track_ids: Sequence[int]) -> None:
+    """Put tracks into a batch that has none, in this order."""
+    rows = [
+        {"batch_id": batch_id, "track_id": track, "place": place}
+        for place, track in enumerate(track_ids, start=1)
+    ]
+    session.execute(insert(BatchTrackModel), rows)
+
+
+def tracks_given(session: Session, dataset_id: int) -> dict[int, list[tuple[int, int]]]:
+    """The open batches of a dataset that each track is in: their ids, and its place in them."""
+    statement = (
+        select(BatchTrackModel.track_id, BatchTrackModel.batch_id, BatchTrackModel.place)
+        .join(BatchModel, BatchModel.id == BatchTrackModel.batch_id)
+        .where(BatchModel.dataset_id == dataset_id, BatchModel.state == OPEN)
+        .order_by(BatchTrackModel.batch_id)
+    )
+    found: dict[int, list[tuple[int, int]]] = {}
+    for track, batch, place in session.execute(statement):
+        found.setdefault(track, []).append((batch, place))
+    return found
 
 
 def groups_given(session: Session, dataset_id: int) -> set[int]:
@@ -186,9 +236,14 @@ def groups_returned(session: Session, batch_ids: Collection[int], person: str) -
 
 
 def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, Any]:
-    """Of each batch ``groups``, ``submitted`` (and not settled), ``settled``, and ``last``, when
-    something of it was done last."""
-    return {row.batch_id: row for row in session.execute(_COUNT, {"ids": list(batch_ids)})}
+    """Of each batch ``groups`` (or tracks), ``submitted`` (and not settled), ``settled``, and ``last``,
+    when something of it was done last."""
+    ids = {"ids": list(batch_ids)}
+    return {
+        row.batch_id: row
+        for count in (_COUNT, _COUNT_TRACKS)
+        for row in session.execute(count, ids)
+    }
 
 
 def mark_submitted(

@@ -8,7 +8,14 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.batches.progress import Pace
-from app.features.batches.service import MOST_GROUPS, MOST_VERDICTS, RAREST_GOLD, BatchGroup, Part
+from app.features.batches.service import (
+    MOST_GROUPS,
+    MOST_VERDICTS,
+    RAREST_GOLD,
+    BatchGroup,
+    BatchKind,
+    Part,
+)
 from app.features.datasets.service import MAX_TITLE
 from app.features.independent_annotations.service import ReturnedGroup
 from app.features.queue.query import MAX_LISTED_LENGTH
@@ -58,6 +65,13 @@ class NewBatchDocument(BaseModel):
     gold_every: Annotated[int, Field(ge=1, le=RAREST_GOLD)] | None = Field(
         default=None, description="One of so many groups is a gold one; null: none is."
     )
+    tracks: (
+        Annotated[list[Annotated[int, Field(ge=1, le=MAX_ID)]], Field(max_length=MOST_GROUPS)]
+        | None
+    ) = Field(
+        default=None,
+        description="Ids of tracks of the ball, which reviewers judge, in place of groups.",
+    )
 
 
 class BatchEdit(BaseModel):
@@ -86,6 +100,7 @@ class WorkBatchDocument(Document):
     id: int
     dataset: str
     name: str
+    kind: BatchKind = Field(description="What is given out; the counts are of these.")
     q: str = Field(validation_alias="query")
     sort: str
     verdicts: int

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
-from typing import Any
+from typing import Any, Literal
 
 from app.db.log import Entry, append
 from app.db.session import Session, now
@@ -24,9 +24,11 @@ from app.features.batches.queries import (
     groups_of,
     insert_batch,
     insert_groups,
+    insert_tracks,
     leases_of,
     people_of,
     set_people,
+    tracks_given,
     update_batch,
 )
 from app.features.datasets.service import checked_title, dataset_id
@@ -36,12 +38,16 @@ from app.features.notifications.service import notify
 from app.features.people.members import list_members
 from app.features.people.roles import Action, lets
 from app.features.queue.queries import Listing
-from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
+from app.features.queue.query import MAX_LISTED_LENGTH, Query, parse_query
+from app.features.tracks.queries import list_rows
 from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, announce_batch
 from app.finite import Moment
 from app.plural import plural
 from app.soccer.actors import person_of
 
+BatchKind = Literal["groups", "tracks"]
+GROUPS: BatchKind = "groups"
+TRACKS: BatchKind = "tracks"
 MOST_GROUPS = 10_000
 """Of one batch."""
 MOST_BATCHES = 500
@@ -73,6 +79,7 @@ class NewBatch:
         size: So many of them, the first ones; None: all.
         skip_given: Skip groups that are in another open batch.
         verdicts, blind, gold_every: As ``BatchModel`` has them.
+        tracks: Ids of tracks of the ball in place of groups, in the order in which they are given out.
     """
 
     name: str
@@ -85,6 +92,7 @@ class NewBatch:
     verdicts: int = 1
     blind: bool = True
     gold_every: int | None = None
+    tracks: Sequence[int] | None = None
 
 
 @dataclass(frozen=True)
@@ -104,7 +112,8 @@ class Batch:
     Attributes:
         annotators, reviewers: Names; nobody: every reviewer of the dataset may review, and nobody
             is asked to annotate.
-        groups, submitted, settled: How many there are, wait for a verdict, and are done.
+        kind: ``groups`` or ``tracks``.
+        groups, submitted, settled: How many there are (or tracks), wait for a verdict, and are done.
         last: When one of them was submitted or done last.
         here: Who has which group open.
     """
@@ -113,6 +122,7 @@ class Batch:
     dataset_id: int
     dataset: str
     name: str
+    kind: BatchKind
     query: str
     sort: str
     verdicts: int
@@ -207,6 +217,8 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
     """
     query = parse_query(new.query, longest=MAX_LISTED_LENGTH)
     _check(new)
+    if new.tracks is not None:
+        _check_tracks(new)
     number = dataset_id(store, dataset)
     people = {
         Part.ANNOTATOR: _ids(store, number, Part.ANNOTATOR, new.annotators),
@@ -217,16 +229,13 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
             raise ConflictError(
                 f"a dataset has at most {MOST_BATCHES} batches", hint="Delete one that is closed."
             )
-        found = Listing(session, number, query.conditions).ids(query.order)
-        given = groups_given(session, number) if new.skip_given else set()
-        ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
-        if not ids:
-            raise _no_groups_error(found)
+        ids = _chosen(session, number, new, query)
         if new.gold_every is not None:
             _require_gold(session, number)
         values = {
             "dataset_id": number,
             "name": new.name.strip(),
+            "kind": GROUPS if new.tracks is None else TRACKS,
             "query": new.query.strip(),
             "sort": f"{query.sort}-desc" if query.descending else query.sort,
             "verdicts": new.verdicts,
@@ -238,7 +247,7 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
             "created_by": actor,
         }
         made = insert_batch(session, values)
-        insert_groups(session, made, ids)
+        (insert_groups if new.tracks is None else insert_tracks)(session, made, ids)
         for part, chosen in people.items():
             set_people(session, made, part, chosen)
         batch = read_batch(session, made)
@@ -247,6 +256,23 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         announce_batch(session, made, GIVEN_OUT, actor=actor, at=batch.created)
         session.respond(batch)
         return batch
+
+
+def _chosen(session: Session, dataset: int, new: NewBatch, query: Query) -> list[int]:
+    """Ids of the groups or tracks that are given out."""
+    if new.tracks is None:
+        found = Listing(session, dataset, query.conditions).ids(query.order)
+        given: Collection[int] = groups_given(session, dataset) if new.skip_given else set()
+    else:
+        found = list(dict.fromkeys(new.tracks))
+        known = {row.id for row in list_rows(session, dataset)}
+        if strange := [one for one in found if one not in known]:
+            raise InputError(f"track {strange[0]} is not of this dataset", pointer="/tracks")
+        given = tracks_given(session, dataset) if new.skip_given else set()
+    ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
+    if not ids:
+        raise _no_tracks_error(found) if new.tracks is not None else _no_groups_error(found)
+    return ids
 
 
 def change_batch(
@@ -389,6 +415,20 @@ def _check(new: NewBatch) -> None:
     _check_gold(new.gold_every)
 
 
+def _check_tracks(new: NewBatch) -> None:
+    """Tracks are judged, each by one reviewer."""
+    if new.annotators:
+        raise InputError(
+            "nobody annotates tracks; a batch of them has reviewers", pointer="/annotators"
+        )
+    if new.query or new.verdicts != 1 or new.gold_every is not None:
+        raise InputError(
+            "a batch of tracks has no query, no gold groups, and one verdict on each",
+            hint="Name the tracks, or leave `tracks` out and give out groups.",
+            pointer="/tracks",
+        )
+
+
 def _check_gold(every: int | None) -> None:
     if every is not None and not 1 <= every <= RAREST_GOLD:
         raise InputError(f"one of 1 to {RAREST_GOLD} groups is a gold one", pointer="/gold_every")
@@ -414,12 +454,22 @@ def _no_groups_error(found: Sequence[int]) -> InputError:
     )
 
 
+def _no_tracks_error(found: Sequence[int]) -> InputError:
+    if not found:
+        return InputError("no track is named", pointer="/tracks")
+    return InputError(
+        "every one of these tracks is in an open batch already",
+        hint="Assign them anyway, or choose other tracks.",
+        pointer="/tracks",
+    )
+
+
 def _notify_people(session: Session, batch: Batch, people: Iterable[str], actor: str) -> None:
     """Tell people that work was given to them."""
     by = person_of(actor)
     due = "" if batch.due is None else f", due {batch.due}"
     # Who is told how many groups it has counts how many gold ones are mixed in.
-    groups = "groups" if batch.gold_every is not None else plural(batch.groups, "group")
+    groups = "groups" if batch.gold_every is not None else plural(batch.groups, batch.kind[:-1])
     sentence = f"{by} assigned you work: {batch.name}, {groups} of {batch.dataset}{due}"
     for name in dict.fromkeys(people):
         notify(

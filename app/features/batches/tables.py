@@ -9,7 +9,8 @@ from app.db.base import Base
 
 
 class BatchModel(Base):
-    """Groups of a dataset that a lead gives out: what a query found in an order when it was made.
+    """Groups of a dataset that a lead gives out: what a query found in an order when it was made; or
+    tracks of the ball, where ``kind`` is ``tracks`` and not ``groups``.
 
     ``verdicts`` is how many people judge or annotate each group without seeing the others', where
     ``blind``. One of ``gold_every`` groups on average is a gold one; NULL: none is. ``due`` is a
@@ -22,6 +23,7 @@ class BatchModel(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id", ondelete="CASCADE"))
     name: Mapped[str]
+    kind: Mapped[str] = mapped_column(server_default="groups")
     query: Mapped[str]
     sort: Mapped[str]
     verdicts: Mapped[int]
@@ -76,6 +78,21 @@ class BatchGroupModel(Base):
     submitted: Mapped[str | None] = mapped_column("handed_in", key="submitted")
     submitted_by: Mapped[str | None] = mapped_column("handed_in_by", key="submitted_by")
     settled: Mapped[str | None]
+
+
+class BatchTrackModel(Base):
+    """A track of a batch, at its ``place`` (from 1); its own verdict says whether it is done."""
+
+    __tablename__ = "batch_track"
+    __table_args__ = (Index("batch_track_track", "track_id"),)
+
+    batch_id: Mapped[int] = mapped_column(
+        ForeignKey("batch.id", ondelete="CASCADE"), primary_key=True
+    )
+    track_id: Mapped[int] = mapped_column(
+        ForeignKey("track.id", ondelete="CASCADE"), primary_key=True
+    )
+    place: Mapped[int]
 
 
 class LeaseModel(Base):

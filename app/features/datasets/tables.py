@@ -5,7 +5,7 @@ Marks tell which groups have changed, in the order of their last change.
 
 from __future__ import annotations
 
-from sqlalchemy import ForeignKey, Index, LargeBinary, UniqueConstraint, text
+from sqlalchemy import Double, ForeignKey, Index, LargeBinary, UniqueConstraint, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.base import Base
@@ -139,7 +139,12 @@ class UnassignedFrameModel(Base):
 
 
 class ImportFindingModel(Base):
-    """What an import noticed about a group (or a shared station) that a person had edited."""
+    """What an import noticed about a group (or a shared station) that a person had edited, and what
+    matches and tracks say of groups.
+
+    ``number`` is the finding's, ``place`` (JSON) x and y of where its ball would be. ``of_inputs`` is the
+    hash of the group of which it is said: of another state of the group it says nothing; NULL: it stays.
+    """
 
     __tablename__ = "import_finding"
     __table_args__ = (
@@ -153,6 +158,9 @@ class ImportFindingModel(Base):
     view: Mapped[str | None]
     kind: Mapped[str]
     sentence: Mapped[str]
+    number: Mapped[float | None] = mapped_column(Double)
+    place: Mapped[str | None]
+    of_inputs: Mapped[str | None]
 
 
 class PaintEvidenceModel(Base):

@@ -2,24 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
 from sqlalchemy import Table, delete, insert, select
 
+from app.canonical import canonical
+from app.db.json_columns import as_written, parse
 from app.db.log import Entry, append
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel
 from app.features.findings.tables import DismissalModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.alias_queries import shown_actor
-from app.soccer.finding import PICTURE_GEOMETRY, PITCH_SIZE, Dismissal, Finding
+from app.soccer.finding import (
+    PICTURE_GEOMETRY,
+    PITCH_SIZE,
+    TRACK_DISAGREES,
+    Dismissal,
+    Finding,
+    Fix,
+    PlacedFinding,
+)
 
-SEEN = (PITCH_SIZE, PICTURE_GEOMETRY)
+SEEN = (PITCH_SIZE, PICTURE_GEOMETRY, TRACK_DISAGREES)
 """Kinds that stand beside what imports noticed and are in no log: computed, or seen of pictures."""
 Noticed = tuple[str | None, str]
 """Key of a view, or None where the whole group is meant; and the sentence."""
+
+
+def findings_of(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
+    """What was noticed about a group as it is now.
+
+    Args:
+        rows: Of the group, as ``features.queue.refresh_queries.read_import_findings`` has them.
+        inputs_hash: Of the group now; what was said of another state of it is left out.
+    """
+    return [_noticed(row) for row in rows if row.of_inputs in (None, inputs_hash)]
+
+
+def _noticed(row: Any) -> Finding:
+    if row.kind != TRACK_DISAGREES:
+        return Finding(row.kind, row.sentence, view=row.view)
+    with as_written():
+        place = None if row.place is None else tuple(parse(row.place))
+    fix = Fix("move_ball" if place else "exclude_view", row.view)
+    return PlacedFinding(
+        row.kind, row.sentence, view=row.view, number=row.number, fix=fix, place=place
+    )
 
 
 def group_findings(session: Session, group_id: int) -> list[Noticed]:
@@ -110,6 +141,77 @@ def replace_shape_findings(
     rows = [(ids[group], view, text) for group, view, text in fresh if group in ids]
     add_group_findings(session, PICTURE_GEOMETRY, rows)
     return sorted({row.group_id for row in gone} | {row[0] for row in rows})
+
+
+@dataclass(frozen=True)
+class BallNotice:
+    """A ball that a track does not explain, as it is stored.
+
+    Attributes:
+        group_id: Of the group.
+        view: Key of the view.
+        sentence: What is wrong.
+        number: How far from the track, pixels.
+        place: Where the track is seen, pixels; None where it is not.
+        of_inputs: Hash of the group that shows it there.
+    """
+
+    group_id: int
+    view: str
+    sentence: str
+    number: float
+    place: tuple[float, float] | None
+    of_inputs: str
+
+
+def replace_track_findings(
+    session: Session,
+    dataset_id: int,
+    matches: Collection[str],
+    groups: Container[int] | None,
+    found: Iterable[BallNotice],
+) -> list[int]:
+    """Put balls that tracks do not explain in the place of those that groups have.
+
+    Args:
+        session: Of a write.
+        dataset_id: The dataset.
+        matches: Of the groups.
+        groups: Ids of those that are asked about; None: all of the matches.
+        found: All of them; what is there already is not written again.
+
+    Returns:
+        Ids of the groups concerned.
+    """
+    model = ImportFindingModel
+    columns = (model.group_id, model.view, model.sentence, model.number, model.place)
+    statement = (
+        select(model.id, *columns, model.of_inputs)
+        .join(GroupModel, GroupModel.id == model.group_id)
+        .where(GroupModel.dataset_id == dataset_id, GroupModel.match.in_(list(matches)))
+        .where(model.kind == TRACK_DISAGREES)
+    )
+    present: dict[tuple[Any, ...], int] = {
+        tuple(row[1:]): row.id
+        for row in session.execute(statement)
+        if groups is None or row.group_id in groups
+    }
+    wanted: set[tuple[Any, ...]] = {
+        (
+            *(item.group_id, item.view, item.sentence, item.number),
+            *(None if item.place is None else canonical(item.place), item.of_inputs),
+        )
+        for item in found
+    }
+    gone = [number for key, number in present.items() if key not in wanted]
+    if gone:
+        session.execute(delete(model).where(model.id.in_(gone)))
+    names = ("group_id", "view", "sentence", "number", "place", "of_inputs")
+    fresh = sorted(wanted - present.keys(), key=lambda key: (key[0], str(key[1])))
+    if fresh:
+        rows = [dict(zip(names, key, strict=True)) | {"kind": TRACK_DISAGREES} for key in fresh]
+        session.execute(insert(model), rows)
+    return sorted({key[0] for key in present.keys() ^ wanted})
 
 
 DISMISSAL = "dismissal"

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from app.db.session import Session
 from app.errors import NotFoundError, StaleRevisionError
 from app.features.datasets.queries import policy_of
-from app.features.findings.queries import NOTHING_DISMISSED, GroupDismissals
+from app.features.findings.queries import NOTHING_DISMISSED, GroupDismissals, findings_of
 from app.features.groups.digest import digest
 from app.features.groups.etag_queries import find_etag_row, read_etag_rows
 from app.features.groups.queries import StoredGroup, read_groups
@@ -136,7 +137,7 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
         content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
         findings = None
         if row.summary is not None:
-            kinds = [item.kind for item in noticed[row.id]]
+            kinds = [item.kind for item in findings_of(noticed[row.id], row.inputs_hash)]
             findings = [*json.loads(row.summary)["findings"], *kinds]
         name = policy_of(row.policy).name
         revisions = int(row.station_revisions)
@@ -212,14 +213,14 @@ class Record:
     """A group with all that is kept about it but its solution.
 
     Attributes:
-        noticed: What imports noticed.
+        said: Rows of what imports and tracks noticed.
         verdicts: The last of each person, the newest first.
         stacks: What can be undone and done again.
         dismissals: Findings that people have checked.
     """
 
     stored: StoredGroup
-    noticed: tuple[Finding, ...]
+    said: tuple[Any, ...]
     verdicts: tuple[StoredVerdict, ...]
     stacks: UndoStacks
     dismissals: GroupDismissals = NOTHING_DISMISSED
@@ -228,6 +229,11 @@ class Record:
     def solution_key(self) -> SolutionKey:
         """The key of the solution of this state."""
         return SolutionKey(self.stored.id, self.stored.inputs_hash, self.stored.policy.hash)
+
+    @property
+    def noticed(self) -> tuple[Finding, ...]:
+        """What was noticed about the group as it is."""
+        return tuple(findings_of(self.said, self.stored.inputs_hash))
 
     @property
     def content(self) -> str:
@@ -246,8 +252,9 @@ class Record:
         """The group as people see it, with its solution where that is known."""
         stored = self.stored
         passes = None if solution is None else solution.passes
-        if solution is not None and self.noticed:
-            solution = replace(solution, findings=solution.findings + self.noticed)
+        noticed = self.noticed
+        if solution is not None and noticed:
+            solution = replace(solution, findings=solution.findings + noticed)
         edited = stored.edited
         verdicts = [
             _verdict_state(item, stored, edited, passes)
@@ -308,7 +315,7 @@ def read_records(session: Session, group_ids: Sequence[int]) -> list[Record]:
     return [
         Record(
             stored,
-            tuple(Finding(row.kind, row.sentence, view=row.view) for row in noticed[number]),
+            tuple(noticed[number]),
             tuple(verdicts.get(number, ())),
             stacks[number],
             dismissals.get(number, NOTHING_DISMISSED),

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from app.features.groups.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, lines_without
-from app.soccer.finding import Finding, Fix
+from app.soccer.finding import Finding, Fix, PlacedFinding
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View, view_letter
 from app.soccer.picture import OPEN
@@ -98,6 +98,8 @@ def offers_of_finding(group: Group, finding: Finding) -> tuple[Offer, ...]:
     """The edits that mend what a finding says: those of its fix, or its ball's box fitted."""
     if finding.kind == "ball_size":
         return _fitted_box_offers(group, finding)
+    if isinstance(finding, PlacedFinding):
+        return _beside_track_offers(group, finding)
     return offers_of_fix(group, finding.fix)
 
 
@@ -134,6 +136,17 @@ def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBal
     return SetBall(view, replace(ball, box=moved))
 
 
+def _beside_track_offers(group: Group, finding: PlacedFinding) -> tuple[Offer, ...]:
+    """The ball at the place of the track, another ball of the view, or the view left out."""
+    key = finding.view
+    view = None if key is None else group.view(key)
+    place = None if finding.place is None else ImagePoint(*finding.place)
+    moved = offers_of_fix(group, Fix("move_ball", key), place) if place is not None else ()
+    others = () if view is None else _fixes_to_choose(view, Fix("pick_ball", key))
+    picked = [offer for fix in others if fix.index for offer in offers_of_fix(group, fix)]
+    return (*moved, *picked, *offers_of_fix(group, Fix("exclude_view", key)))
+
+
 def _fitted_box_offers(group: Group, finding: Finding) -> tuple[Offer, ...]:
     """A box as large as the ball looks at its distance; the number is how many times as large it is now."""
     view = None if finding.view is None else group.view(finding.view)
@@ -168,6 +181,11 @@ def _include_view_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit 
 def _pick_ball_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     there = fix.index is not None and fix.index < len(view.balls)
     return SetBall(view.key, view.balls[fix.index or 0]) if there else None
+
+
+def _move_ball_edit(view: View, _fix: Fix, point: ImagePoint | None) -> Edit | None:
+    ball = next((one for one in view.balls if not one.out_of_view), None)
+    return None if point is None or ball is None else move_ball_edit(view.key, ball, point)
 
 
 def _swap_sides_edit(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit | None:
@@ -262,6 +280,13 @@ _ACTIONS = {
         "ball {number} was the one in play in {letter}",
         "Keep ball {number}",
         edit=_pick_ball_edit,
+    ),
+    "move_ball": _FixAction(
+        1,
+        "the ball of {letter} was where its track is seen",
+        "Move the ball there",
+        "is the ball here?",
+        _move_ball_edit,
     ),
     "free_picture": _FixAction(
         1,

@@ -36,6 +36,7 @@ from app.features.findings.queries import (
     GroupDismissals,
     current_dismissals,
     dismissed_kinds,
+    findings_of,
 )
 from app.features.findings.tables import DismissalModel
 from app.features.groups.queries import StoredGroup
@@ -63,7 +64,11 @@ _NOTICE = ImportFindingModel.__table__
 _VIEW = ViewModel.__table__
 _IDS: BindParameter[Any] = bindparam("ids", expanding=True)
 _CHECKED = DismissalModel.__table__
-_UNKNOWN = [cast_to(null(), column.type).label(column.name) for column in SHOWN]
+_UNKNOWN = [
+    _NOTICE.c.number if column.name == "number" else cast_to(null(), column.type).label(column.name)
+    for column in SHOWN
+]
+_SAID_OF = [_NOTICE.c.place, _NOTICE.c.of_inputs]
 _NOTICED = union_all(
     select(
         _NOTICE.c.group_id.label("group"),
@@ -73,16 +78,17 @@ _NOTICED = union_all(
         literal(0).label("source"),
         _NOTICE.c.id,
         *_UNKNOWN,
+        *_SAID_OF,
     ).where(_NOTICE.c.group_id.in_(_IDS)),
     select(
         *(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, literal(1)),
-        *(_NOTICE.c.id, *_UNKNOWN),
+        *(_NOTICE.c.id, *_UNKNOWN, *_SAID_OF),
     )
     .join_from(_VIEW, _NOTICE, _NOTICE.c.station_id == _VIEW.c.station_id)
     .where(_VIEW.c.group_id.in_(_IDS)),
     select(
         *(_CHECKED.c.group_id, _CHECKED.c.kind, _CHECKED.c.sentence, _CHECKED.c.view, literal(2)),
-        *(_CHECKED.c.id, *SHOWN),
+        *(_CHECKED.c.id, *SHOWN, *(cast_to(null(), column.type) for column in _SAID_OF)),
     ).where(_CHECKED.c.group_id.in_(_IDS)),
 ).order_by("source", "id")
 """A group's own come before those of its static cameras; then what people have dismissed."""
@@ -183,13 +189,15 @@ def _queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of groups as they follow from everything else."""
     views, verdicts = _views_by_group(session, ids), _newest_verdicts_by_group(session, ids)
     (findings, dismissals), edited = read_import_findings(session, ids), edited_groups(session, ids)
-    checked = _findings_by_dismissal(session, dismissals, findings)
+    heads = _groups_with_summaries(session, ids)
+    own = {head.id: findings_of(findings[head.id], head.inputs_hash) for head, _ in heads}
+    checked = _findings_by_dismissal(session, dismissals, own)
     rows = []
-    for head, summary in _groups_with_summaries(session, ids):
+    for head, summary in heads:
         passes = None if summary is None else summary.passes
         judged = _verdict_columns(head, verdicts.get(head.id), edited, passes)
         row = {**_group_columns(head, views[head.id]), **judged}
-        row.update(_solution_columns(summary, [item.kind for item in findings[head.id]]))
+        row.update(_solution_columns(summary, [item.kind for item in own[head.id]]))
         rows.append(row | checked.get(head.id, {}))
     return rows
 
@@ -197,7 +205,7 @@ def _queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
 def _findings_by_dismissal(
     session: Session,
     dismissals: Mapping[int, GroupDismissals],
-    noticed: Mapping[int, Sequence[Any]],
+    noticed: Mapping[int, Sequence[Finding]],
 ) -> dict[int, dict[str, Any]]:
     """Which kinds of findings are open and which dismissed, of the few groups in which people have
     dismissed any: their solutions are decoded."""
@@ -218,8 +226,7 @@ def _findings_by_dismissal(
     checked = {}
     for group, dismissed in dismissals.items():
         solved = solutions.get(group)
-        own = [Finding(row.kind, row.sentence, view=row.view) for row in noticed[group]]
-        found = [*(() if solved is None else solved.findings), *own]
+        found = [*(() if solved is None else solved.findings), *noticed[group]]
         opened, closed = dismissed_kinds(found, dismissed)
         checked[group] = {
             "findings": _comma_separated(opened),
@@ -278,7 +285,7 @@ def read_import_findings(
     findings people have dismissed, in one statement.
 
     Returns:
-        Rows (kind, sentence, view), and what was dismissed, by group id.
+        Rows for ``findings_of``, and what was dismissed, by group id.
     """
     rows = session.execute(_NOTICED, {"ids": list(ids)}).all()
     found: dict[int, list[Any]] = defaultdict(list)

@@ -25,6 +25,7 @@ from app.features.tracks.codec import (
     track_from_json,
     track_to_json,
 )
+from app.features.tracks.findings import refresh_findings
 from app.features.tracks.queries import (
     TrackGroup,
     delete_tracks,
@@ -98,7 +99,7 @@ def make_tracks(
         stretches: list[Stretch] = []
         for items in timed.values():
             records = []
-            for record in _records(session, items):
+            for record in read_records(session, items):
                 records.append(record)
                 if len(records) % BATCH == 0:
                     progress(done + len(records), total)
@@ -115,10 +116,12 @@ def make_tracks(
             made.without.append({"stretch": stretch.key, "reason": reason})
         progress(done, total, f"{tracked} of {len(stretches)} stretches tracked.")
     _forget(store, found, stretches, matches)
+    with store.write() as session:
+        refresh_findings(session, found.id, groups.keys())
     return made
 
 
-def _records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
+def read_records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
     """Groups with their solutions; those that people rejected measure nothing."""
     ids = [group.id for group in groups if not group.rejected]
     for start in range(0, len(ids), BATCH):
@@ -128,7 +131,7 @@ def _records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportR
 
 def _says_time(session: Session, groups: Sequence[TrackGroup]) -> bool:
     """Whether a match's groups follow each other in time, by the first of them."""
-    first = next(iter(_records(session, groups[:1])), None)
+    first = next(iter(read_records(session, groups[:1])), None)
     return first is None or instant_of(first.group) is not None
 
 

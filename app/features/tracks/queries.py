@@ -63,6 +63,12 @@ def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[i
         }
 
 
+def place_of_group(session: Session, group_id: int) -> Any | None:
+    """Dataset, match and key of a group; None where there is none."""
+    columns = GroupModel.dataset_id, GroupModel.match, GroupModel.key
+    return session.execute(select(*columns).where(GroupModel.id == group_id)).one_or_none()
+
+
 def _heads() -> Select[Any]:
     columns = [item for item in TrackModel.__table__.columns if item.name not in _LARGE]
     return select(*columns, DatasetModel.name.label("dataset")).join_from(

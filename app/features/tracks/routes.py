@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 
 from app.features.jobs.queries import Job
 from app.features.match_estimates.schemas import MatchRequest
 from app.features.tracks import service as tracks
+from app.features.tracks.around import track_around, tracks_of_group
 from app.features.tracks.jobs import TRACKS
+from app.features.tracks.listing import TrackChoice, TrackOrder, choose_tracks
 from app.features.tracks.schemas import (
     MOST_FRAMES,
+    GroupTrackList,
+    TrackAround,
     TrackDocument,
     TrackEdit,
     TrackFrames,
@@ -25,7 +29,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
 from app.http.job_responses import by_job, job_answer
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import QUESTIONS, limit
+from app.http.request_limits import LOOKS, QUESTIONS, limit
 from app.http.respond import document, responds
 from app.http.route import Route
 
@@ -37,9 +41,34 @@ router = APIRouter(tags=["tracks"], route_class=Route)
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(QUESTIONS)
 @paged()
-def list_tracks(dataset: DatasetPath, store: AppStore) -> TrackList:
-    """The tracks of a dataset, by match and frame, each with how well it predicts what was left out."""
-    return TrackList.model_validate({"items": tracks.list_tracks(store, dataset)})
+def list_tracks(
+    dataset: DatasetPath,
+    store: AppStore,
+    verdict: Annotated[
+        Literal["accepted", "rejected", "none"] | None,
+        Query(description="Only those; `none`: nobody judged them."),
+    ] = None,
+    stale: Annotated[
+        bool | None, Query(description="Only those whose groups have changed since, or have not.")
+    ] = None,
+    assigned: Annotated[
+        str | None,
+        Query(max_length=60, description="Only those in open batches of this person."),
+    ] = None,
+    batch: Annotated[
+        int | None, Query(ge=1, le=MAX_ID, description="Only those in this open batch.")
+    ] = None,
+    sort: Annotated[
+        TrackOrder,
+        Query(
+            description="`match` and frame (of a batch: its order), `worst`: the largest left-out "
+            "error first, `gaps`: those of which least is known first."
+        ),
+    ] = "match",
+) -> TrackList:
+    """The tracks of a dataset, each with how well it predicts what was left out, and for whom it is."""
+    choice = TrackChoice(verdict, stale, assigned, batch, sort)
+    return TrackList.of(choose_tracks(store, dataset, choice))
 
 
 @router.post("/datasets/{dataset}/tracks", operation_id="makeTracks", **by_job(404, 409, 413, 415))
@@ -90,6 +119,33 @@ def get_track_frames(
     found = TrackFrames.of(detail, start, end)
     response.headers["ETag"] = found.etag
     return found
+
+
+@router.get("/tracks/{track}/around", operation_id="getTrackAround", responses=responses(404))
+@may(Action.READ, track=OwnedKind.TRACK)
+@limit(QUESTIONS)
+def get_track_around(
+    track: Id,
+    store: AppStore,
+    frame: Annotated[
+        int | None,
+        Query(ge=0, le=MAX_ID, description="In the middle; default: the worst, else the first."),
+    ] = None,
+) -> TrackAround:
+    """The frames around one as they come out of the groups as they are now; nothing is stored.
+
+    What an edit makes of the ball is known at once; the track is stale until it is made again.
+    """
+    return TrackAround.around(track_around(store, track, frame))
+
+
+@router.get("/groups/{group}/tracks", operation_id="listTracksOfGroup", responses=responses(404))
+@may(Action.READ, group=OwnedKind.GROUP)
+@limit(LOOKS)
+@paged()
+def list_tracks_of_group(group: Id, store: AppStore) -> GroupTrackList:
+    """The track that a group is in, and its frame there."""
+    return GroupTrackList.model_validate({"items": tracks_of_group(store, group)})
 
 
 def _tagged(track: Track) -> Response:

@@ -9,6 +9,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
+from app.features.tracks.around import AROUND, Around
+from app.features.tracks.findings import balls_beside
+from app.features.tracks.listing import ListedTrack
 from app.features.tracks.service import (
     MOST_CORRECTIONS,
     TrackChange,
@@ -84,8 +87,25 @@ class TrackDocument(Document):
     etag: str
 
 
-class TrackList(ListDocument[TrackDocument]):
-    """The tracks of a dataset, by match and frame."""
+class ListedTrackDocument(TrackDocument):
+    """A track of a list, and for whom it is."""
+
+    batches: list[int] = Field(description="Ids of the open batches that it is in.")
+    assigned: list[str] = Field(
+        description="Names of the people whom these are given to; empty: every reviewer."
+    )
+
+
+class TrackList(ListDocument[ListedTrackDocument]):
+    """Tracks of a dataset."""
+
+    @staticmethod
+    def of(listed: Sequence[ListedTrack]) -> TrackList:
+        """The document of a list."""
+        items = [
+            {**vars(one.track), "batches": one.batches, "assigned": one.assigned} for one in listed
+        ]
+        return TrackList.model_validate({"items": items})
 
 
 class TrackEventDocument(Document):
@@ -190,6 +210,29 @@ class TrackFrames(Document):
         )
 
 
+class TrackAround(TrackFrames):
+    """Frames of a track as they come out of their groups as they are now."""
+
+    reason: str | None = Field(description="Why no track comes of them; null: one does.")
+
+    @staticmethod
+    def around(found: Around) -> TrackAround:
+        """The document of what was tracked around a frame."""
+        frames = TrackFrames.of(found.detail, found.frame - AROUND, found.frame + AROUND)
+        return TrackAround(**vars(frames), reason=found.detail.ball.reason)
+
+
+class GroupTrackDocument(Document):
+    """A track that a group is in."""
+
+    track: TrackDocument = Field(description="The track.")
+    frame: int = Field(description="The group's frame in its stretch.")
+
+
+class GroupTrackList(ListDocument[GroupTrackDocument]):
+    """The tracks that a group is in: at most one, unless stretches have changed."""
+
+
 class TrackEdit(BaseModel):
     """What a person says of a track; what is left out stays."""
 
@@ -213,34 +256,25 @@ class TrackEdit(BaseModel):
 
 
 def _contradictions(detail: TrackDetail) -> list[ContradictionDocument]:
-    measured, ball = detail.inputs.measurements, detail.ball
-    rows = {int(frame): row for row, frame in enumerate(ball.frames)}
     found = []
-    for item in ball.contradicted:
-        frame, (x, y) = int(measured.frames[item.measurement]), measured.pixels[item.measurement]
-        place = ball.position[rows[frame]][None]
-        seen = (
-            measured.cameras[item.measurement].project(place)[0]
-            if np.isfinite(place).all()
-            else np.full(2, np.nan)
-        )
-        view, group = measured.views[item.measurement], detail.groups.get(frame)
-        there = bool(np.isfinite(seen).all())
+    for item in balls_beside(detail.ball, detail.inputs):
+        group = detail.groups.get(item.frame)
+        x, y = item.place or (None, None)
         fix = (
-            f"Move the ball of {view} to ({seen[0]:.1f}, {seen[1]:.1f}) if it is there, pick the "
+            f"Look at {item.view}: move its ball, or leave the view out."
+            if x is None
+            else f"Move the ball of {item.view} to ({x:.1f}, {y:.1f}) if it is there, pick the "
             "other ball if it shows two, or leave the view out."
-            if there
-            else f"Look at {view}: move its ball, or leave the view out."
         )
         found.append(
             ContradictionDocument(
-                frame=frame,
-                view=view,
+                frame=item.frame,
+                view=item.view,
                 group=None if group is None else group.id,
-                x=float(x),
-                y=float(y),
-                track_x=float(seen[0]) if there else None,
-                track_y=float(seen[1]) if there else None,
+                x=item.at[0],
+                y=item.at[1],
+                track_x=x,
+                track_y=y,
                 px=item.px,
                 sentence=item.reason,
                 fix=fix,

@@ -27,6 +27,7 @@ from app.features.tracks.codec import (
     track_from_json,
 )
 from app.features.tracks.export import KnownTrack, TrackSource, frozen_known
+from app.features.tracks.findings import refresh_findings
 from app.features.tracks.making import MadeTracks as MadeTracks
 from app.features.tracks.making import make_tracks as make_tracks
 from app.features.tracks.queries import (
@@ -159,6 +160,8 @@ def change_track(
                 values |= {"verdict": change.verdict, "note": note, "judged_by": actor}
                 values["judged_at"] = now()
         update_track(session, track_id, **values)
+        if "rejected" in (track.verdict, change.verdict) or change.corrections is not None:
+            refresh_findings(session, track.dataset_id, [track.match], track_id)
         did = f"track {change.verdict}" if change.verdict else "track corrected"
         add_audit_event(session, actor, did, track.dataset_id, track=track_id, name=track.key)
         found, _ = _read(session, track_id)

@@ -236,7 +236,7 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
             unused["no camera that passes its gates" if solution else "not solved"] += ball
             continue
         camera = known.setdefault(_bytes_of(camera), camera)
-        cameras[_name_of(view)] = camera
+        cameras[view_name(view)] = camera
         if not view.included:
             unused["view left out"] += ball
             continue
@@ -248,7 +248,7 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
         calibrations.append(replace(solved.calibration, camera=camera))
     by_key = {view.key: view for view in views}
     observations = [
-        (_name_of(by_key[item.view]), instant.time + _later(by_key[item.view]), item)
+        (view_name(by_key[item.view]), instant.time + _later(by_key[item.view]), item)
         for item in ball_observations(views, calibrations)
     ]
     return _Row(instant, group.pitch, observations, record.point, cameras, unused)
@@ -260,7 +260,7 @@ def _taken_from(view: View) -> Mapping[str, Any]:
     return found if isinstance(found, Mapping) else {}
 
 
-def _name_of(view: View) -> str:
+def view_name(view: View) -> str:
     """What a view is called through a stretch: its recording, of a replay with its link, or its camera."""
     found = _taken_from(view)
     if "name" not in found:

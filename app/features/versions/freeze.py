@@ -18,7 +18,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
 from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head, require_name
-from app.features.findings.queries import GroupDismissals
+from app.features.findings.queries import GroupDismissals, findings_of
 from app.features.groups.codecs import policy_to_json
 from app.features.groups.queries import read_groups
 from app.features.queue.refresh_queries import read_import_findings
@@ -267,7 +267,7 @@ class _Run:
             names |= calibration_names(solved)
             rows[number] = self._member(item.group, annotations.key, key, solved)
             if number in dismissals:
-                own = [Finding(one.kind, one.sentence, view=one.view) for one in noticed[number]]
+                own = findings_of(noticed[number], item.inputs_hash)
                 found = [*(_finding(value) for value in solved["findings"]), *own]
                 rows[number]["dismissed"] = _dismissed(found, dismissals[number])
         self._freeze_new(texts, bodies, names)

@@ -13,8 +13,18 @@ import { approached, turned } from './standpoints.js';
 
 const STEP = Math.PI / 36;
 
-/** @param {() => SceneStage | null} stage @returns {Binding[]} */
-export function sceneKeys(stage) {
+/**
+ * @typedef {object} Habits where the scene stands
+ * @property {() => boolean} turns whether arrows turn it now
+ * @property {() => void} leave
+ * @property {boolean} digits whether digits look through cameras
+ */
+
+/** @type {Habits} */
+const REVIEW = { turns: notScrolling, leave: () => { sceneShown.value = false; }, digits: true };
+
+/** @param {() => SceneStage | null} stage @param {Habits} [habits] @returns {Binding[]} */
+export function sceneKeys(stage, { turns, leave, digits } = REVIEW) {
 	/** @param {(orbit: Orbit) => Orbit} change */
 	const turn = (change) => () => {
 		leaveCamera();
@@ -24,7 +34,7 @@ export function sceneKeys(stage) {
 	/** @param {string} arrow @param {number} azimuth @param {number} elevation @returns {Binding} */
 	const arrow = (arrow, azimuth, elevation) => ({
 		keys: [`Arrow${arrow}`], label: 'Turn the scene', group: '3D', shown: arrow === 'Left' ? '← ↑ → ↓' : 'hidden',
-		when: notScrolling, run: turn((orbit) => turned(orbit, azimuth, elevation)),
+		when: turns, run: turn((orbit) => turned(orbit, azimuth, elevation)),
 	});
 	return [
 		arrow('Left', -STEP, 0), arrow('Right', STEP, 0), arrow('Up', 0, STEP), arrow('Down', 0, -STEP),
@@ -35,11 +45,11 @@ export function sceneKeys(stage) {
 		{ keys: ['8'], label: 'From the side', group: '3D', run: () => goToPreset('side') },
 		{ keys: ['9'], label: 'From the goal', group: '3D', run: () => goToPreset('goal') },
 		{ keys: ['z'], label: 'At the ball', group: '3D', run: () => goToPreset('ball') },
-		...['1', '2', '3', '4', '5', '6'].map((digit, i) => ({
+		...(digits ? ['1', '2', '3', '4', '5', '6'] : []).map((digit, i) => ({
 			keys: [digit], label: 'Look through a camera; again: step back', group: '3D',
 			shown: i === 0 ? '1 … 6' : 'hidden', run: () => throughCamera(i),
 		})),
-		{ keys: ['Escape'], label: 'Step back out of a camera, then to the images', group: '3D', run: stepBack },
+		{ keys: ['Escape'], label: 'Step back out of a camera, then to the images', group: '3D', run: () => stepBack(leave) },
 	];
 }
 
@@ -55,7 +65,8 @@ function throughCamera(index) {
 	else announce(`There is no view ${index + 1}.`);
 }
 
-function stepBack() {
+/** @param {() => void} leave */
+function stepBack(leave) {
 	if (standpoint.value.kind === 'camera') goToPreset('whole');
-	else sceneShown.value = false;
+	else leave();
 }

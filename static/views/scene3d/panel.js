@@ -20,6 +20,7 @@ import { sceneOf } from './values.js';
 
 /** @import {GroupDocument, SolutionJson} from '../../api/types.js' */
 /** @import {Preset} from '../../state/scene3d.js' */
+/** @import {Habits} from './keys.js' */
 /** @import {Place} from './stage.js' */
 /** @import {SceneValues} from './values.js' */
 
@@ -59,8 +60,8 @@ function placeLabels(layer, places) {
 	}
 }
 
-/** @param {{scene: SceneValues, images: Map<string, ImageBitmap>}} props */
-function Stage({ scene, images }) {
+/** @param {{scene: SceneValues, images: Map<string, ImageBitmap>, habits?: Habits}} props */
+export function Stage({ scene, images, habits }) {
 	const [ref, size] = useSize();
 	const labels = useRef(/** @type {HTMLDivElement | null} */ (null));
 	const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
@@ -84,7 +85,14 @@ function Stage({ scene, images }) {
 	useEffect(() => {
 		if (stage && size.width > 0) stage.resize(size.width, size.height);
 	}, [stage, size.width, size.height]);
-	useEffect(() => stage?.show(scene, readPalette(), images), [stage, scene, images, theme]);
+	const drawn = useRef(/** @type {unknown[]} */ ([]));
+	useEffect(() => {
+		if (!stage) return;
+		const fixed = [stage, scene.stands, images, theme];
+		if (fixed.every((one, i) => one === drawn.current[i])) stage.move(scene);
+		else stage.show(scene, readPalette(), images);
+		drawn.current = fixed;
+	}, [stage, scene, images, theme]);
 	const at = standpoint.value;
 	const ready = stage !== null && size.width > 0;
 	useEffect(() => {
@@ -97,46 +105,63 @@ function Stage({ scene, images }) {
 		if (!stage?.untouched || at.kind !== 'preset') return;
 		stage.goTo(presetOrbit(at.preset, scene, stage.aspect), false);
 	}, [scene, size.width, size.height]);
-	const keys = useMemo(() => sceneKeys(() => stage), [stage]);
+	const keys = useMemo(() => sceneKeys(() => stage, habits), [stage, habits]);
 	useKeys(keys);
 
 	return html`
 		<div class="scene3d__stage" ref=${ref} data-ready=${ready}>
-			<canvas ref=${canvas} role="img" tabindex="0" aria-label="The scene in 3D. Arrow keys turn it, plus and minus come closer. The table says the same in words."></canvas>
+			<canvas ref=${canvas} role="img" tabindex="0" onMouseDown=${habits ? keepFocus : undefined} aria-label="The scene in 3D. Arrow keys turn it, plus and minus come closer. The table says the same in words."></canvas>
 			${missing ? html`<p class="scene3d__missing" role="status">This browser shows no 3D graphics (WebGL 2). The table below says the same in words.</p>` : html`
 				<div class="scene3d__labels" ref=${labels}>
 					<svg class="scene3d__leaders" aria-hidden="true">${scene.stands.map(({ letter }) => html`<path key=${letter} data-leader=${letter} />`)}</svg>
 					${scene.stands.map(({ letter, label }) => html`
-						<button key=${letter} class="scene3d__camera letter" type="button" data-letter=${letter} data-label=${letter} title=${`Look through ${label}`} aria-label=${`Look through camera ${letter}`} onClick=${() => lookThrough(letter)}>${letter}</button>`)}
+						<button key=${letter} class="scene3d__camera letter" type="button" data-letter=${letter} data-label=${letter} data-sees=${scene.seen ? scene.seen.has(letter) : undefined} title=${`Look through ${label}`} aria-label=${`Look through camera ${letter}`} onClick=${() => lookThrough(letter)}>${letter}</button>`)}
 					${scene.ball || scene.best ? html`<span class="scene3d__height" data-label="ball">${metres((scene.best ?? scene.ball)?.height)}</span>` : null}
 				</div>`}
 		</div>
 	`;
 }
 
-/** @param {{group: GroupDocument, solution: SolutionJson | null}} props */
-export function ScenePanel({ group, solution }) {
-	const scene = useMemo(() => sceneOf(group, solution), [group.id, group.views, solution]);
-	const frames = useFrames(group.views);
-	const images = useMemo(() => new Map(group.views.flatMap(({ key, letter }) => {
+/** Who turns the scene with the mouse keeps the keys of the page. @param {Event} event */
+function keepFocus(event) {
+	event.preventDefault();
+}
+
+/** @param {{hasBall: boolean}} props */
+export function Presets({ hasBall }) {
+	const at = standpoint.value;
+	return html`
+		${PRESETS.map(({ preset, label, key }) => {
+			const off = preset === 'ball' && !hasBall;
+			return html`
+				<button
+					key=${preset} class="button" type="button" aria-pressed=${at.kind === 'preset' && at.preset === preset}
+					aria-disabled=${off} title=${off ? 'There is no 3D ball' : `${label} (${key})`}
+					onClick=${() => { if (!off) goToPreset(preset); }}
+				>${label} <kbd>${key}</kbd></button>`;
+		})}
+		<span class="scene3d__through">${at.kind === 'camera' ? `Through camera ${at.letter}` : ''}</span>
+	`;
+}
+
+/** The frames of some views, by letter. @param {GroupDocument['views']} views @returns {Map<string, ImageBitmap>} */
+export function useImages(views) {
+	const frames = useFrames(views);
+	return useMemo(() => new Map(views.flatMap(({ key, letter }) => {
 		const frame = frames.get(key);
 		return frame ? [[letter, frame]] : [];
 	})), [frames]);
-	const at = standpoint.value;
+}
+
+/** @param {{group: GroupDocument, solution: SolutionJson | null}} props */
+export function ScenePanel({ group, solution }) {
+	const scene = useMemo(() => sceneOf(group, solution), [group.id, group.views, solution]);
+	const images = useImages(group.views);
 	const hasBall = scene.ball !== null || scene.best !== null;
 	return html`
 		<${Stage} scene=${scene} images=${images} />
 		<div class="scene3d__toolbar" role="toolbar" aria-label="Standpoints">
-			${PRESETS.map(({ preset, label, key }) => {
-				const off = preset === 'ball' && !hasBall;
-				return html`
-					<button
-						key=${preset} class="button" type="button" aria-pressed=${at.kind === 'preset' && at.preset === preset}
-						aria-disabled=${off} title=${off ? 'There is no 3D ball' : `${label} (${key})`}
-						onClick=${() => { if (!off) goToPreset(preset); }}
-					>${label} <kbd>${key}</kbd></button>`;
-			})}
-			<span class="scene3d__through">${at.kind === 'camera' ? `Through camera ${at.letter}` : ''}</span>
+			<${Presets} hasBall=${hasBall} />
 			<button class="button" type="button" onClick=${toggleScene}>Images <kbd>\\</kbd></button>
 		</div>
 		<${SceneTable} scene=${scene} />

@@ -1,11 +1,11 @@
 // @ts-check
 /** The canvas of the 3D view: draws when something has changed, and gives everything back. */
 
-import { Color, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import { Color, Group, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
 
 import { ballGroup } from './balls.js';
 import { framePicture, frustum, ray } from './cameras.js';
-import { pitchGroup } from './pitch.js';
+import { pitchGroup, segments } from './pitch.js';
 import { axesOf, between, cameraProjection, eyeOf, freeProjection, toWorld } from './standpoints.js';
 
 /** @import {Object3D} from 'three' */
@@ -32,6 +32,8 @@ export class SceneStage {
 		this.values = null;
 		/** @type {Map<string, ImageBitmap>} */
 		this.images = new Map();
+		/** @type {Palette | null} */
+		this.palette = null;
 		/** @type {Orbit | null} */
 		this.orbit = null;
 		/** @type {Stand | null} */
@@ -63,17 +65,31 @@ export class SceneStage {
 	 */
 	show(values, palette, images) {
 		discard(this.scene);
-		this.values = values;
 		this.images = images;
+		this.palette = palette;
 		this.scene.background = new Color(palette.sky);
 		this.scene.add(pitchGroup(values.pitch, palette));
-		for (const stand of values.stands) {
-			const line = ray(stand, palette);
-			if (line) this.scene.add(line);
-			this.scene.add(this.standing(stand, palette));
-		}
-		this.scene.add(ballGroup(values, palette));
+		for (const stand of values.stands) this.scene.add(this.standing(stand, palette));
+		this.move(values);
 		if (this.through) this.lookThrough(this.through.letter);
+	}
+
+	/** The ball and its rays anew; cameras and pitch stay. @param {SceneValues} values of the cameras that are shown */
+	move(values) {
+		const { palette } = this;
+		const before = this.scene.getObjectByName('moving');
+		if (before) {
+			this.scene.remove(before);
+			discard(before);
+		}
+		this.values = values;
+		if (!palette) return;
+		const moving = new Group();
+		moving.name = 'moving';
+		const lines = values.stands.map((stand) => ray(seeing(stand, values), palette));
+		moving.add(...lines.filter((line) => line !== null), ballGroup(values, palette));
+		if (values.trail?.length) moving.add(segments(values.trail, { colour: palette.ball, width: 2.4, opacity: 0.75 }));
+		this.scene.add(moving);
 		this.request();
 	}
 
@@ -243,6 +259,11 @@ function facing(eye, target, azimuth) {
 function setProjection(camera, rows) {
 	camera.projectionMatrix.fromArray(rows).transpose();
 	camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
+}
+
+/** A camera with the ray of the ball, where a track says which cameras see it. @param {Stand} stand @param {SceneValues} values @returns {Stand} */
+function seeing(stand, { seen, best }) {
+	return seen ? { ...stand, used: true, ray: best && seen.has(stand.letter) ? best.point : null } : stand;
 }
 
 /** Free geometries, materials and textures below an object, and the objects. @param {Object3D} root */

@@ -12,6 +12,7 @@ import { ballCenter, ballOf } from '../../geometry/preview.js';
 
 /**
  * @typedef {object} Stand a camera where it stands
+ * @property {string} key of its view
  * @property {string} letter
  * @property {string} label
  * @property {Camera} camera
@@ -37,6 +38,8 @@ import { ballCenter, ballOf } from '../../geometry/preview.js';
  * @property {PlacedBall | null} ball mean of the valid pairs
  * @property {PlacedBall | null} best the estimate from all views at once
  * @property {number} diameter of a ball, metres
+ * @property {ReadonlySet<string>} [seen] letters of the cameras that see the ball of a track; else rays say so
+ * @property {PitchPoint[]} [trail] where the ball of a track came from, two points for each piece
  */
 
 /** How long a frustum is drawn, metres. */
@@ -85,7 +88,7 @@ function standsOf(group, solution) {
 		const camera = cameraFromJson(json);
 		const ray = rayOf(view, camera, solution.ball?.point ?? null);
 		return [{
-			letter: view.letter, label: view.label, camera, size: view, image: view.image,
+			key: view.key, letter: view.letter, label: view.label, camera, size: view, image: view.image,
 			corners: cornersOf(camera, view), ray, used: solved.included,
 		}];
 	});

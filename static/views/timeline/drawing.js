@@ -21,6 +21,7 @@
  * @property {Span} span
  * @property {number} limit pixels: errors from here on fail
  * @property {number} position of the group on screen, -1 when not there
+ * @property {ReadonlyMap<number, number>} [leftOut] pixels by which the track misses the balls that it was made without, by index, where an edit was made
  */
 /** @typedef {{worst: number | null, passes: number, fails: number, open: number, status: string, stale: boolean}} Column */
 
@@ -90,6 +91,7 @@ export function drawCurve(context, size, curve, look) {
 	for (const [x, column] of binned(curve, width)) {
 		drawColumn(context, x, column, { bar, low, toY, height }, look);
 	}
+	for (const [index, px] of curve.leftOut ?? []) drawDiamond(context, toX(curve.span, width, index), toY(Math.min(px, top)), look);
 	drawHead(context, toX(curve.span, width, curve.position), height, curve.position >= 0, look);
 }
 
@@ -163,6 +165,14 @@ function drawVerdict(context, left, bar, height, { status, stale }, look) {
 	const half = (VERDICT_LANE - 2) / 2;
 	const y = height - VERDICT_LANE + 1 + (status === 'rejected' ? half : 0);
 	context.fillRect(left, y, bar, status === 'accepted' ? 2 * half : half);
+}
+
+/** @param {CanvasRenderingContext2D} context @param {number} x @param {number} y @param {Look} look */
+function drawDiamond(context, x, y, look) {
+	context.fillStyle = look.ink;
+	context.beginPath();
+	for (const [dx, dy] of [[0, -4], [4, 0], [0, 4], [-4, 0]]) context.lineTo(x + dx, y + dy);
+	context.fill();
 }
 
 /** @param {CanvasRenderingContext2D} context @param {number} x @param {number} height @param {boolean} there @param {Look} look */

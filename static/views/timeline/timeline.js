@@ -2,7 +2,7 @@
 /** The timeline of static cameras: error over frames, to scrub, play and jump in. */
 
 import { html } from 'htm/preact';
-import { useCallback, useEffect, useRef, useState } from 'preact/hooks';
+import { useCallback, useEffect, useMemo, useRef, useState } from 'preact/hooks';
 
 import { diagonal } from '../../geometry/preview.js';
 import { Canvas } from '../../lib/canvas.js';
@@ -10,11 +10,13 @@ import { colours } from '../../lib/colours.js';
 import { count, metres, pixelText } from '../../lib/format.js';
 import { useSize } from '../../lib/hooks.js';
 import { groupDocument } from '../../state/group.js';
+import { trackAround } from '../../state/group_track.js';
 import {
 	columns, goToWorst, keepInSight, playing, position, scrubTo, span, startTimeline, togglePlaying, trouble, zoomSpan,
 } from '../../state/timeline.js';
 import { drawCurve, toIndex } from './drawing.js';
 
+/** @import {TrackAround} from '../../api/tracks.js' */
 /** @import {TimelineJson} from '../../api/timeline.js' */
 /** @import {Look} from './drawing.js' */
 
@@ -45,6 +47,16 @@ const STEPS = /** @type {Record<string, number>} */ ({
 	ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 25, PageDown: -25, Home: -Infinity, End: Infinity,
 });
 
+/** How far the track is from balls that it was made without, around the frame on screen and by index; empty until something was edited. @param {TimelineJson} all @param {TrackAround | null} around @returns {Map<number, number>} */
+function leftOutOf(all, around) {
+	const found = new Map();
+	around?.group.forEach((id, place) => {
+		const [index, px] = [id === null ? -1 : all.id.indexOf(id), around.left_out_px[place]];
+		if (index >= 0 && px !== null) found.set(index, px);
+	});
+	return found;
+}
+
 /** @param {{all: TimelineJson, limit: number}} props */
 function Curve({ all, limit }) {
 	const [ref, size] = useSize();
@@ -53,9 +65,11 @@ function Curve({ all, limit }) {
 	const shown = span.value ?? { from: 0, to: all.id.length - 1 };
 	const at = position.value;
 	const theme = colours.value;
+	const around = trackAround.value;
+	const leftOut = useMemo(() => leftOutOf(all, around), [all, around]);
 	const draw = useCallback((/** @type {CanvasRenderingContext2D} */ context) => {
-		drawCurve(context, size, { columns: all, span: shown, limit, position: at }, look());
-	}, [all, shown.from, shown.to, limit, at, size.width, size.height, theme]);
+		drawCurve(context, size, { columns: all, span: shown, limit, position: at, leftOut }, look());
+	}, [leftOut, all, shown.from, shown.to, limit, at, size.width, size.height, theme]);
 	const wheeled = useRef({ shown, width: size.width });
 	wheeled.current = { shown, width: size.width };
 
@@ -134,6 +148,7 @@ export function Timeline() {
 				<button class="button" type="button" onClick=${goToWorst}>Worst <kbd>J</kbd></button>
 				<button class="button" type="button" aria-label="Zoom in" title="Zoom in (wheel)" onClick=${() => zoomSpan(0.5)}>+</button>
 				<button class="button" type="button" aria-label="Zoom out" title="Zoom out (wheel)" onClick=${() => zoomSpan(2)}>−</button>
+				${trackAround.value ? html`<span class="timeline__track"><span aria-hidden="true">◆</span> left out by the track, as groups are now</span>` : null}
 				<span class="timeline__key"><span aria-hidden="true">- -</span> limit ${pixelText(limit)}</span>
 			</div>
 			${all && all.id.length > 0 ? html`<${Curve} all=${all} limit=${limit} />` : html`<p class="empty-note" role="status">${trouble.value || 'Loading the frames…'}</p>`}

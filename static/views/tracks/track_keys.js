@@ -6,39 +6,51 @@ import { eventAt, eventBy, EVENTS } from '../../state/tracks.js';
 
 /** @import {EventKind, TrackFrames, TrackJson} from '../../api/tracks.js' */
 /** @import {Binding} from '../../lib/keys.js' */
+/** @import {TrackPlayer} from '../../state/track_player.js' */
 
 /**
  * @typedef {object} Doing
  * @property {TrackJson} track
  * @property {TrackFrames | null} frames
  * @property {number} at
- * @property {(frame: number) => void} goTo
+ * @property {TrackPlayer} player
  * @property {(verdict: 'accepted' | 'rejected' | 'none') => void} judge
  * @property {(kind: EventKind, added: boolean) => void} correct
  * @property {(by: number) => void} zoom
+ * @property {() => void} switchView
+ * @property {() => Promise<boolean>} goOn
  */
 
 /** @param {{current: Doing}} doing as it is when a key is pressed @returns {Binding[]} */
 export function keysOfTrack(doing) {
 	const [look, say] = ['Track', 'Verdict and events'];
 	/** @param {number} step */
-	const stepBy = (step) => doing.current.goTo(doing.current.at + step);
+	const stepBy = (step) => doing.current.player.stepBy(step);
+	/** @param {number} frame */
+	const goTo = (frame) => doing.current.player.goTo(frame);
 	/** @param {1 | -1} way */
 	const toEvent = (way) => {
 		const next = eventBy(doing.current.frames?.events ?? [], doing.current.at, way);
-		if (next) doing.current.goTo(next.frame);
+		if (next) goTo(next.frame);
 	};
 	const second = () => Math.round(doing.current.track.summary.rate);
 	return [
+		{ keys: [' '], label: 'Play, or stop', group: look, shown: 'Space', run: () => doing.current.player.toggle() },
+		{ keys: ['l'], label: 'Play forwards; again: twice as fast', group: look, run: () => doing.current.player.run(1) },
+		{ keys: ['k'], label: 'Stop', group: look, run: () => doing.current.player.stand() },
+		{ keys: ['j'], label: 'Play backwards; again: twice as fast', group: look, run: () => doing.current.player.run(-1) },
+		{ keys: [','], label: 'Play more slowly', group: look, run: () => doing.current.player.changePace(-1) },
+		{ keys: ['.'], label: 'Play faster', group: look, run: () => doing.current.player.changePace(1) },
+		{ keys: ['\\'], label: '3D view and plan, or the curves', group: look, run: () => doing.current.switchView() },
 		{ keys: ['ArrowRight'], label: 'Next frame', group: look, run: () => stepBy(1) },
 		{ keys: ['ArrowLeft'], label: 'Frame before', group: look, run: () => stepBy(-1) },
 		{ keys: ['Shift+ArrowRight'], label: 'A second on', group: look, run: () => stepBy(second()) },
 		{ keys: ['Shift+ArrowLeft'], label: 'A second back', group: look, run: () => stepBy(-second()) },
 		{ keys: ['n'], label: 'Next event', group: look, run: () => toEvent(1) },
 		{ keys: ['p'], label: 'Event before', group: look, run: () => toEvent(-1) },
-		{ keys: ['w'], label: 'Worst frame: the largest left-out error', group: look, run: () => { const { worst } = doing.current.track.summary; if (worst !== null) doing.current.goTo(worst); } },
+		{ keys: ['w'], label: 'Worst frame: the largest left-out error', group: look, run: () => { const { worst } = doing.current.track.summary; if (worst !== null) goTo(worst); } },
 		{ keys: ['c'], label: 'Next frame with a ball that contradicts the track', group: look, run: () => {
-			const { frames, at, goTo } = doing.current;
+			const { frames, at } = doing.current;
 			const frame = frames?.contradicted.find((one) => one.frame > at)?.frame ?? frames?.contradicted[0]?.frame;
 			if (frame !== undefined) goTo(frame);
 		} },
@@ -49,9 +61,10 @@ export function keysOfTrack(doing) {
 			const group = frames?.group[at - track.first];
 			if (group) navigate(`/review/${group}`);
 		} },
-		{ keys: ['a'], label: 'Accept the track', group: say, needs: 'review', run: () => doing.current.judge('accepted') },
-		{ keys: ['x'], label: 'Reject the track', group: say, needs: 'review', run: () => doing.current.judge('rejected') },
+		{ keys: ['a'], label: 'Accept the track, and go to the next one', group: say, needs: 'review', run: () => doing.current.judge('accepted') },
+		{ keys: ['x'], label: 'Reject the track, and go to the next one', group: say, needs: 'review', run: () => doing.current.judge('rejected') },
 		{ keys: ['u'], label: 'Take the verdict back', group: say, needs: 'review', run: () => doing.current.judge('none') },
+		{ keys: ['f'], label: 'Next track that waits for a verdict', group: say, run: () => { doing.current.goOn(); } },
 		...EVENTS.map(({ kind, key }) => /** @type {Binding} */ ({ keys: [key], label: `Add a ${kind === 'out' ? 'ball out' : kind} at this frame`, group: say, needs: 'review', run: () => doing.current.correct(kind, true) })),
 		{ keys: ['d'], label: 'Remove the event at this frame', group: say, needs: 'review', run: () => {
 			const event = eventAt(doing.current.frames?.events ?? [], doing.current.at);

@@ -2,23 +2,31 @@
 /** One track: its curves with their bands, its modes and events, and what is said of it. */
 
 import { html } from 'htm/preact';
-import { useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 
+import { listenToGroups } from '../../api/events.js';
 import { ApiError } from '../../api/problem.js';
-import { getTrack, getTrackFrames, patchTrack } from '../../api/tracks.js';
+import { getTrack, getTrackAround, getTrackFrames, patchTrack } from '../../api/tracks.js';
 import { fixed, plural } from '../../lib/format.js';
 import { useKeys } from '../../lib/hooks.js';
+import { latest } from '../../lib/latest.js';
 import { useResource } from '../../lib/resource.js';
-import { page } from '../../lib/router.js';
-import { announce, complain } from '../../state/notice.js';
-import { corrected, curvesOf, eventAt, EVENTS, MODES, mostShown, partOf, runsOf, STATES } from '../../state/tracks.js';
+import { address, navigate, page, param, place } from '../../lib/router.js';
+import { stored } from '../../lib/storage.js';
+import { me } from '../../state/me.js';
+import { announce, complain, inform } from '../../state/notice.js';
+import { listValues, nextOpen, trackAddress } from '../../state/track_list.js';
+import { makeTrackPlayer, PACES } from '../../state/track_player.js';
+import { amid, corrected, curvesOf, eventAt, EVENTS, MODES, mostShown, partOf, runsOf, STATES } from '../../state/tracks.js';
 import { Chart, Numbers } from '../chart.js';
 import { pageAddress } from '../dataset_menu.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { keysOfTrack } from './track_keys.js';
+import { TrackSpace } from './track_scene.js';
 import { verdictText } from './tracks_page.js';
 
-/** @import {EventKind, TrackFrames, TrackJson} from '../../api/tracks.js' */
+/** @import {EventKind, TrackAround, TrackFrames, TrackJson} from '../../api/tracks.js' */
+/** @import {TrackPlayer} from '../../state/track_player.js' */
 /** @import {Curve} from '../chart.js' */
 
 const HEIGHT = 104;
@@ -26,6 +34,12 @@ const HEIGHT = 104;
 const CLICK_PX = 2;
 /** Frames that are shown at first. */
 const WINDOW = 500;
+/** How long a frame is at hand before the address says so, milliseconds: browsers refuse an address that changes with every frame. */
+const SETTLED = 300;
+/** Changes of groups that come together are asked about once, and frames that somebody only passes are not, milliseconds. */
+const [CHANGES, HELD] = [200, 40];
+/** What the page shows of a track: its curves, or the ball in space. */
+const shownAs = stored('track-view', /** @type {string} */ ('curves'));
 /** @param {number} value */
 const centimetres = (value) => value.toFixed(2);
 /** @param {number} value */
@@ -41,8 +55,8 @@ async function framesOf(track, signal) {
 	return whole;
 }
 
-/** Modes and states in proportion, and events above them; a click leads to its frame. @param {{frames: TrackFrames, at: number, goTo: (frame: number) => void}} props */
-function Band({ frames, at, goTo }) {
+/** Modes and states in proportion, and events above them; a click leads to its frame. @param {{frames: TrackFrames, at: number, goTo: (frame: number) => void, whole: boolean}} props `whole`: not as wide as charts below it */
+function Band({ frames, at, goTo, whole }) {
 	const [modes, states] = useMemo(() => [runsOf(frames.mode), runsOf(frames.state)], [frames]);
 	const [first, total] = [frames.frame[0], frames.frame.length];
 	/** @param {number} frame */
@@ -55,7 +69,7 @@ function Band({ frames, at, goTo }) {
 	const inside = frames.events.filter(({ frame }) => frame >= first && frame < first + total);
 	const shown = at >= first && at < first + total;
 	return html`
-		<div class="track__band" onClick=${click}>
+		<div class="track__band" data-whole=${whole} onClick=${click}>
 			<ol class="track__events" aria-label="Events">
 				${inside.map((event) => html`<li key=${`${event.frame} ${event.kind}`} style=${{ left: left(event.frame) }} data-kind=${event.kind} data-added=${event.added} title=${`${event.kind} in frame ${event.frame}`}><span class="hidden-text">${event.kind} in frame ${event.frame}</span><span aria-hidden="true">${EVENTS.find(({ kind }) => kind === event.kind)?.letter}</span></li>`)}
 			</ol>
@@ -70,23 +84,59 @@ function Band({ frames, at, goTo }) {
 	`;
 }
 
-/** @param {TrackFrames} frames */
-function chartsOf(frames) {
+/** What plays the track, and what of it is shown. @param {{player: TrackPlayer, switchView: () => void}} props */
+function Tools({ player, switchView }) {
+	const plays = player.speed.value !== 0;
+	/** @param {Event} event */
+	const choose = (event) => player.setPace(Number(/** @type {HTMLSelectElement} */ (event.currentTarget).value));
+	const space = shownAs.value === 'space';
+	return html`
+		<div class="track__tools" role="toolbar" aria-label="Playing">
+			<button class="button" type="button" aria-pressed=${plays} onClick=${player.toggle}>${plays ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
+			<label>Speed <select class="field" value=${String(player.pace.value)} onChange=${choose}>${PACES.map((pace) => html`<option key=${pace} value=${String(pace)}>${pace} ×</option>`)}</select></label>
+			<span class="note">${plays ? `${player.speed.value < 0 ? 'backwards, ' : ''}${Math.abs(player.speed.value)} ×` : ''}</span>
+			<span class="track__views" role="group" aria-label="What is shown">
+				<button class="button" type="button" aria-pressed=${!space} onClick=${() => { if (space) switchView(); }}>Curves</button>
+				<button class="button" type="button" aria-pressed=${space} onClick=${() => { if (!space) switchView(); }}>3D and plan</button>
+				<kbd>\\</kbd>
+			</span>
+		</div>
+	`;
+}
+
+/** @param {TrackFrames} frames @param {TrackAround | null} around what comes of some of them as their groups are now */
+function chartsOf(frames, around) {
 	const names = /** @type {const} */ (['x, m', 'y, m', 'height, m']);
 	const charts = names.map((label, axis) => {
 		const { values, low, high, raw } = curvesOf(frames, /** @type {0 | 1 | 2} */ (axis));
 		const track = { label, values, low, high, gaps: true, colour: /** @type {const} */ ('chart-a') };
 		const alone = { label: `${label.split(',')[0]} of each frame alone`, values: raw, colour: /** @type {const} */ ('chart-b'), points: 4 };
-		return { name: `${label} of the ball in each frame, with a band of two sigma`, yLabel: label, curves: /** @type {Curve[]} */ ([alone, track]), format: centimetres };
+		const now = around && { label: 'as its groups are now', values: amid(frames.frame, around, curvesOf(around, /** @type {0 | 1 | 2} */ (axis)).values), gaps: true, colour: /** @type {const} */ ('chart-c'), dash: [6, 4] };
+		return { name: `${label} of the ball in each frame, with a band of two sigma`, yLabel: label, curves: /** @type {Curve[]} */ ([alone, track, ...(now ? [now] : [])]), format: centimetres };
 	});
 	const most = mostShown(frames.left_out_px);
 	/** @type {Curve} */
 	const left = { label: `left-out error, px (up to ${most})`, values: frames.left_out_px.map((value) => (value === null ? null : Math.min(value, most))), colour: 'chart-d', points: 4 };
-	return [...charts, { name: 'Error of what was left out and predicted, in each frame', yLabel: 'px', curves: [left], format: tenths, yRange: /** @type {[number | null, number | null]} */ ([0, null]) }];
+	/** @type {Curve[]} */
+	const now = around ? [{ label: 'as its groups are now', values: amid(frames.frame, around, around.left_out_px).map((value) => (value === null ? null : Math.min(value, most))), colour: 'chart-c', points: 4 }] : [];
+	return [...charts, { name: 'Error of what was left out and predicted, in each frame', yLabel: 'px', curves: [left, ...now], format: tenths, yRange: /** @type {[number | null, number | null]} */ ([0, null]) }];
 }
 
-/** What is known of the frame at hand. @param {{track: TrackJson, frames: TrackFrames, at: number, goTo: (frame: number) => void}} props */
-function FrameCard({ track, frames, at, goTo }) {
+/** What comes of the frame at hand as its groups are now. @param {{around: TrackAround, at: number}} props */
+function Now({ around, at }) {
+	const place = at - around.frame[0];
+	const [x, y, z, left] = [around.x[place], around.y[place], around.z[place], around.left_out_px[place]];
+	const where = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' ? `${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(-z, 2)} m up` : null;
+	return html`
+		<div class="track__now" data-around=${at}>
+			<p><strong>As its groups are now:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left out ${fixed(left, 1)} px` : ''}.</p>
+			<p class="note">Dashed in the curves, frames ${around.frame[0]} to ${around.frame.at(-1)}. The track waits to be made again.</p>
+		</div>
+	`;
+}
+
+/** What is known of the frame at hand. @param {{track: TrackJson, frames: TrackFrames, around: TrackAround | null, at: number, goTo: (frame: number) => void}} props */
+function FrameCard({ track, frames, around, at, goTo }) {
 	const place = at - track.first;
 	const [x, y, z, sigma] = [frames.x[place], frames.y[place], frames.z[place], frames.sigma[place]];
 	const velocity = frames.velocity[place];
@@ -106,6 +156,7 @@ function FrameCard({ track, frames, at, goTo }) {
 				<dt>Left out</dt><dd>${frames.left_out_px[place] === null ? '–' : `${fixed(frames.left_out_px[place], 1)} px`}</dd>
 			</dl>
 			${against.map((one) => html`<div class="track__against" key=${one.view}><p><strong>${one.view}</strong> is ${fixed(one.px, 0)} px off. ${one.sentence}</p><p class="note">${one.fix}</p></div>`)}
+			${around ? html`<${Now} around=${around} at=${at} />` : null}
 			<p class="buttons">
 				${group === null ? html`<button class="button" type="button" aria-disabled="true" title="No group shows this frame">Open its group</button>` : html`<a class="button" href=${`/review/${group}`}>Open its group <kbd>Enter</kbd></a>`}
 				${worst === null ? null : html`<button class="button" type="button" onClick=${() => goTo(worst)}>Worst frame <kbd>w</kbd></button>`}
@@ -152,22 +203,73 @@ function EventCard({ frames, at, goTo, correct }) {
 	`;
 }
 
+/** Read the track again where groups of its dataset were changed; counts how often. @param {TrackJson} track @param {(track: TrackJson) => void} setTrack */
+function useChanges({ id, dataset }, setTrack) {
+	const [turn, setTurn] = useState(0);
+	useEffect(() => {
+		const again = latest(CHANGES, async (_, signal) => {
+			// What cannot be read now is read with the next change.
+			const found = await getTrack(id, signal).catch((error) => { if (error instanceof ApiError) return null; throw error; });
+			if (found) setTrack(found);
+			setTurn((before) => before + 1);
+		});
+		const deaf = listenToGroups((/** @type {{dataset: string}} */ event) => { if (event.dataset === dataset) again.run(null); }, () => again.run(null));
+		return () => { deaf(); again.cancel(); };
+	}, [id, dataset]);
+	return turn;
+}
+
+/** What comes of the frames around one, where groups have changed since the track was made. @param {TrackJson} track @param {number} at @param {boolean} plays @param {number} turn @returns {TrackAround | null} */
+function useAround({ id, stale, etag }, at, plays, turn) {
+	const wanted = stale && !plays;
+	const found = useResource(async (signal) => {
+		// Who holds an arrow key down asks once.
+		await new Promise((resolve) => { setTimeout(resolve, HELD); });
+		return wanted && !signal.aborted ? getTrackAround(id, at, signal) : null;
+	}, [id, wanted, etag, at, turn]);
+	return wanted && found.value?.frame.includes(at) ? found.value : null;
+}
+
 /** @param {{track: TrackJson, setTrack: (track: TrackJson) => void}} props */
 function Track({ track, setTrack }) {
 	const found = useResource((signal) => framesOf(track, signal), [track.id, track.etag]);
-	const [at, setAt] = useState(track.summary.worst ?? track.first);
+	const player = useMemo(() => {
+		const made = makeTrackPlayer({ first: track.first, last: track.last, rate: track.summary.rate });
+		made.goTo(Number(param('frame')) || (track.summary.worst ?? track.first));
+		return made;
+	}, [track.id]);
+	const [at, plays] = [player.at.value, player.speed.value !== 0];
 	const [width, setWidth] = useState(Math.min(track.last - track.first + 1, WINDOW));
+	const turn = useChanges(track, setTrack);
 	const sending = useRef(false);
 	const frames = found.value;
-	/** @param {number} frame */
-	const goTo = (frame) => setAt(Math.min(Math.max(frame, track.first), track.last));
+	const goTo = player.goTo;
+	const switchView = () => { shownAs.value = shownAs.value === 'space' ? 'curves' : 'space'; };
+	useEffect(() => () => player.stand(), [player]);
+	useEffect(() => {
+		if (plays) return undefined;
+		const timer = setTimeout(() => {
+			const values = { ...Object.fromEntries(place.peek().search), frame: String(at) };
+			navigate(address(place.peek().path, values), { replace: true });
+		}, SETTLED);
+		return () => clearTimeout(timer);
+	}, [at, plays]);
+	/** The next track that waits for a verdict, in the list that this one was reached from. @returns {Promise<boolean>} whether there is one */
+	async function goOn() {
+		const values = listValues(place.peek().search);
+		const next = await nextOpen(track, values, me.value?.name ?? 'local');
+		if (!next) inform('No other track of this list waits for a verdict.', { label: 'All tracks', run: () => navigate(pageAddress(track.dataset, 'tracks')) });
+		else navigate(trackAddress(next.id, values));
+		return next !== null;
+	}
 	/** @param {Parameters<typeof patchTrack>[1]} body @param {string} told */
 	async function send(body, told) {
 		if (sending.current) return;
 		sending.current = true;
 		try {
-			setTrack(await patchTrack(track, body));
+			const changed = await patchTrack(track, body);
 			announce(told);
+			if (body.verdict === undefined || body.verdict === 'none' || !(await goOn())) setTrack(changed);
 		} catch (problem) {
 			if (!(problem instanceof ApiError)) throw problem;
 			complain(problem.message);
@@ -183,24 +285,29 @@ function Track({ track, setTrack }) {
 		const frame = added ? at : (eventAt(frames?.events ?? [], at)?.frame ?? at);
 		send({ corrections: corrected(track.corrections, { frame, kind, added }) }, added ? `A ${kind} is added in frame ${frame}.` : `The ${kind} of frame ${frame} is removed.`);
 	};
-	const doing = useRef({ track, frames, at, goTo, judge, correct, zoom: (/** @type {number} */ by) => setWidth((before) => Math.min(Math.max(Math.round(before * by), 50), track.last - track.first + 1)) });
-	Object.assign(doing.current, { track, frames, at, goTo, judge, correct });
+	const doing = useRef({ track, frames, at, player, judge, correct, switchView, goOn, zoom: (/** @type {number} */ by) => setWidth((before) => Math.min(Math.max(Math.round(before * by), 50), track.last - track.first + 1)) });
+	Object.assign(doing.current, { track, frames, at, player, judge, correct, goOn });
 	useKeys(useMemo(() => keysOfTrack(doing), [track.id]));
 	const from = Math.min(Math.max(at - track.first - Math.floor(width / 2), 0), Math.max(track.last - track.first + 1 - width, 0));
 	const part = useMemo(() => frames && partOf(frames, from, from + width - 1), [frames, from, width]);
-	const charts = useMemo(() => part && chartsOf(part), [part]);
+	const space = shownAs.value === 'space';
+	const around = useAround(track, at, plays, turn);
+	const charts = useMemo(() => (part && !space ? chartsOf(part, around) : null), [part, space, around]);
 	if (found.error) return html`<${Trouble} title="Its frames cannot be shown" error=${found.error} retry=${found.reload} />`;
-	if (!frames || !part || !charts) return html`<${Loading} what="the track" />`;
+	if (!frames || !part) return html`<${Loading} what="the track" />`;
 	return html`
 		<div class="track">
 			<section class="card track__time" aria-label="The ball over time">
-				<${Band} frames=${part} at=${at} goTo=${goTo} />
-				${charts.map((chart) => html`<${Chart} key=${chart.yLabel} ...${chart} x=${part.frame} xLabel="frame" compact=${true} height=${HEIGHT} marker=${at} onPick=${(/** @type {number} */ index) => goTo(part.frame[index])} />`)}
-				<p class="note">Frames ${part.frame[0]} to ${part.frame.at(-1)}. <kbd>+</kbd> <kbd>−</kbd> zoom at the frame, arrow keys move.</p>
-				<${Numbers} x=${part.frame} xLabel="frame" curves=${charts.flatMap(({ curves }) => curves)} format=${centimetres} />
+				<${Tools} player=${player} switchView=${switchView} />
+				<${Band} frames=${space ? frames : part} at=${at} goTo=${goTo} whole=${space} />
+				${space ? html`<${TrackSpace} track=${track} frames=${frames} at=${at} plays=${plays} leave=${switchView} />` : null}
+				${charts?.map((chart) => html`<${Chart} key=${chart.yLabel} ...${chart} x=${part.frame} xLabel="frame" compact=${true} height=${HEIGHT} marker=${at} onPick=${(/** @type {number} */ index) => goTo(part.frame[index])} />`)}
+				${charts ? html`
+					<p class="note">Frames ${part.frame[0]} to ${part.frame.at(-1)}. <kbd>+</kbd> <kbd>−</kbd> zoom at the frame, arrow keys move.</p>
+					<${Numbers} x=${part.frame} xLabel="frame" curves=${charts.flatMap(({ curves }) => curves)} format=${centimetres} />` : null}
 			</section>
 			<div class="track__rail">
-				<${FrameCard} track=${track} frames=${frames} at=${at} goTo=${goTo} />
+				<${FrameCard} track=${track} frames=${frames} around=${around} at=${at} goTo=${goTo} />
 				<${VerdictCard} track=${track} judge=${judge} />
 				<${EventCard} frames=${frames} at=${at} goTo=${goTo} correct=${correct} />
 			</div>

@@ -10,7 +10,7 @@ import { count, plural } from '../../lib/format.js';
 /** How far a batch is, in words and as a bar. @param {{batch: BatchJson}} props */
 export function Progress({ batch }) {
 	const { groups, settled, submitted: handed } = batch;
-	const words = [`${count(settled)} of ${plural(groups, 'group')} done`, handed && batch.annotators.length && batch.verdicts === 1 ? `${count(handed)} submitted` : '', `${count(batch.waiting)} open`];
+	const words = [`${count(settled)} of ${plural(groups, batch.kind === 'tracks' ? 'track' : 'group')} done`, handed && batch.annotators.length && batch.verdicts === 1 ? `${count(handed)} submitted` : '', `${count(batch.waiting)} open`];
 	/** @param {number} n */
 	const share = (n) => (groups ? (100 * n) / groups : 0);
 	return html`

@@ -18,15 +18,15 @@ const PARTS = /** @type {{part: Part, title: string, note: string, roles: Role[]
 	{ part: 'reviewer', title: 'Reviewers', note: 'None: every reviewer of this dataset.', roles: ['reviewer', 'lead', 'admin'] },
 ]);
 
-/** @param {{dataset: string, chosen: Chosen, choose: (chosen: Chosen) => void}} props `dataset`: its name */
-export function PeopleChoice({ dataset, chosen, choose }) {
+/** @param {{dataset: string, chosen: Chosen, choose: (chosen: Chosen) => void, parts?: Part[]}} props `dataset`: its name; `parts`: what there is to do, else all */
+export function PeopleChoice({ dataset, chosen, choose, parts }) {
 	const people = useResource(async (signal) => (isTeam && !signal.aborted ? getMembers(dataset) : { items: /** @type {MemberJson[]} */ ([]) }), [dataset]);
 	if (!isTeam) return html`<p class="note">This server has no accounts: the batch is assigned to you.</p>`;
 	/** @param {Part} part @param {string} name @param {boolean} on */
 	function turn(part, name, on) {
 		choose({ ...chosen, [part]: on ? [...chosen[part], name] : chosen[part].filter((one) => one !== name) });
 	}
-	return html`${PARTS.map(({ part, title, note, roles }) => html`
+	return html`${PARTS.filter((one) => !parts || parts.includes(one.part)).map(({ part, title, note, roles }) => html`
 		<fieldset class="people-choice" key=${part}>
 			<legend>${title}</legend>
 			<p class="note">${note}</p>

@@ -8,6 +8,7 @@ import { deleteBatch, getTeamWork, patchBatch } from '../../api/work.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { fixed, plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
+import { address } from '../../lib/router.js';
 import { queueAddress } from '../../state/navigation.js';
 import { whyNot } from '../../state/rights.js';
 import { pageAddress } from '../dataset_menu.js';
@@ -46,7 +47,7 @@ function TeamBatch({ one, act, give }) {
 		<li class="work__item">
 			<div class="work__head">
 				<div>
-					<h3><a class="link" href=${queueAddress(batch.dataset, `batch:${batch.id}`)}>${batch.name}</a>${open ? null : html` <span class="pill">closed</span>`}${stalled ? html` <span class="pill" data-status="rejected">stalled</span>` : null}</h3>
+					<h3><a class="link" href=${batch.kind === 'tracks' ? address(pageAddress(batch.dataset, 'tracks'), { batch: String(batch.id) }) : queueAddress(batch.dataset, `batch:${batch.id}`)}>${batch.name}</a>${open ? null : html` <span class="pill">closed</span>`}${stalled ? html` <span class="pill" data-status="rejected">stalled</span>` : null}</h3>
 					<${Progress} batch=${batch} />
 					<p class="note">${given}${several}${goldEvery ? ` · one gold group in ${goldEvery}` : ''}${here.length ? ` · active now: ${here.map(({ person }) => person).join(', ')}` : ''}${stalled ? html` · no activity since <${When} at=${stalled} />` : null}<${Due} due=${batch.due} /></p>
 				</div>

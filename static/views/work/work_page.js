@@ -4,15 +4,18 @@
 import { html } from 'htm/preact';
 import { useEffect, useRef } from 'preact/hooks';
 
+import { getTracks } from '../../api/tracks.js';
 import { getMyWork } from '../../api/work.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
+import { navigate } from '../../lib/router.js';
 import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
 import { goOn } from '../../state/leases.js';
 import { isTeam } from '../../state/me.js';
 import { reviewAddress } from '../../state/navigation.js';
 import { inform } from '../../state/notice.js';
+import { trackAddress } from '../../state/track_list.js';
 import { pageAddress } from '../dataset_menu.js';
 import { FormError } from '../form_error.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
@@ -20,7 +23,14 @@ import { When } from '../when.js';
 import { Due, Progress } from './parts.js';
 import { TeamCard } from './team_card.js';
 
-/** @import {MyBatchJson} from '../../api/work.js' */
+/** @import {BatchJson, MyBatchJson} from '../../api/work.js' */
+
+/** Open the first track of a batch that nobody judged. @param {BatchJson} batch @returns {Promise<boolean>} whether there is one */
+async function openTrack({ id, dataset: name }) {
+	const { items } = await getTracks(name, { batch: id, verdict: 'none' });
+	if (items[0]) navigate(trackAddress(items[0].id, { batch: String(id) }));
+	return items.length > 0;
+}
 
 /** @param {{one: MyBatchJson, first: boolean}} props `first`: Enter goes on with it */
 function MyBatch({ one: { batch, parts, left, returned: back }, first }) {
@@ -29,8 +39,9 @@ function MyBatch({ one: { batch, parts, left, returned: back }, first }) {
 	const hides = datasets.value?.find(({ name }) => name === batch.dataset)?.hides_groups ?? false;
 	// Who is at something else already stays there; where another one becomes the first, nobody is taken to it.
 	useEffect(() => { if (first && document.activeElement === document.body) button.current?.focus(); }, []);
-	const go = () => attempt(goOn(batch.id), (some) => {
-		if (!some) inform(`No group of “${batch.name}” is available to you now: other people have the remaining groups open, or have to work on them first.`);
+	const tracks = batch.kind === 'tracks';
+	const go = () => attempt(tracks ? openTrack(batch) : goOn(batch.id), (some) => {
+		if (!some) inform(tracks ? `No track of “${batch.name}” is left.` : `No group of “${batch.name}” is available to you now: other people have the remaining groups open, or have to work on them first.`);
 	});
 	return html`
 		<li class="work__item">
@@ -44,7 +55,7 @@ function MyBatch({ one: { batch, parts, left, returned: back }, first }) {
 						<li key=${one.group}><a href=${reviewAddress(one.group, `batch:${batch.id}`)}>${one.title}</a> was returned by ${one.by}${one.reason ? html`: “${one.reason}”` : ''} <small><${When} at=${one.at} /></small></li>`)}</ul>` : null}
 					${error ? html`<${FormError} error=${error} />` : null}
 				</div>
-				${left ? html`<button ref=${button} class=${first ? 'button button--primary' : 'button'} type="button" data-needs="annotate" onClick=${go}>Continue: ${plural(left, 'group')}<span class="hidden-text"> of ${batch.name}</span></button>` : null}
+				${left ? html`<button ref=${button} class=${first ? 'button button--primary' : 'button'} type="button" data-needs="annotate" onClick=${go}>Continue: ${plural(left, tracks ? 'track' : 'group')}<span class="hidden-text"> of ${batch.name}</span></button>` : null}
 			</div>
 		</li>
 	`;

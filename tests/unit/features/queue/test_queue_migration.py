@@ -33,10 +33,13 @@ def as_before(store: Store) -> None:
         for trigger in ("group_new", "group_change", "group_solved"):
             session.execute(text(f"DROP TRIGGER {trigger}_is_marked"))
         session.execute(text("ALTER TABLE version DROP COLUMN tracks"))
+        session.execute(text("DROP TABLE batch_track"))
         session.execute(text("DROP TABLE track"))
         session.execute(text("DROP TABLE ball_run"))
         session.execute(text("DROP TABLE predicted_track"))
         session.execute(text("ALTER TABLE prediction_set DROP COLUMN tracks"))
+        for column in ("number", "place", "of_inputs"):
+            session.execute(text(f"ALTER TABLE import_finding DROP COLUMN {column}"))
         session.execute(text("DROP TABLE shot_cameras"))
         session.execute(text("DROP TABLE shot_link"))
         session.execute(text("DROP TABLE recording"))

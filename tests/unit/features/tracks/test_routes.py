@@ -43,7 +43,21 @@ class TestTracks:
         assert (track["stale"], track["verdict"], track["by"]) == (False, None, "local")
         assert track["summary"]["reason"] is None
         answer = api.get(f"{API}/tracks/{track['id']}")
+        assert (track.pop("batches"), track.pop("assigned")) == ([], [])
         assert (answer.json(), answer.headers["etag"]) == (track, track["etag"])
+
+    def test_are_listed_by_what_is_asked_for(self, api, track) -> None:
+        def listed(**asked: Any) -> list[int]:
+            return [item["id"] for item in api.get(TRACKS, params=asked).json()["items"]]
+
+        assert listed(verdict="none", sort="worst") == [track["id"]]
+        assert listed(verdict="accepted") == listed(stale=True) == listed(assigned="local") == []
+        body = {"name": "all", "tracks": [track["id"]]}
+        made = api.post(f"{API}/datasets/flight/batches", json=body).json()
+        assert (made["kind"], made["groups"], made["waiting"]) == ("tracks", 1, 1)
+        assert listed(assigned="local") == listed(batch=made["id"]) == [track["id"]]
+        work = api.get(f"{API}/work").json()["items"]
+        assert [(item["batch"]["id"], item["left"]) for item in work] == [(made["id"], 1)]
 
     def test_a_dataset_without_stretches_says_so(self, api, services) -> None:
         answer = api.post(f"{API}/datasets/broadcast/tracks", json={})
@@ -69,6 +83,19 @@ class TestFrames:
         part = {"first": FIRST + 10, "last": FIRST + 12}
         found = api.get(f"{API}/tracks/{track['id']}/frames", params=part).json()
         assert found["frame"] == [FIRST + 10, FIRST + 11, FIRST + 12]
+
+    def test_around_one_as_groups_are_now(self, api, track) -> None:
+        found = api.get(f"{API}/tracks/{track['id']}/around", params={"frame": FIRST + 30}).json()
+        assert (found["frame"][0], found["frame"][-1]) == (FIRST + 5, FIRST + 55)
+        assert found["reason"] is None
+        assert found["x"][25] is not None
+        refused = api.get(f"{API}/tracks/{track['id']}/around", params={"frame": 3})
+        assert refused.status_code == 400
+
+    def test_a_group_leads_to_its_track(self, api, track) -> None:
+        group = api.get(f"{API}/tracks/{track['id']}/frames").json()["group"][4]
+        (found,) = api.get(f"{API}/groups/{group}/tracks").json()["items"]
+        assert (found["track"]["id"], found["frame"]) == (track["id"], FIRST + 4)
 
     def test_a_track_that_is_not_there_is_404(self, api) -> None:
         assert api.get(f"{API}/tracks/999/frames").status_code == 404

@@ -1,0 +1,118 @@
+"""A track around one frame as its groups are now: what an edit changes, told before the whole is made again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.db.store import Store
+from app.errors import InputError, NotFoundError
+from app.features.datasets.service import read_dataset_head
+from app.features.tracks.codec import TrackInputs, make_track
+from app.features.tracks.findings import groups_by_frame
+from app.features.tracks.making import read_records
+from app.features.tracks.queries import find_row, list_rows, match_groups, place_of_group
+from app.features.tracks.service import TrackDetail
+from app.features.tracks.stored import Track, stored_track
+from app.features.tracks.stretches import frame_of, gather_stretches
+from app.soccer.pitch import Pitch
+from app.tracking.ball_track import BallMeasurements, BallTrack
+
+AROUND = 25
+"""Frames before and after the one that is asked for."""
+_MARGIN = 15
+"""Frames more that are tracked on either side, so that what is told knows what comes before and after."""
+
+
+@dataclass(frozen=True)
+class TrackOfGroup:
+    """A track that a group is in, and its frame there."""
+
+    track: Track
+    frame: int
+
+
+def tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
+    """The tracks that a group is in: at most one, unless stretches have changed.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        place = place_of_group(session, group_id)
+        if place is None:
+            raise NotFoundError.group(group_id)
+        frame = frame_of(place.key)
+        rows = [
+            row
+            for row in list_rows(session, place.dataset_id)
+            if row.match == place.match and frame is not None and row.first <= frame <= row.last
+        ]
+        if frame is None or not rows:
+            return []
+        head = read_dataset_head(session, place.dataset_id)
+        groups = match_groups(session, head.id, [place.match]).get(place.match, [])
+        return [TrackOfGroup(stored_track(row, head.policy, groups), frame) for row in rows]
+
+
+@dataclass(frozen=True)
+class Around:
+    """What was tracked around a frame.
+
+    Attributes:
+        frame: In the middle.
+        detail: ``ball`` and ``inputs`` have the frames around it alone, and a reason where no track
+            comes of them.
+    """
+
+    frame: int
+    detail: TrackDetail
+
+
+def track_around(store: Store, track_id: int, frame: int | None = None) -> Around:
+    """A track in the frames around one of its own, from its groups as they are now; nothing is stored.
+
+    Args:
+        store: The database.
+        track_id: Which.
+        frame: In the middle; None: the worst of the track, else its first.
+
+    Raises:
+        NotFoundError: There is no such track.
+        InputError: It has no such frame.
+    """
+    with store.read() as session:
+        row = find_row(session, track_id)
+        if row is None:
+            raise NotFoundError(f"there is no track {track_id}")
+        head = read_dataset_head(session, int(row.dataset_id))
+        groups = match_groups(session, head.id, [row.match]).get(row.match, [])
+        track = stored_track(row, head.policy, groups)
+        if frame is None:
+            worst = track.summary.worst
+            frame = track.first if worst is None else worst
+        if not track.first <= frame <= track.last:
+            raise InputError(
+                f'frame {frame} is not of the track "{track.key}", {track.first} to {track.last}'
+            )
+        first = max(track.first, frame - AROUND - _MARGIN)
+        last = min(track.last, frame + AROUND + _MARGIN)
+        near = groups_by_frame(groups, first, last)
+        records = list(read_records(session, list(near.values())))
+    # One stretch, however far apart its groups are.
+    stretches = gather_stretches(records, head.policy, {track.match: [(track.first, track.last)]})
+    if not stretches:
+        return Around(frame, TrackDetail(track, *_nothing(track, first, last), near))
+    corrections = (item for item in track.corrections if first <= item.frame <= last)
+    inputs = TrackInputs.of(stretches[0], corrections)
+    return Around(frame, TrackDetail(track, make_track(inputs), inputs, near))
+
+
+def _nothing(track: Track, first: int, last: int) -> tuple[BallTrack, TrackInputs]:
+    """No ball in some frames, whose groups are all rejected."""
+    frames = np.arange(first, last + 1)
+    times, empty = frames / track.summary.rate, np.zeros(0)
+    measured = BallMeasurements(np.zeros(0, dtype=np.int64), empty, (), np.zeros((0, 2)), empty, ())
+    reason = "No group around this frame takes part."
+    return BallTrack.none(frames, times, reason), TrackInputs(frames, times, Pitch(), measured)

@@ -1,0 +1,147 @@
+"""Balls that contradict a track, as findings of their groups; they live and go with the track."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from app.db.json_columns import as_written, parse, unpack
+from app.db.session import Session
+from app.features.findings.queries import BallNotice, replace_track_findings
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.queue.refresh_queries import refresh_queue
+from app.features.tracks.codec import (
+    TrackInputs,
+    corrected,
+    inputs_from_json,
+    patches_from_json,
+    track_from_json,
+)
+from app.features.tracks.queries import TrackGroup, list_rows, match_groups, read_bodies
+from app.features.tracks.stored import corrections_of
+from app.features.tracks.stretches import frame_of, view_name
+from app.tracking.ball_track import BallTrack
+
+BATCH = 200
+
+
+@dataclass(frozen=True)
+class BallBeside:
+    """A ball that a track does not explain.
+
+    Attributes:
+        frame: Of the stretch.
+        view: Name of the camera or recording.
+        at: Where it was annotated, pixels.
+        place: Where the track is seen, pixels; None in a gap.
+        px: How far off it is.
+        reason: A sentence.
+    """
+
+    frame: int
+    view: str
+    at: tuple[float, float]
+    place: tuple[float, float] | None
+    px: float
+    reason: str
+
+
+def balls_beside(ball: BallTrack, inputs: TrackInputs) -> list[BallBeside]:
+    """The balls that a track does not explain, in its order."""
+    measured, first = inputs.measurements, int(ball.frames[0]) if len(ball.frames) else 0
+    found = []
+    for item in ball.contradicted:
+        row = item.measurement
+        frame, at = int(measured.frames[row]), measured.pixels[row].tolist()
+        place = ball.position[frame - first][None]
+        seen = np.full(2, np.nan)
+        if np.isfinite(place).all():
+            seen = measured.cameras[row].project(place)[0]
+        there = (float(seen[0]), float(seen[1])) if np.isfinite(seen).all() else None
+        view = measured.views[row]
+        found.append(BallBeside(frame, view, (at[0], at[1]), there, item.px, item.reason))
+    return found
+
+
+def refresh_findings(
+    session: Session, dataset_id: int, matches: Collection[str], only: int | None = None
+) -> None:
+    """Bring what tracks say of groups in step with the tracks; rejected ones say nothing.
+
+    A ball that was changed since the track was made is passed over: the track does not know it.
+
+    Args:
+        session: Of a write.
+        dataset_id: The dataset.
+        matches: Of the tracks.
+        only: Id of the track whose groups alone are asked about; None: all of the matches.
+    """
+    groups = match_groups(session, dataset_id, matches)
+    rows = [row for row in list_rows(session, dataset_id) if row.match in groups]
+    if only is not None:
+        rows = [row for row in rows if row.id == only]
+    mine = {row.id: groups_by_frame(groups[row.match], row.first, row.last) for row in rows}
+    scope = None if only is None else {one.id for one in mine.get(only, {}).values()}
+    found: list[BallNotice] = []
+    for row in rows:
+        if row.verdict == "rejected" or not _contradicted(row):
+            continue
+        body = read_bodies(session, [row.id])[row.id]
+        inputs = replace(inputs_from_json(unpack(body.inputs)), corrections=corrections_of(row))
+        patches = () if body.patches is None else patches_from_json(unpack(body.patches))
+        beside = balls_beside(
+            corrected(inputs, track_from_json(unpack(body.body)), patches), inputs
+        )
+        found += _notices(session, beside, mine[row.id])
+    changed = replace_track_findings(session, dataset_id, groups.keys(), scope, found)
+    refresh_queue(session, changed)
+
+
+def groups_by_frame(groups: Iterable[TrackGroup], first: int, last: int) -> dict[int, TrackGroup]:
+    """The group of each frame of a stretch that has one."""
+    numbered = ((frame_of(group.key), group) for group in groups)
+    return {
+        frame: group for frame, group in numbered if frame is not None and first <= frame <= last
+    }
+
+
+def _contradicted(row: Any) -> int:
+    with as_written():
+        return int(parse(row.summary)["contradicted"])
+
+
+def _notices(
+    session: Session, beside: Sequence[BallBeside], groups: Mapping[int, TrackGroup]
+) -> list[BallNotice]:
+    ids = sorted({groups[item.frame].id for item in beside if item.frame in groups})
+    stored: dict[int, StoredGroup] = {}
+    for start in range(0, len(ids), BATCH):
+        stored |= read_groups(session, ids[start : start + BATCH])
+    found = []
+    for item in beside:
+        group = groups.get(item.frame)
+        known = None if group is None else stored.get(group.id)
+        key = None if known is None else _view_of(known, item)
+        if known is not None and key is not None:
+            sentence = (
+                f"It lies {item.px:.0f} px beside the track of the ball over time: "
+                "another ball, or a slip."
+            )
+            found.append(
+                BallNotice(known.id, key, sentence, item.px, item.place, known.inputs_hash)
+            )
+    return found
+
+
+def _view_of(stored: StoredGroup, item: BallBeside) -> str | None:
+    """Key of the view that still shows the ball where the track met it; None: none does."""
+    for view in stored.group.views:
+        center = None if view.ball is None or not view.included else view.ball.center
+        if center is None or view_name(view) != item.view:
+            continue
+        if (center.x, center.y) == item.at:
+            return view.key
+    return None

@@ -1,0 +1,86 @@
+"""A track around a frame, as its groups are now."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.db.store import Store
+from app.errors import InputError, NotFoundError
+from app.features.groups.submit import load
+from app.features.tracks.around import AROUND, track_around, tracks_of_group
+from app.features.tracks.service import list_tracks, make_tracks, read_track
+from app.features.verdicts.service import set_verdict
+from tests.flights import FIRST, places
+from tests.unit.features.tracks.test_service import move
+
+AT = 30
+
+
+@pytest.fixture
+def track(store: Store, flight: list[int]) -> int:
+    """Id of the track of the flight."""
+    make_tracks(store, "demo", None, "ann", lambda *_: None)
+    (found,) = list_tracks(store, "demo")
+    return found.id
+
+
+def at_frame(store: Store, track: int) -> np.ndarray:
+    detail = track_around(store, track, FIRST + AT).detail
+    (row,) = np.flatnonzero(detail.ball.frames == FIRST + AT)
+    return np.asarray(detail.ball.position[row])
+
+
+class TestTrackAround:
+    def test_is_the_track_where_nothing_has_changed(self, store: Store, track: int) -> None:
+        whole = read_track(store, track).ball.position[AT]
+        assert np.linalg.norm(at_frame(store, track) - whole) < 0.03
+        assert np.linalg.norm(at_frame(store, track) - places(AT + 1)[-1]) < 0.1
+
+    def test_tells_what_an_edit_makes_of_it(
+        self, store: Store, flight: list[int], track: int
+    ) -> None:
+        move(store, flight[AT], 60.0)
+        detail = track_around(store, track, FIRST + AT).detail
+        assert detail.track.stale
+        frames = [
+            int(detail.inputs.measurements.frames[item.measurement])
+            for item in detail.ball.contradicted
+        ]
+        assert frames == [FIRST + AT]
+        assert not read_track(store, track).ball.contradicted
+
+    def test_has_no_frames_beyond_those_of_the_track(self, store: Store, track: int) -> None:
+        detail = track_around(store, track, FIRST).detail
+        assert detail.ball.frames[0] == FIRST
+        assert AROUND <= len(detail.ball.frames) < 60
+
+    def test_says_why_there_is_none(self, store: Store, flight: list[int], track: int) -> None:
+        for group in flight:
+            set_verdict(
+                store, group, "rejected", "ball_not_visible",
+                if_match=load(store, group).etag, actor="ann",
+            )  # fmt: skip
+        detail = track_around(store, track, FIRST + AT).detail
+        assert detail.ball.reason == "No group around this frame takes part."
+
+    def test_is_of_the_worst_frame_where_none_is_named(self, store: Store, track: int) -> None:
+        (worst,) = [found.summary.worst for found in list_tracks(store, "demo")]
+        assert track_around(store, track).frame == worst
+
+    def test_refuses_what_it_does_not_have(self, store: Store, track: int) -> None:
+        with pytest.raises(InputError, match="frame 3 is not of the track"):
+            track_around(store, track, 3)
+        with pytest.raises(NotFoundError, match="there is no track 99"):
+            track_around(store, 99, FIRST)
+
+
+class TestTracksOfGroup:
+    def test_are_those_of_its_frame(self, store: Store, flight: list[int], track: int) -> None:
+        (found,) = tracks_of_group(store, flight[7])
+        assert (found.track.id, found.frame) == (track, FIRST + 7)
+
+    def test_are_none_before_somebody_made_them(self, store: Store, flight: list[int]) -> None:
+        assert tracks_of_group(store, flight[7]) == []
+        with pytest.raises(NotFoundError):
+            tracks_of_group(store, 999)

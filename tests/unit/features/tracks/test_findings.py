@@ -1,0 +1,163 @@
+"""Balls that contradict a track: findings of their groups, as long as the track says so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from sqlalchemy import select
+
+from app.db.store import Store
+from app.features.datasets.service import dataset_id
+from app.features.datasets.tables import ImportFindingModel
+from app.features.findings.service import FindingName, finding_values, set_dismissal
+from app.features.groups.edit import SetBall
+from app.features.groups.submit import load, submit
+from app.features.groups.suggested_edits import offers_of_finding
+from app.features.groups.undo import undo
+from app.features.queue.refresh_queries import differing_rows
+from app.features.queue.service import list_groups
+from app.features.solutions.service import solve_dataset
+from app.features.tracks.service import (
+    TrackChange,
+    change_track,
+    list_tracks,
+    make_tracks,
+    read_track,
+)
+from app.soccer.finding import TRACK_DISAGREES, Finding
+from app.soccer.frames import ImagePoint
+from tests.flights import FIRST, places
+from tests.rigs import TRUTH
+from tests.unit.features.tracks.test_service import move
+
+AT = 20
+"""The frame of the stretch whose first view shows another ball."""
+
+
+def make(store: Store) -> None:
+    make_tracks(store, "demo", None, "ann", lambda *_: None)
+
+
+def judge(store: Store, verdict: Any) -> None:
+    (track,) = list_tracks(store, "demo")
+    change_track(store, track.id, TrackChange(verdict), track.etag, actor="ben")
+
+
+def told(store: Store) -> list[tuple[str, str | None]]:
+    """Group and view of each finding of the track."""
+    values = finding_values(store, "demo")
+    return [(item["group"], item["view"]) for item in values if item["kind"] == TRACK_DISAGREES]
+
+
+def of_group(store: Store, group: int) -> Finding:
+    solution = load(store, group).solution
+    assert solution is not None
+    (found,) = [item for item in solution.findings if item.kind == TRACK_DISAGREES]
+    return found
+
+
+@pytest.fixture
+def beside(store: Store, flight: list[int]) -> int:
+    """A group whose first view shows a ball 60 px beside the track."""
+    move(store, flight[AT], 60.0)
+    make(store)
+    return flight[AT]
+
+
+def rows(store: Store) -> list[tuple[int, int | None]]:
+    """Ids of what is stored, and their groups."""
+    model = ImportFindingModel
+    with store.read() as session:
+        found = session.execute(
+            select(model.id, model.group_id).where(model.kind == TRACK_DISAGREES)
+        )
+        return [(row.id, row.group_id) for row in found]
+
+
+class TestFindings:
+    def test_name_the_ball_and_where_the_track_is_seen(self, store: Store, beside: int) -> None:
+        view = load(store, beside).group.views[0].key
+        assert told(store) == [(str(FIRST + AT), view)]
+        found = of_group(store, beside)
+        assert found.sentence.startswith("It lies ")
+        assert found.number == pytest.approx(60, abs=6)
+        (seen,) = TRUTH[view].project(places(AT + 1)[-1:])
+        assert found.place == pytest.approx(seen.tolist(), abs=4)
+
+    def test_stand_in_the_queue(self, store: Store, beside: int) -> None:
+        listed = list_groups(store, dataset_id(store, "demo"), f"finding:{TRACK_DISAGREES}")
+        assert [row.id for row in listed.items] == [beside]
+        with store.read() as session:
+            assert differing_rows(session)[1] == []
+
+    def test_offer_to_move_the_ball_or_to_leave_the_view_out(
+        self, store: Store, beside: int
+    ) -> None:
+        state, found = load(store, beside), of_group(store, beside)
+        moved, left_out = offers_of_finding(state.group, found)
+        assert (moved.label, left_out.label) == ("Move the ball there", "Leave it out")
+        center = moved.edit.apply(state.group).views[0].ball.center
+        assert (center.x, center.y) == pytest.approx(found.place)
+        assert not left_out.edit.apply(state.group).views[0].included
+
+    def test_go_with_the_edit_that_mends_and_come_back_with_its_undo(
+        self, store: Store, beside: int
+    ) -> None:
+        state = load(store, beside)
+        moved = offers_of_finding(state.group, of_group(store, beside))[0]
+        after = submit(store, beside, moved.edit, if_match=state.etag, actor="ann")
+        assert told(store) == []
+        with store.read() as session:
+            assert differing_rows(session)[1] == []
+        undo(store, beside, if_match=after.etag, actor="ann")
+        assert len(told(store)) == 1
+        with store.read() as session:
+            assert differing_rows(session)[1] == []
+
+    def test_are_gone_when_the_track_is_made_without_a_reason_for_them(
+        self, store: Store, beside: int
+    ) -> None:
+        state = load(store, beside)
+        moved = offers_of_finding(state.group, of_group(store, beside))[0]
+        submit(store, beside, moved.edit, if_match=state.etag, actor="ann")
+        solve_dataset(store, "demo")
+        make(store)
+        assert told(store) == []
+
+    def test_follow_the_verdict_on_the_track(self, store: Store, beside: int) -> None:
+        before = of_group(store, beside)
+        judge(store, "accepted")
+        assert of_group(store, beside) == before
+        judge(store, "rejected")
+        assert told(store) == []
+        judge(store, "none")
+        assert of_group(store, beside) == before
+
+    def test_pass_over_a_ball_that_was_moved_since(self, store: Store, beside: int) -> None:
+        judge(store, "rejected")
+        state = load(store, beside)
+        ball = state.group.views[0].ball
+        away = SetBall(state.group.views[0].key, type(ball)(point=ImagePoint(5.0, 5.0)))
+        submit(store, beside, away, if_match=state.etag, actor="ann")
+        judge(store, "none")
+        assert told(store) == []
+
+    def test_are_checked_off_and_stay_so(self, store: Store, beside: int) -> None:
+        found, state = of_group(store, beside), load(store, beside)
+        name = FindingName(found.kind, found.view)
+        set_dismissal(store, beside, name, dismissed=True, if_match=state.etag, actor="ann")
+        make(store)
+        rows = list_groups(store, dataset_id(store, "demo"), f"dismissed:{TRACK_DISAGREES}")
+        assert [row.id for row in rows.items] == [beside]
+
+    def test_that_are_there_are_not_written_again(self, store: Store, beside: int) -> None:
+        before = rows(store)
+        assert [group for _, group in before] == [beside]
+        make(store)
+        assert rows(store) == before
+
+    def test_say_where_the_balls_of_a_track_are(self, store: Store, beside: int) -> None:
+        (track,) = list_tracks(store, "demo")
+        detail = read_track(store, track.id)
+        assert len(detail.ball.contradicted) == track.summary.contradicted >= 1
