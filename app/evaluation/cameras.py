@@ -15,7 +15,7 @@ from app.geometry.camera import Camera
 from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.solution import GAMMAS_PERCENT
-from app.solving.score import SHARE_ABOVE, FrameScore, score, score_frame
+from app.solving.score import SHARE_ABOVE, FrameScore, score_frame, score_frames
 
 COLUMNS = (
     Column("completeness", "Calibrated", "", "higher"),
@@ -96,7 +96,7 @@ def jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figur
 def _row(
     name: str, label: str, scores: Scores, match: Mapping[int, str], resamples: Resamples
 ) -> Row:
-    total, count = score(scores.values()), len(scores)
+    total, count = score_frames(scores.values()), len(scores)
     matches = [match[frame] for frame in scores]
     found = list(scores.values())
 

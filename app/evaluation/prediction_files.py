@@ -49,7 +49,7 @@ from app.formats.json_text import describe_document, read_json, read_json_lines
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
-from app.soccer.camera_size import other_size
+from app.soccer.camera_size import size_centred_on_principal_point
 from app.soccer.choices import PredictionFormat
 from app.soccer.frames import Box, ImageSize
 
@@ -194,7 +194,9 @@ def read_predicted_cameras(
         for identity in ids:
             annotated = names.frames[identity].size
             made_for = sizes.get(name) or size
-            if (other := other_size(camera, made_for or annotated)) is not None:
+            if (
+                other := size_centred_on_principal_point(camera, made_for or annotated)
+            ) is not None:
                 message = (
                     f"was made for {other.width} x {other.height}: its principal point is the middle of "
                     f"that; say so (--cameras-size {other.width}x{other.height})"

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from app.errors import InputError
 from app.finite import json_text
 from app.formats.camera_json import camera_to_json
-from app.formats.export_names import fold_file_name, frame_claims
+from app.formats.export_names import fold_file_name, frame_name_claims
 from app.formats.export_record import ExportRecord
 from app.formats.frame_names import view_file_path
 from app.formats.view_files import PutText, write_to_disk
@@ -80,10 +80,10 @@ def camera_owner(group: Group, view: View) -> tuple[str, ...]:
     return (view.station.key,) if view.station.shared else (group.key, view.key)
 
 
-def camera_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def camera_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The names of a view in an export, and whose each would be (``export_names.Claims``)."""
     camera = {_camera_file_of_view(group, view): camera_owner(group, view)}
-    return {**camera, **frame_claims(group, view, split)}
+    return {**camera, **frame_name_claims(group, view, split)}
 
 
 def _camera_file_of_view(group: Group, view: View) -> str:

@@ -50,7 +50,7 @@ class JoinedAnnotations:
         seen: dict[str, Mapping[str, Any]] = {}
         for index, item in enumerate(annotations):
             record = f"annotations[{index}]"
-            image = self._image(item, record)
+            image = self._find_image(item, record)
             if image is None:
                 continue
             if isinstance(item.get("caption"), str) and "category_id" not in item:
@@ -59,7 +59,9 @@ class JoinedAnnotations:
             identity = id_text(item.get("id"))
             other = item if identity is None else seen.setdefault(identity, item)
             if other is not item and other == item:
-                self._note(record, "id", f"is {identity}: the same annotation twice; left out")
+                self._report_problem(
+                    record, "id", f"is {identity}: the same annotation twice; left out"
+                )
                 continue
             shared += other is not item
             self.of_image[image].append((record, item))
@@ -75,7 +77,7 @@ class JoinedAnnotations:
         """Whether one image alone has a name, as the last part of its own."""
         return len(self._names.get(name, [])) == 1
 
-    def _note(self, record: str, field: str | None, problem: str) -> None:
+    def _report_problem(self, record: str, field: str | None, problem: str) -> None:
         self._report.note(self._path, record, field, problem)
 
     def _add_image(self, index: int, item: Any) -> None:
@@ -87,15 +89,17 @@ class JoinedAnnotations:
         if not self._ids.add(value, index):
             known = id_text(value) is not None
             problem = f"is {quote_value(value)}, as another image's is" if known else "is missing"
-            self._note(f"images[{index}]", "id", f"{problem}; no annotation joins this image")
+            self._report_problem(
+                f"images[{index}]", "id", f"{problem}; no annotation joins this image"
+            )
 
-    def _image(self, item: Any, record: str) -> int | None:
+    def _find_image(self, item: Any, record: str) -> int | None:
         """The image of an annotation, by its id or else by its name; None is reported."""
         if not isinstance(item, dict):
-            self._note(record, None, "is not an object; left out")
+            self._report_problem(record, None, "is not an object; left out")
             return None
         if "image_id" not in item:
-            self._note(record, "image_id", "is missing; left out")
+            self._report_problem(record, "image_id", "is missing; left out")
             return None
         value = item["image_id"]
         image = self._ids.find(value)
@@ -104,7 +108,7 @@ class JoinedAnnotations:
         if image is None:
             self._report.counts["annotations without image"] += 1
             problem = f"is {quote_value(value)}, which no image of the file has; left out"
-            self._note(record, "image_id", problem)
+            self._report_problem(record, "image_id", problem)
         return image
 
 

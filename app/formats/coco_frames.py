@@ -343,7 +343,7 @@ def _make_view(group: str, frame: Frame, tree: FileTree, calibration: str) -> Vi
     key = group if alone else frame.view
     station = Station(key if alone else f"{group}/{key}", frame.size, calibration=calibration)
     if frame.camera is not None:
-        station = station.with_given(frame.camera)
+        station = station.with_given_camera(frame.camera)
     media = None if frame.place is None else tree.media(frame.place)
     return View(key, station, tuple(frame.balls), media, extras=Extras(tuple(frame.boxes)))
 

@@ -68,7 +68,7 @@ def write_coco(
         for record in records:
             counts["groups"] += 1
             for view in record.group.views:
-                teaches = every_view or record.teaches(view)
+                teaches = every_view or record.is_training_view(view)
                 prefix = PREFIX if teaches else OUTSIDE
                 name = f"{prefix}{record.split(view) or UNASSIGNED}.json"
                 if name not in files:

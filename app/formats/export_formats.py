@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import get_args
 
 from app.errors import InputError
-from app.formats.cameras_writer import camera_claims, write_camera_files
+from app.formats.cameras_writer import camera_name_claims, write_camera_files
 from app.formats.coco_writer import write_coco
-from app.formats.export_names import Claims, ExportNames, Outline, frame_claims
+from app.formats.export_names import Claims, ExportNames, Outline, frame_name_claims
 from app.formats.export_record import ExportRecord
 from app.formats.format_names import ExportFormat
 from app.formats.frame_names import FrameName, frame_path_by_match, frame_path_in_split
-from app.formats.gamestate import sequence_claims, sequence_frame_path
+from app.formats.gamestate import sequence_frame_path, sequence_name_claims
 from app.formats.gamestate_writer import write_gamestate
 from app.formats.issia import FramePersons
 from app.formats.issia_3d_writer import write_issia_3d
 from app.formats.issia_writer import write_issia
 from app.formats.manifest import SOFTWARE, software_version
 from app.formats.parquet_writer import write_parquet
-from app.formats.sn_calibration import line_claims, line_frame_path
+from app.formats.sn_calibration import line_frame_path, line_name_claims
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import labels_frame_path, write_soccernet_v3
 from app.formats.soccernet_v3d_writer import write_soccernet_v3d
@@ -60,9 +60,9 @@ LAYOUTS: Mapping[str, FrameName] = {
 }
 """Where a format looks for the frames of its views, unless beside the labels of a match."""
 CLAIMS: Mapping[str, Claims] = {
-    "cameras": camera_claims,
-    "gamestate": sequence_claims,
-    "sn-calibration": line_claims,
+    "cameras": camera_name_claims,
+    "gamestate": sequence_name_claims,
+    "sn-calibration": line_name_claims,
 }
 """The names that a format makes of a view, unless that of its frame alone."""
 PRESCRIBED = ("soccernet-v3", "soccernet-v3d", "yolo")
@@ -202,7 +202,7 @@ def options_used_by(format: str) -> list[str]:  # noqa: A002
     return [name for name in USERS if format in USERS[name]]
 
 
-def frame_layout(format: str) -> FrameName:  # noqa: A002
+def frame_path_rule(format: str) -> FrameName:  # noqa: A002
     """Where a format looks for the frames of its views."""
     return LAYOUTS.get(format, frame_path_by_match)
 
@@ -212,7 +212,7 @@ def export_names(format: str, outlines: Iterable[Outline]) -> ExportNames:  # no
     if format in PRESCRIBED:
         return ExportNames(lambda group, view, split: {})
     glue = "_" if format == "gamestate" else "/"
-    return ExportNames(CLAIMS.get(format, frame_claims), outlines, glue)
+    return ExportNames(CLAIMS.get(format, frame_name_claims), outlines, glue)
 
 
 def box_settings(format: str, boxes: str) -> dict[str, str]:  # noqa: A002

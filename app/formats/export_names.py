@@ -36,7 +36,7 @@ def frame_identity(group: Group, view: View) -> Hashable:
     return view.media, view.station.flipped
 
 
-def frame_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def frame_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """Of formats whose records name the picture alone."""
     return {
         frame_path_by_match(group, view, split, expected_frame_suffix(view)): frame_identity(

@@ -80,7 +80,7 @@ class ExportRecord:
         """Whether the 3D ball holds in one view; every format's count of balls counts these."""
         return has_ball_3d(self.solution, view)
 
-    def teaches(self, view: View) -> bool:
+    def is_training_view(self, view: View) -> bool:
         """Whether a detector may learn from a view: its ball holds in 3D, or it shows none.
 
         In any other view a ball was annotated that the other views do not confirm.
@@ -90,7 +90,7 @@ class ExportRecord:
 
     def for_training(self) -> ExportRecord:
         """The same group with the views alone from which a detector may learn."""
-        views = tuple(view for view in self.group.views if self.teaches(view))
+        views = tuple(view for view in self.group.views if self.is_training_view(view))
         return replace(self, group=replace(self.group, views=views))
 
     @property

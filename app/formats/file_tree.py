@@ -81,7 +81,7 @@ class FileTree(Protocol):
     def media_in_zip(self, name: str, member: str) -> Media:
         """The same of a member of a zip file among the files."""
 
-    def nested(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
         """The members of a zip file among the files, read in place.
 
         Raises:

@@ -90,7 +90,7 @@ class FolderTree:
         """Where a member of a zip file in the folder can be read later."""
         return Media(str(self.path / name), member)
 
-    def nested(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
         """The members of a zip file in the folder."""
         return ZipTree(self.path / name, report, self._limits)
 

@@ -43,7 +43,7 @@ def frame_file_name(group: Group, view: View) -> str:
     return f"{PurePosixPath(stem).name}{PurePosixPath(view.key).suffix or '.jpg'}"
 
 
-def sequence_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def sequence_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The name of a view in an export, and whose it is (``export_names.Claims``).
 
     Files of one sequence in several splits are one sequence to who reads them, and images are

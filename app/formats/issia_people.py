@@ -28,7 +28,7 @@ _WRITTEN_HERE = re.compile(r"cam\d{1,3}", re.ASCII)
 """Name of the video in a file that ``issia_writer`` wrote, whose people are turned right."""
 
 
-def mirrored_people(
+def cameras_with_mirrored_people(
     tracks: Mapping[int, ViperTrack], given: Mapping[int, Camera], widths: Mapping[int, int]
 ) -> list[int]:
     """Numbers of the cameras whose people are to be turned.

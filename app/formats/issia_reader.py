@@ -13,7 +13,7 @@ from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.folder_tree import FolderTree
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, DEFAULT_SIZE, MATCH, FramePersons
-from app.formats.issia_people import mirrored_people, turn_people
+from app.formats.issia_people import cameras_with_mirrored_people, turn_people
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files, read_line_files_of_tree
@@ -185,7 +185,7 @@ def add_stations_and_media(
         station = _make_station(camera, given.get(camera), lines.get(camera), options, size)
         found.stations[camera] = station
     widths = {camera: size.width for camera, size in sizes.items()}
-    mirrored = mirrored_people(found.tracks, given, widths)
+    mirrored = cameras_with_mirrored_people(found.tracks, given, widths)
     for camera in mirrored:
         found.tracks[camera] = turn_people(found.tracks[camera], widths[camera])
     if mirrored:

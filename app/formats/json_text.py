@@ -16,7 +16,7 @@ from app.finite import quoted
 from app.formats.camera_matrix import holds_homography, holds_matrices
 from app.formats.report import Report
 from app.plural import plural
-from app.soccer.pitch import marking_like
+from app.soccer.pitch import find_marking_like
 
 EVALUATE = "touchline evaluate"
 EXPORT = "export it as COCO from your tool and import that"
@@ -84,7 +84,7 @@ def _describe_object(value: dict[str, Any]) -> str:
         return f"is an annotation of LabelMe: {EXPORT}"
     if any(map(is_camera, value.values())):
         return "holds cameras: import it as cameras"
-    if any(map(marking_like, value)):
+    if any(map(find_marking_like, value)):
         return "holds field lines: import it as sn-calibration"
     return f"is an object with {_list_keys(value)}" if value else "is an empty object"
 

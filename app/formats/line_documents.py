@@ -13,7 +13,7 @@ from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.json_text import describe_document, read_json, read_json_lines
 from app.formats.report import Report
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like
+from app.soccer.pitch import WITHOUT_GEOMETRY, find_marking_like
 
 MEANT = (
     'lines are {"Side line top": [{"x": 0.1, "y": 0.2}, ...], ...} (docs/formats.md#sn-calibration)'
@@ -114,7 +114,7 @@ def _read_document(value: Any) -> LineDocument | None:
 
 
 def _is_line_name(name: str) -> bool:
-    return marking_like(name) is not None or name.replace("_", " ").strip() in WITHOUT_GEOMETRY
+    return find_marking_like(name) is not None or name.replace("_", " ").strip() in WITHOUT_GEOMETRY
 
 
 def _lines_of_list(items: list[Any]) -> dict[str, Any] | None:

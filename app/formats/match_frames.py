@@ -38,7 +38,7 @@ class MatchFrames:
 
     def _open_archive(self, report: Report) -> None:
         try:
-            archive = self._tree.nested(self._match + ARCHIVE, report)
+            archive = self._tree.open_nested_zip(self._match + ARCHIVE, report)
         except DatasetFormatError as error:
             problem = f"{error.problem} Its match is imported without these frames."
             report.note(error.path, error.record, error.field, problem)

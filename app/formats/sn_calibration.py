@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
-from app.formats.export_names import frame_claims
+from app.formats.export_names import frame_name_claims
 from app.formats.frame_names import UNASSIGNED, frame_path_by_match, view_file_path
 from app.formats.soccernet_v3 import SPLITS
 from app.soccer.annotation import Lines
@@ -95,7 +95,7 @@ def flat_frame_name(place: str, split: str) -> str:
     return f"{digest}_{stem}"
 
 
-def line_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
+def line_name_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     """The names of a view in an export, and whose each would be (``export_names.Claims``).
 
     The place of a frame is a name, too: what is read again has it for a key. A static camera has
@@ -106,7 +106,7 @@ def line_claims(group: Group, view: View, split: str) -> Mapping[str, Hashable]:
     if not view.station.shared:
         return dict.fromkeys((place.encode().hex(), name), (group.key, view.key))
     own = dict.fromkeys((place.encode().hex(), name), view.station.key)
-    return {**own, **frame_claims(group, view, split)}
+    return {**own, **frame_name_claims(group, view, split)}
 
 
 def line_frame_path(group: Group, view: View, split: str, suffix: str) -> str:

@@ -31,7 +31,7 @@ from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.media import Media
-from app.soccer.pitch import WITHOUT_GEOMETRY, marking_like
+from app.soccer.pitch import WITHOUT_GEOMETRY, find_marking_like
 
 _OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
 _OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
@@ -276,7 +276,7 @@ def _parse_point(item: Any) -> tuple[float, float]:
 
 def _read_marking_name(name: str, path: str, report: Report) -> str | None:
     """The marking of that name; None (reported unless the format knows it) for any other."""
-    found = marking_like(name)
+    found = find_marking_like(name)
     if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
         problem = UnknownMarkingError(name).message
         report.note(path, None, name, f"{problem}; kept without geometry")

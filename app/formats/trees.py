@@ -80,7 +80,7 @@ class StoreTree:
         """Where a member of a zip file in the store can be read later."""
         return Media(self.path.of(self._stored_object(name)).sealed(), member)
 
-    def nested(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
         """The members of a zip file in the store, of which no more than its list is fetched."""
         return ZipTree(self.path.of(self._stored_object(name)), report, self._limits)
 

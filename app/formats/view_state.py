@@ -21,7 +21,7 @@ from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import CALIBRATIONS, Group, Station, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
-from app.soccer.reasons import LeftOut, left_out
+from app.soccer.reasons import LeftOut, make_left_out
 
 MAX_TEXT = 1000
 """Longest key or label, characters."""
@@ -200,7 +200,7 @@ class StateReader:
         )
         camera = None if given is None else camera_from_json(given, self.path, self.record)
         try:
-            station = station.with_given(camera, self.covariance())
+            station = station.with_given_camera(camera, self.covariance())
         except InputError as error:
             raise self.error("given_covariance", error.message) from error
         included = self.flag("included", True)
@@ -243,7 +243,7 @@ class StateReader:
             reason, note = value.get("reason"), value.get("note")
             if not isinstance(reason, str) or not isinstance(note, str | None):
                 raise ValueError("needs a reason, and a note that is a text or null")
-            return left_out(reason, note)
+            return make_left_out(reason, note)
         except (ValueError, InputError) as error:
             raise self.error("left_out", str(error)) from error
 

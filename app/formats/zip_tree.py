@@ -42,7 +42,7 @@ class ZipTree:
             self._archive.close()
             raise
 
-    def nested(self, name: str, report: Report) -> ZipTree:
+    def open_nested_zip(self, name: str, report: Report) -> ZipTree:
         """The members of a zip file that is itself a member, read in place.
 
         What the zip files inside hold counts toward the limits of the one around them. A zip

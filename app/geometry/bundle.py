@@ -55,17 +55,17 @@ class Rays:
 
     def only(self, kept: BoolArray) -> Rays:
         """The rays of some points, shape (points,), in the same order."""
-        return self._chosen(kept, kept[self.point])
+        return self._select_rays(kept, kept[self.point])
 
     def of_cameras(self, *cameras: int) -> tuple[Rays, IntArray]:
         """The rays of points that all of some cameras see, from these alone, and the points' rows."""
         seen = np.zeros((self.points, len(self.half_diagonals)), dtype=np.bool_)
         seen[self.point, self.camera] = True
         kept: BoolArray = np.logical_and.reduce([seen[:, camera] for camera in cameras])
-        rays = self._chosen(kept, kept[self.point] & np.isin(self.camera, cameras))
+        rays = self._select_rays(kept, kept[self.point] & np.isin(self.camera, cameras))
         return rays, np.flatnonzero(kept)
 
-    def _chosen(self, kept: BoolArray, rows: BoolArray) -> Rays:
+    def _select_rays(self, kept: BoolArray, rows: BoolArray) -> Rays:
         """Some rays of the points that are kept."""
         place = np.cumsum(kept) - 1
         return Rays(
@@ -150,7 +150,7 @@ def best_points(parameters: FloatArray, rays: Rays, scale: float) -> FloatArray:
     for _ in range(_POINT_STEPS):
         at = linearize(parameters, points, rays)
         weights = soft_weights(at.residuals, scale)
-        information, gradient = _point_system(at, weights, rays)
+        information, gradient = _point_equations(at, weights, rays)
         points = points - np.asarray(np.linalg.solve(information, gradient[..., None]))[..., 0]
     return points
 
@@ -188,7 +188,7 @@ def bundle_equations(
         information[row, :, row] = np.einsum("nia,nib->ab", weighted[mine], at.by_camera[mine])
         shared = at.by_point[mine].transpose(0, 2, 1) @ weighted[mine]
         np.add.at(coupling[:, :, row], rays.point[mine], shared)
-    of_points, _ = _point_system(at, weights, rays)
+    of_points, _ = _point_equations(at, weights, rays)
     size = cameras * PARAMETERS
     mixed = coupling.reshape(rays.points, 3, size)
     carried = np.linalg.solve(of_points, mixed)
@@ -199,7 +199,9 @@ def bundle_equations(
     return cost, gradient.ravel(), (reduced + reduced.T) / 2
 
 
-def _point_system(at: Linearized, weights: FloatArray, rays: Rays) -> tuple[FloatArray, FloatArray]:
+def _point_equations(
+    at: Linearized, weights: FloatArray, rays: Rays
+) -> tuple[FloatArray, FloatArray]:
     """J^T W J and gradient of each point, shapes (F, 3, 3) and (F, 3)."""
     information, gradient = np.zeros((rays.points, 3, 3)), np.zeros((rays.points, 3))
     weighted = weights[:, None, None] * at.by_point

@@ -112,7 +112,7 @@ class Camera:
         return [*map(float, self.distortion)]
 
     @cached_property
-    def _fold(self) -> float:
+    def _fold_radius(self) -> float:
         """``fold_radius`` of the lens."""
         return self.model.fold_radius(self.distortion)
 
@@ -147,27 +147,27 @@ class Camera:
         """
         in_camera = self.pitch_to_camera(points)
         if len(in_camera) == 1:
-            return np.array([self._pixel(in_camera[0].tolist(), folded)])
+            return np.array([self._project_point(in_camera[0].tolist(), folded)])
         depth = in_camera[:, 2]
         visible = depth > MIN_DEPTH
         safe = np.where(visible, depth, 1.0)
         ideal = in_camera[:, :2] / safe[:, None]
         if self.distorts:
             if not folded:
-                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= self._fold
+                visible &= np.hypot(ideal[:, 0], ideal[:, 1]) <= self._fold_radius
             ideal = self.model.distort(np.where(visible[:, None], ideal, 0.0), self.distortion)
         pixels = self._unit_to_pixel(ideal)
         pixels[~visible] = np.nan
         return pixels
 
-    def _pixel(self, in_camera: Sequence[float], folded: bool) -> tuple[float, float]:
+    def _project_point(self, in_camera: Sequence[float], folded: bool) -> tuple[float, float]:
         """``project`` for one point of the camera frame, the same bits in plain numbers."""
         x, y, depth = in_camera
         if not depth > MIN_DEPTH:
             return np.nan, np.nan
         x, y = x / depth, y / depth
         if self.distorts:
-            if not (folded or np.hypot(x, y) <= self._fold):
+            if not (folded or np.hypot(x, y) <= self._fold_radius):
                 return np.nan, np.nan
             x, y = self.model.distort_point(x, y, self._coefficients)
         (ax, ay), (x0, y0) = self.focal_length, self.principal_point

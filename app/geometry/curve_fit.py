@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.geometry.curve_residuals import accumulate, compiled
+from app.geometry.curve_residuals import accumulate_equations, compiled
 from app.geometry.damped_solve import solve_damped
 
 CONVERGED, OUT_OF_STEPS, STUCK = 0, 1, 2
@@ -16,13 +16,13 @@ LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e9
 
 
 @compiled
-def descend(
+def minimize_curve_costs(
     parameters, kinds, shapes, pixels, curve, weight, mean, sigma, scale, half_diagonal,
     steps, tolerance, damping, cost, gradient, information, accepted, rejected, reasons,
 ):  # fmt: skip
     """Move each row of parameters to a minimum; results are written to it and to the last six."""
     count, size = parameters.shape
-    accumulate(
+    accumulate_equations(
         parameters, kinds, shapes, pixels, curve, weight, mean, sigma, scale, half_diagonal,
         cost, gradient, information,
     )  # fmt: skip
@@ -42,7 +42,7 @@ def descend(
         solve_damped(slope[:left], bend[:left], damped[:left], step[:left])
         for i in range(left):
             trial[i] = parameters[moving[i]] + step[i]
-        accumulate(
+        accumulate_equations(
             trial[:left], kinds, shapes, pixels, curve, weight, mean, sigma, scale, half_diagonal,
             found[:left], slope[:left], bend[:left],
         )  # fmt: skip

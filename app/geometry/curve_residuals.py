@@ -23,7 +23,7 @@ ARC_STEPS = 4
 
 
 @compiled
-def accumulate(
+def accumulate_equations(
     parameters, kinds, shapes, pixels, curve, weight, mean, sigma, scale, half_diagonal,
     cost, gradient, information,
 ):  # fmt: skip
@@ -38,8 +38,8 @@ def accumulate(
     arcs, ideal = arc_points(kinds, shapes), np.empty((2, len(pixels)))
     samples, place = np.empty((5, ARC_SAMPLES + 1)), np.empty(6)
     for b in range(len(parameters)):
-        camera = unpack(parameters[b], half_diagonal)
-        rows_of(
+        camera = unpack_camera(parameters[b], half_diagonal)
+        residual_rows_of_camera(
             camera, kinds, shapes, arcs, pixels, curve, ideal, samples, place, offsets, jacobians
         )
         total = 0.0
@@ -79,15 +79,17 @@ def residual_rows(parameters, kinds, shapes, pixels, curve, half_diagonal, offse
     The first residual of a point is normal to the curve, the second along it (zero but beyond
     an end). Shapes (N, 2) and (N, 2, 8).
     """
-    rows_of(
-        unpack(parameters, half_diagonal), kinds, shapes, arc_points(kinds, shapes), pixels, curve,
+    residual_rows_of_camera(
+        unpack_camera(parameters, half_diagonal), kinds, shapes, arc_points(kinds, shapes), pixels, curve,
         np.empty((2, len(pixels))), np.empty((5, ARC_SAMPLES + 1)), np.empty(6),
         offsets, jacobians,
     )  # fmt: skip
 
 
 @compiled
-def rows_of(camera, kinds, shapes, arcs, pixels, curve, ideal, samples, place, offsets, jacobians):
+def residual_rows_of_camera(
+    camera, kinds, shapes, arcs, pixels, curve, ideal, samples, place, offsets, jacobians
+):
     """``residual_rows`` of a camera: pixels (N, 2) with their curve (N,).
 
     ``arcs`` are ``arc_points``. Room: ideal (2, N), samples (5, ARC_SAMPLES + 1), place (6,).
@@ -113,8 +115,8 @@ def rows_of(camera, kinds, shapes, arcs, pixels, curve, ideal, samples, place, o
                 inside = nearest_on_segment(shapes, m, ends, ideal[0, n], ideal[1, n], place)
             else:
                 inside = nearest_on_arc(camera, shapes, m, samples, shares, x, y, place)
-        if visible and depth(camera, place) > 0.5 * NEAR:
-            residual_at(camera, place, inside, x, y, offsets, jacobians, n)
+        if visible and curve_depth(camera, place) > 0.5 * NEAR:
+            write_residual_row(camera, place, inside, x, y, offsets, jacobians, n)
         else:
             offsets[n, 0], offsets[n, 1] = BEHIND_PX, 0.0
             for k in range(8):
@@ -136,7 +138,7 @@ def arc_points(kinds, shapes):
 
 
 @compiled
-def unpack(parameters, half_diagonal):
+def unpack_camera(parameters, half_diagonal):
     """Rotation row by row, position, focal length, kappa / half_diagonal^2 and its unit."""
     sp, cp = np.sin(parameters[0]), np.cos(parameters[0])
     st, ct = np.sin(parameters[1]), np.cos(parameters[1])
@@ -155,40 +157,40 @@ def unpack(parameters, half_diagonal):
 
 
 @compiled
-def radial_growth(u):
+def radial_growth_factor(u):
     """Radius as seen over ideal radius, for u = kappa (radius / half_diagonal)^2."""
     return 1 + u + 0.5 * u * u
 
 
 @compiled
-def bent(kappa, px, py):
+def distortion_and_derivative(kappa, px, py):
     """Growth of the radius, and the derivative of the seen by the ideal pixel (xx, xy, yy).
 
     (px, py) is the ideal pixel less the principal point.
     """
     rho2 = px * px + py * py
-    growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
+    growth, bend = radial_growth_factor(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
     return growth, growth + bend * px * px, bend * px * py, growth + bend * py * py
 
 
 @compiled
-def bent_step(kappa, px, py, ix, iy):
+def distort_step(kappa, px, py, ix, iy):
     """Growth of the radius, and a small step (ix, iy) of the ideal pixel as it is seen."""
     rho2 = px * px + py * py
-    growth, bend = radial_growth(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
+    growth, bend = radial_growth_factor(kappa * rho2), 2 * kappa * (1 + kappa * rho2)
     inward = bend * (px * ix + py * iy)
     return growth, ix * growth + px * inward, iy * growth + py * inward
 
 
 @compiled
-def to_camera(camera, x, y, z):
+def pitch_to_camera(camera, x, y, z):
     """Point of the pitch frame in the camera frame, metres."""
     dx, dy, dz = x - camera[9], y - camera[10], z - camera[11]
-    return turn(camera, dx, dy, dz)
+    return rotate_to_camera(camera, dx, dy, dz)
 
 
 @compiled
-def turn(camera, dx, dy, dz):
+def rotate_to_camera(camera, dx, dy, dz):
     """Direction of the pitch frame in the camera frame."""
     return (
         camera[0] * dx + camera[1] * dy + camera[2] * dz,
@@ -198,9 +200,9 @@ def turn(camera, dx, dy, dz):
 
 
 @compiled
-def depth(camera, place):
+def curve_depth(camera, place):
     """Depth of a place on a curve, metres."""
-    return to_camera(camera, place[0], place[1], place[2])[2]
+    return pitch_to_camera(camera, place[0], place[1], place[2])[2]
 
 
 @compiled
@@ -242,8 +244,8 @@ def project_segment(camera, shapes, m):
     """Whether any of a segment is in front of the camera, and its part that is: where it begins
     and ends (0 to 1 along the segment), both ends' ideal pixels, and their depths."""
     x0, y0, z0 = shapes[m, 0], shapes[m, 1], shapes[m, 2]
-    first = to_camera(camera, x0, y0, z0)[2]
-    last = to_camera(camera, shapes[m, 3], shapes[m, 4], shapes[m, 5])[2]
+    first = pitch_to_camera(camera, x0, y0, z0)[2]
+    last = pitch_to_camera(camera, shapes[m, 3], shapes[m, 4], shapes[m, 5])[2]
     begin, end = 0.0, 1.0
     if first < NEAR and last < NEAR:
         return False, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, first, last)
@@ -252,8 +254,8 @@ def project_segment(camera, shapes, m):
     elif last < NEAR:
         end = (NEAR - first) / (last - first)
     dx, dy, dz = shapes[m, 3] - x0, shapes[m, 4] - y0, shapes[m, 5] - z0
-    ax, ay, az = to_camera(camera, x0 + begin * dx, y0 + begin * dy, z0 + begin * dz)
-    bx, by, bz = to_camera(camera, x0 + end * dx, y0 + end * dy, z0 + end * dz)
+    ax, ay, az = pitch_to_camera(camera, x0 + begin * dx, y0 + begin * dy, z0 + begin * dz)
+    bx, by, bz = pitch_to_camera(camera, x0 + end * dx, y0 + end * dy, z0 + end * dz)
     focal = camera[12]
     ax, ay, bx, by = focal * ax / az, focal * ay / az, focal * bx / bz, focal * by / bz
     return True, (begin, end, ax, ay, bx, by, az, bz)
@@ -296,12 +298,12 @@ def sample_arc(camera, arcs, m, samples):
     focal, kappa = camera[12], camera[13]
     seen = False
     for i in range(ARC_SAMPLES + 1):
-        x, y, z = to_camera(camera, arcs[m, i, 0], arcs[m, i, 1], 0.0)
+        x, y, z = pitch_to_camera(camera, arcs[m, i, 0], arcs[m, i, 1], 0.0)
         if z < NEAR:
             samples[0, i] = np.nan
             continue
         px, py = focal * x / z, focal * y / z
-        growth = radial_growth(kappa * (px * px + py * py))
+        growth = radial_growth_factor(kappa * (px * px + py * py))
         samples[0, i], samples[1, i] = px * growth, py * growth
         seen = True
     for i in range(ARC_SAMPLES):
@@ -337,13 +339,13 @@ def nearest_on_arc(camera, shapes, m, samples, shares, pixel_x, pixel_y, place):
     focal, kappa = camera[12], camera[13]
     for _ in range(ARC_STEPS):
         sine, cosine = np.sin(angle), np.cos(angle)
-        x, y, z = to_camera(camera, x0 + radius * cosine, y0 + radius * sine, 0.0)
+        x, y, z = pitch_to_camera(camera, x0 + radius * cosine, y0 + radius * sine, 0.0)
         if z < NEAR:
             break
-        vx, vy, vz = turn(camera, -radius * sine, radius * cosine, 0.0)
+        vx, vy, vz = rotate_to_camera(camera, -radius * sine, radius * cosine, 0.0)
         px, py = focal * x / z, focal * y / z
         gx, gy = focal * (vx - x / z * vz) / z, focal * (vy - y / z * vz) / z
-        growth, gx, gy = bent_step(kappa, px, py, gx, gy)
+        growth, gx, gy = distort_step(kappa, px, py, gx, gy)
         ex, ey = pixel_x - px * growth, pixel_y - py * growth
         move = (gx * ex + gy * ey) / max(gx * gx + gy * gy, 1e-12)
         angle += min(max(move, -step), step)
@@ -357,26 +359,26 @@ def nearest_on_arc(camera, shapes, m, samples, shares, pixel_x, pixel_y, place):
 
 
 @compiled
-def residual(camera, place, inside, pixel, offset, jacobian):
+def write_residual(camera, place, inside, pixel, offset, jacobian):
     """Writes the offset of one image point from one place of space, and its derivatives."""
-    residual_at(
+    write_residual_row(
         camera, place, inside, pixel[0], pixel[1],
         offset.reshape((1, 2)), jacobian.reshape((1, 2, 8)), 0,
     )  # fmt: skip
 
 
 @compiled
-def residual_at(camera, place, inside, pixel_x, pixel_y, offsets, jacobians, n):
-    """``residual`` into row ``n`` of many."""
+def write_residual_row(camera, place, inside, pixel_x, pixel_y, offsets, jacobians, n):
+    """``write_residual`` into row ``n`` of many."""
     dx, dy, dz = place[0] - camera[9], place[1] - camera[10], place[2] - camera[11]
-    ux, uy, uz = turn(camera, dx, dy, dz)
+    ux, uy, uz = rotate_to_camera(camera, dx, dy, dz)
     focal, kappa = camera[12], camera[13]
     nx, ny = ux / uz, uy / uz
     px, py = focal * nx, focal * ny
-    growth, dxx, dxy, dyy = bent(kappa, px, py)
+    growth, dxx, dxy, dyy = distortion_and_derivative(kappa, px, py)
     ex, ey = pixel_x - px * growth, pixel_y - py * growth
     # Unit tangent of the projected curve: it splits the offset into normal and along.
-    vx, vy, vz = turn(camera, place[3], place[4], place[5])
+    vx, vy, vz = rotate_to_camera(camera, place[3], place[4], place[5])
     ix, iy = focal * (vx - nx * vz) / uz, focal * (vy - ny * vz) / uz
     gx, gy = dxx * ix + dxy * iy, dxy * ix + dyy * iy
     length = np.sqrt(gx * gx + gy * gy)
@@ -386,7 +388,7 @@ def residual_at(camera, place, inside, pixel_x, pixel_y, offsets, jacobians, n):
         gx, gy = 1.0, 0.0
     offsets[n, 0] = gx * ey - gy * ex
     offsets[n, 1] = 0.0 if inside else gx * ex + gy * ey
-    derivatives_at(camera, dx, dy, dz, jacobians, n)
+    write_derivative_row(camera, dx, dy, dz, jacobians, n)
     for k in range(8):
         jx, jy = jacobians[n, 0, k], jacobians[n, 1, k]
         jacobians[n, 0, k] = gy * jx - gx * jy
@@ -399,23 +401,23 @@ def projection_derivatives(camera, dx, dy, dz, derivatives):
 
     (dx, dy, dz) is the point less the camera's position, pitch frame.
     """
-    derivatives_at(camera, dx, dy, dz, derivatives.reshape((1, 2, 8)), 0)
+    write_derivative_row(camera, dx, dy, dz, derivatives.reshape((1, 2, 8)), 0)
 
 
 @compiled
-def derivatives_at(camera, dx, dy, dz, derivatives, n):
+def write_derivative_row(camera, dx, dy, dz, derivatives, n):
     """``projection_derivatives`` into row ``n`` of many."""
-    ux, uy, uz = turn(camera, dx, dy, dz)
+    ux, uy, uz = rotate_to_camera(camera, dx, dy, dz)
     focal, kappa, unit = camera[12], camera[13], camera[14]
     nx, ny = ux / uz, uy / uz
     px, py = focal * nx, focal * ny
-    _, dxx, dxy, dyy = bent(kappa, px, py)
+    _, dxx, dxy, dyy = distortion_and_derivative(kappa, px, py)
     sp, cp, st, ct, sr, cr = camera[15], camera[16], camera[17], camera[18], camera[19], camera[20]
     along, across = cp * dx + sp * dy, -sp * dx + cp * dy
     lifted = -st * across + ct * dz
     lowered = ct * across + st * dz
     # d Rz(-pan) X / d pan = (across, -along, 0), then tilted and rolled.
-    _moved(
+    _pixel_derivative_of_motion(
         derivatives,
         n,
         0,
@@ -430,10 +432,12 @@ def derivatives_at(camera, dx, dy, dz, derivatives, n):
         dxy,
         dyy,
     )
-    _moved(derivatives, n, 1, sr * lifted, cr * lifted, -lowered, focal, nx, ny, uz, dxx, dxy, dyy)
-    _moved(derivatives, n, 2, uy, -ux, 0.0, focal, nx, ny, uz, dxx, dxy, dyy)
+    _pixel_derivative_of_motion(
+        derivatives, n, 1, sr * lifted, cr * lifted, -lowered, focal, nx, ny, uz, dxx, dxy, dyy
+    )
+    _pixel_derivative_of_motion(derivatives, n, 2, uy, -ux, 0.0, focal, nx, ny, uz, dxx, dxy, dyy)
     for k in range(3, 6):
-        _moved(
+        _pixel_derivative_of_motion(
             derivatives,
             n,
             k,
@@ -455,16 +459,16 @@ def derivatives_at(camera, dx, dy, dz, derivatives, n):
 
 
 @compiled
-def _moved(derivatives, n, k, a, b, c, focal, nx, ny, uz, dxx, dxy, dyy):
+def _pixel_derivative_of_motion(derivatives, n, k, a, b, c, focal, nx, ny, uz, dxx, dxy, dyy):
     """Writes what the pixel does when the point moves by (a, b, c) in the camera frame."""
     qx, qy = focal * (a - nx * c) / uz, focal * (b - ny * c) / uz
     derivatives[n, 0, k], derivatives[n, 1, k] = dxx * qx + dxy * qy, dxy * qx + dyy * qy
 
 
 @compiled
-def point_rows(parameters, points, half_diagonals, derivatives):
+def derivative_rows_of_points(parameters, points, half_diagonals, derivatives):
     """Writes ``projection_derivatives`` of a point in each of many cameras, shape (N, 2, 8)."""
     for n in range(len(parameters)):
-        camera = unpack(parameters[n], half_diagonals[n])
+        camera = unpack_camera(parameters[n], half_diagonals[n])
         dx, dy, dz = points[n] - parameters[n, 3:6]
         projection_derivatives(camera, dx, dy, dz, derivatives[n])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.geometry.arrays import FloatArray, require_shape
-from app.geometry.lens_kernels import distorted, slopes, undistort_all
+from app.geometry.lens_kernels import distorted, distortion_derivatives, undistort_all
 
 COEFFICIENTS = 12
 
@@ -50,11 +50,11 @@ def distort_jacobian(points: FloatArray, coefficients: FloatArray) -> FloatArray
     if len(points) == 1 and coefficients.ndim == 1:
         x, y = points[0].tolist()
         try:
-            return np.array(slopes(x, y, coefficients.tolist())).reshape(1, 2, 2)
+            return np.array(distortion_derivatives(x, y, coefficients.tolist())).reshape(1, 2, 2)
         except ZeroDivisionError:
             pass
     jacobian = np.empty((len(points), 2, 2))
-    found = slopes(points[:, 0], points[:, 1], coefficients)
+    found = distortion_derivatives(points[:, 0], points[:, 1], coefficients)
     for place, slope in enumerate(found):
         jacobian[:, place // 2, place % 2] = slope
     return jacobian
@@ -80,16 +80,16 @@ def fold_radius(coefficients: FloatArray) -> float:
     Beyond it far points fold back into the picture, so they count as not visible.
     Tangential and prism terms are small and left out.
     """
-    return _fold_radius(*coefficients[:8].tolist())
+    return _fold_radius_of_terms(*coefficients[:8].tolist())
 
 
 # A group is solved again on every edit, with the same few lenses.
 @lru_cache(maxsize=1024)
-def _fold_radius(
+def _fold_radius_of_terms(
     k1: float, k2: float, _p1: float, _p2: float, k3: float, k4: float, k5: float, k6: float
 ) -> float:
     if k3 == k4 == k5 == k6 == 0.0:
-        return _fold_of_two_terms(k1, k2)
+        return _fold_radius_of_two_terms(k1, k2)
     # d/dr of r N(r^2) / D(r^2) is zero where N D + 2 s (N' D - N D') is, with s = r^2.
     numerator = np.polynomial.Polynomial([1.0, k1, k2, k3])
     denominator = np.polynomial.Polynomial([1.0, k4, k5, k6])
@@ -97,12 +97,12 @@ def _fold_radius(
     slope = numerator * denominator + 2 * s * (
         numerator.deriv() * denominator - numerator * denominator.deriv()
     )
-    roots = np.concatenate([_roots(slope), _roots(denominator)])
+    roots = np.concatenate([_polynomial_roots(slope), _polynomial_roots(denominator)])
     real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
     return float(np.sqrt(real.min())) if len(real) else np.inf
 
 
-def _fold_of_two_terms(k1: float, k2: float) -> float:
+def _fold_radius_of_two_terms(k1: float, k2: float) -> float:
     """Where 1 + 3 k1 s + 5 k2 s^2 is zero first, s = r^2: that is what a resected camera has."""
     half = 1.5 * k1
     under = half * half - 5 * k2
@@ -114,7 +114,7 @@ def _fold_of_two_terms(k1: float, k2: float) -> float:
     return math.sqrt(1 / inverse) if inverse > 0 else math.inf
 
 
-def _roots(polynomial: np.polynomial.Polynomial) -> np.ndarray[Any, Any]:
+def _polynomial_roots(polynomial: np.polynomial.Polynomial) -> np.ndarray[Any, Any]:
     """Roots; a highest term that is too small to divide by counts as none."""
     terms = polynomial.coef
     with np.errstate(all="ignore"):

@@ -38,7 +38,7 @@ _STEPS = 60
 
 
 @dataclass(frozen=True)
-class Profile:
+class RadiusProfile:
     """Image radius by angle, increasing from 0 at the axis to the edge of the picture.
 
     Attributes:
@@ -59,11 +59,17 @@ class Profile:
 
     def radius(self, angle: FloatArray) -> FloatArray:
         """Image radius of angles, shape (N,)."""
-        return np.where(angle < self.inner, self.slope * angle, _value(self.terms, angle))
+        return np.where(
+            angle < self.inner, self.slope * angle, _polynomial_value(self.terms, angle)
+        )
 
     def growth(self, angle: FloatArray) -> FloatArray:
         """Derivative of the radius by the angle, shape (N,)."""
-        return np.where(angle < self.inner, self.slope, _value(_derivative(self.terms), angle))
+        return np.where(
+            angle < self.inner,
+            self.slope,
+            _polynomial_value(_polynomial_derivative(self.terms), angle),
+        )
 
     def angle(self, radius: FloatArray) -> FloatArray:
         """The angle of each image radius, NaN beyond the edge, shape (N,).
@@ -90,28 +96,28 @@ class Profile:
         return found
 
 
-def kannala_brandt(coefficients: Sequence[float]) -> Profile:
+def kannala_brandt(coefficients: Sequence[float]) -> RadiusProfile:
     """Profile of k1 k2 k3 k4.
 
     Raises:
         DegenerateGeometryError: The picture folds next to the axis.
     """
     k1, k2, k3, k4 = coefficients
-    return _profile((0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4))
+    return _profile_of_terms((0.0, 1.0, 0.0, k1, 0.0, k2, 0.0, k3, 0.0, k4))
 
 
-def arctan_polynomial(coefficients: Sequence[float]) -> Profile:
+def arctan_polynomial(coefficients: Sequence[float]) -> RadiusProfile:
     """Profile of a0 .. a8.
 
     Raises:
         DegenerateGeometryError: The radius does not grow from (nearly) zero at the axis.
     """
-    return _profile(tuple(coefficients))
+    return _profile_of_terms(tuple(coefficients))
 
 
 # A group is solved again on every edit, with the same few lenses.
 @lru_cache(maxsize=1024)
-def _profile(terms: tuple[float, ...]) -> Profile:
+def _profile_of_terms(terms: tuple[float, ...]) -> RadiusProfile:
     constant, linear = terms[0], terms[1]
     if not (linear > 0 and abs(constant) <= MAX_CONSTANT * linear):
         raise DegenerateGeometryError(
@@ -119,51 +125,51 @@ def _profile(terms: tuple[float, ...]) -> Profile:
             hint="Give the constant term first, and the radius in units of the focal length.",
         )
     inner = _INNER * abs(constant) / linear
-    widest = _widest(terms, inner)
+    widest = _widest_angle(terms, inner)
     if widest < NARROWEST:
         raise DegenerateGeometryError(
             "the picture of the lens folds next to the axis",
             hint="Check the order and the signs of its coefficients.",
         )
-    slope = float(_value(terms, np.float64(inner))) / inner if inner > 0 else linear
-    edge = float(_value(terms, np.float64(widest)))
-    return Profile(terms, inner, slope, widest, edge)
+    slope = float(_polynomial_value(terms, np.float64(inner))) / inner if inner > 0 else linear
+    edge = float(_polynomial_value(terms, np.float64(widest)))
+    return RadiusProfile(terms, inner, slope, widest, edge)
 
 
-def _widest(terms: tuple[float, ...], inner: float) -> float:
+def _widest_angle(terms: tuple[float, ...], inner: float) -> float:
     """Where the radius stops growing, found in small steps and halved; at most ``WIDEST``."""
-    growth = _derivative(terms)
+    growth = _polynomial_derivative(terms)
     angles = np.append(np.arange(inner, WIDEST, _GRID), WIDEST)
-    stopped = np.flatnonzero(~(_value(growth, angles) > 0))
+    stopped = np.flatnonzero(~(_polynomial_value(growth, angles) > 0))
     if len(stopped) == 0:
         return WIDEST
     low, high = float(angles[max(stopped[0] - 1, 0)]), float(angles[stopped[0]])
     for _ in range(_STEPS):
         middle = (low + high) / 2
-        if _value(growth, np.float64(middle)) > 0:
+        if _polynomial_value(growth, np.float64(middle)) > 0:
             low = middle
         else:
             high = middle
     return low
 
 
-def distort(points: FloatArray, profile: Profile) -> FloatArray:
+def distort(points: FloatArray, profile: RadiusProfile) -> FloatArray:
     """Distorted normalised coordinates of ideal ones, NaN beyond the edge, both shape (N, 2)."""
     points = require_shape(points, (None, 2), "points")
-    ideal, angle = _polar(points)
-    distorted: FloatArray = points * _ratio(profile, ideal, angle)[:, None]
+    ideal, angle = _radius_and_angle(points)
+    distorted: FloatArray = points * _radius_ratio(profile, ideal, angle)[:, None]
     distorted[~(angle <= profile.widest)] = np.nan
     return distorted
 
 
-def distort_jacobian(points: FloatArray, profile: Profile) -> FloatArray:
+def distort_jacobian(points: FloatArray, profile: RadiusProfile) -> FloatArray:
     """Derivative of ``distort`` by the ideal coordinates, NaN beyond the edge, shape (N, 2, 2).
 
     Along the radius the angle grows by ``1 / (1 + R^2)``; across it the picture is only scaled.
     """
     points = require_shape(points, (None, 2), "points")
-    ideal, angle = _polar(points)
-    across = _ratio(profile, ideal, angle)
+    ideal, angle = _radius_and_angle(points)
+    across = _radius_ratio(profile, ideal, angle)
     along = profile.growth(angle) / (1 + ideal * ideal)
     outwards = points / np.where(ideal > 0, ideal, 1.0)[:, None]
     radial = outwards[:, :, None] * outwards[:, None, :]
@@ -174,7 +180,7 @@ def distort_jacobian(points: FloatArray, profile: Profile) -> FloatArray:
     return jacobian
 
 
-def undistort(points: FloatArray, profile: Profile) -> FloatArray:
+def undistort(points: FloatArray, profile: RadiusProfile) -> FloatArray:
     """Ideal normalised coordinates of distorted ones, both shape (N, 2).
 
     NaN beyond the edge: there the lens folds, or looks sideways and back, and no ray in front of
@@ -188,13 +194,13 @@ def undistort(points: FloatArray, profile: Profile) -> FloatArray:
     return ideal
 
 
-def _polar(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _radius_and_angle(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Ideal radius and angle off the axis, shapes (N,)."""
     ideal = np.hypot(points[:, 0], points[:, 1])
     return ideal, np.arctan(ideal)
 
 
-def _ratio(profile: Profile, ideal: FloatArray, angle: FloatArray) -> FloatArray:
+def _radius_ratio(profile: RadiusProfile, ideal: FloatArray, angle: FloatArray) -> FloatArray:
     """Image radius over ideal radius, at the axis its limit, shape (N,)."""
     near = ideal == 0
     ratio: FloatArray = np.where(
@@ -203,7 +209,7 @@ def _ratio(profile: Profile, ideal: FloatArray, angle: FloatArray) -> FloatArray
     return ratio
 
 
-def _value(terms: Sequence[float], at: Any) -> Any:
+def _polynomial_value(terms: Sequence[float], at: Any) -> Any:
     """Horner's scheme, of a number or of an array."""
     total = at * 0.0
     for term in reversed(terms):
@@ -212,8 +218,8 @@ def _value(terms: Sequence[float], at: Any) -> Any:
 
 
 @lru_cache(maxsize=1024)
-def _derivative(terms: tuple[float, ...]) -> tuple[float, ...]:
+def _polynomial_derivative(terms: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(power * term for power, term in enumerate(terms))[1:]
 
 
-ProfileOf = Callable[[Sequence[float]], Profile]
+ProfileOf = Callable[[Sequence[float]], RadiusProfile]

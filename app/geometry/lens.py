@@ -43,44 +43,50 @@ class LensModel:
     profile: fisheye.ProfileOf | None = None
 
 
-def _by_angle(count: int, profile: fisheye.ProfileOf) -> LensModel:
+def _fisheye_model(count: int, profile: fisheye.ProfileOf) -> LensModel:
     """A lens of ``geometry.fisheye``."""
     return LensModel(
         count=count,
-        distort=partial(_distort, profile),
-        distort_point=partial(_distort_point, profile),
-        jacobian=partial(_jacobian, profile),
-        undistort=partial(_undistort, profile),
-        fold_radius=partial(_fold_radius, profile),
+        distort=partial(_distort_by_profile, profile),
+        distort_point=partial(_distort_point_by_profile, profile),
+        jacobian=partial(_distort_jacobian_by_profile, profile),
+        undistort=partial(_undistort_by_profile, profile),
+        fold_radius=partial(_fold_radius_of_profile, profile),
         check=profile,
         profile=profile,
     )
 
 
-def _distort(profile: fisheye.ProfileOf, points: FloatArray, numbers: FloatArray) -> FloatArray:
+def _distort_by_profile(
+    profile: fisheye.ProfileOf, points: FloatArray, numbers: FloatArray
+) -> FloatArray:
     return fisheye.distort(points, profile(numbers.tolist()))
 
 
-def _distort_point(
+def _distort_point_by_profile(
     profile: fisheye.ProfileOf, x: float, y: float, numbers: Sequence[float]
 ) -> tuple[float, float]:
     u, v = fisheye.distort(np.array([[x, y]]), profile(numbers))[0].tolist()
     return u, v
 
 
-def _jacobian(profile: fisheye.ProfileOf, points: FloatArray, numbers: FloatArray) -> FloatArray:
+def _distort_jacobian_by_profile(
+    profile: fisheye.ProfileOf, points: FloatArray, numbers: FloatArray
+) -> FloatArray:
     return fisheye.distort_jacobian(points, profile(numbers.tolist()))
 
 
-def _undistort(profile: fisheye.ProfileOf, points: FloatArray, numbers: FloatArray) -> FloatArray:
+def _undistort_by_profile(
+    profile: fisheye.ProfileOf, points: FloatArray, numbers: FloatArray
+) -> FloatArray:
     return fisheye.undistort(points, profile(numbers.tolist()))
 
 
-def _fold_radius(profile: fisheye.ProfileOf, numbers: FloatArray) -> float:
+def _fold_radius_of_profile(profile: fisheye.ProfileOf, numbers: FloatArray) -> float:
     return float(np.tan(profile(numbers.tolist()).widest))
 
 
-def _any(_numbers: Sequence[float]) -> None:
+def _accept_any_coefficients(_numbers: Sequence[float]) -> None:
     """Every set of coefficients is a lens of OpenCV's."""
 
 
@@ -92,8 +98,8 @@ LENSES: dict[str, LensModel] = {
         jacobian=distortion.distort_jacobian,
         undistort=distortion.undistort,
         fold_radius=distortion.fold_radius,
-        check=_any,
+        check=_accept_any_coefficients,
     ),
-    FISHEYE: _by_angle(fisheye.KANNALA_BRANDT, fisheye.kannala_brandt),
-    ARCTAN_POLYNOMIAL: _by_angle(fisheye.ARCTAN_POLYNOMIAL, fisheye.arctan_polynomial),
+    FISHEYE: _fisheye_model(fisheye.KANNALA_BRANDT, fisheye.kannala_brandt),
+    ARCTAN_POLYNOMIAL: _fisheye_model(fisheye.ARCTAN_POLYNOMIAL, fisheye.arctan_polynomial),
 }

@@ -31,7 +31,9 @@ def distorted(x: Any, y: Any, coefficients: Iterable[float]) -> tuple[Any, Any]:
     )
 
 
-def slopes(x: Any, y: Any, coefficients: Iterable[float]) -> tuple[Any, Any, Any, Any]:
+def distortion_derivatives(
+    x: Any, y: Any, coefficients: Iterable[float]
+) -> tuple[Any, Any, Any, Any]:
     """``distort_jacobian``, of u by x and y, then of v; of numbers or of arrays, as ``distorted``."""
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = coefficients
     r2 = x * x + y * y
@@ -52,14 +54,14 @@ def slopes(x: Any, y: Any, coefficients: Iterable[float]) -> tuple[Any, Any, Any
 
 
 distorted_fast = compiled(distorted)
-slopes_fast = compiled(slopes)
+slopes_fast = compiled(distortion_derivatives)
 
 
 # Types are checked by hand from here on: numba compiles these functions from their arguments.
 
 
 @compiled
-def lens_of(numbers):
+def lens_coefficients(numbers):
     """The twelve coefficients at the beginning of an array, as the functions above take them."""
     k1, k2, p1, p2, k3, k4 = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]
     k5, k6, s1, s2, s3, s4 = (
@@ -76,7 +78,7 @@ def lens_of(numbers):
 @compiled
 def undistort_all(points, coefficients, fold, ideal):
     """Writes what is distorted to each point, by Newton's method; NaN where nothing within the fold is."""
-    lens = lens_of(coefficients)
+    lens = lens_coefficients(coefficients)
     for row in range(len(points)):
         x, y = points[row, 0], points[row, 1]
         for _ in range(_STEPS):

@@ -15,7 +15,7 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import MIN_DEPTH, Camera
 from app.geometry.lens import BROWN_CONRADY
-from app.geometry.lens_kernels import compiled, distorted_fast, lens_of, slopes_fast
+from app.geometry.lens_kernels import compiled, distorted_fast, lens_coefficients, slopes_fast
 
 STEPS = 8
 ARRIVED_M = 1e-6
@@ -65,7 +65,7 @@ class CameraTable:
             rotation=np.array([camera.rotation for camera in cameras]),
             position=np.array([camera.position for camera in cameras]),
             K=np.array([camera.K for camera in cameras]),
-            kind=np.array([_kind(camera) for camera in cameras]),
+            kind=np.array([_lens_kind(camera) for camera in cameras]),
             fold=np.array([camera.model.fold_radius(camera.distortion) for camera in cameras]),
             lens=lens,
         )
@@ -113,7 +113,7 @@ def likely_points(
         np.empty((count, 3, 3)),
         np.empty((count, views)),
     )
-    _settle_all(
+    _refine_points(
         *cameras.columns,
         *(pixels, chosen, noise),
         *(made.points, made.covariances, made.distances, made.found),
@@ -121,7 +121,7 @@ def likely_points(
     return made
 
 
-def _kind(camera: Camera) -> int:
+def _lens_kind(camera: Camera) -> int:
     return _WIDE if camera.is_wide else _BENT if camera.distorts else _STRAIGHT
 
 
@@ -138,7 +138,9 @@ def _lens_numbers(camera: Camera) -> list[float]:
 
 
 @compiled
-def _settle_all(R, C, K, kind, fold, lens, pixels, chosen, noise, points, spans, distances, found):
+def _refine_points(
+    R, C, K, kind, fold, lens, pixels, chosen, noise, points, spans, distances, found
+):
     views = chosen.shape[1]
     information, pull, step = np.empty((3, 3)), np.empty(3), np.empty(3)
     pixel, slope, offset, weighed = np.empty(2), np.empty((2, 3)), np.empty(2), np.empty((2, 3))
@@ -154,7 +156,7 @@ def _settle_all(R, C, K, kind, fold, lens, pixels, chosen, noise, points, spans,
                     break
                 offset[0] = pixels[view, 0] - pixel[0]
                 offset[1] = pixels[view, 1] - pixel[1]
-                distances[row, place] = _add_view(
+                distances[row, place] = _add_view_equations(
                     noise[row, place], offset, slope, weighed, information, pull
                 )
             sound = sound and invert_symmetric(information, spans[row])
@@ -174,7 +176,7 @@ def _settle_all(R, C, K, kind, fold, lens, pixels, chosen, noise, points, spans,
 
 
 @compiled
-def _add_view(noise, offset, slope, weighed, information, pull):
+def _add_view_equations(noise, offset, slope, weighed, information, pull):
     """Adds what a view knows to information and pull; its squared distance."""
     a, b, c, d = noise[0, 0], noise[0, 1], noise[1, 0], noise[1, 1]
     determinant = a * d - b * c
@@ -239,11 +241,11 @@ def _project(R, C, K, kind, fold, lens, view, point, pixel, slope):
         if not math.hypot(x, y) <= fold[view]:
             return False
         if kind[view] == _BENT:
-            numbers = lens_of(lens[view])
+            numbers = lens_coefficients(lens[view])
             u, v = distorted_fast(x, y, numbers)
             ux, uy, vx, vy = slopes_fast(x, y, numbers)
         else:
-            u, v, ux, uy, vx, vy = _widely(x, y, lens[view])
+            u, v, ux, uy, vx, vy = _fisheye_distort(x, y, lens[view])
     pixel[0] = K[view, 0, 0] * u + K[view, 0, 1] * v + K[view, 0, 2]
     pixel[1] = K[view, 1, 1] * v + K[view, 1, 2]
     for j in range(3):
@@ -256,7 +258,7 @@ def _project(R, C, K, kind, fold, lens, view, point, pixel, slope):
 
 
 @compiled
-def _widely(x, y, lens):
+def _fisheye_distort(x, y, lens):
     """``fisheye.distort`` of a point and its derivative, of u by x and y, then of v."""
     ideal = math.hypot(x, y)
     angle = math.atan(ideal)

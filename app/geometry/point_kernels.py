@@ -8,7 +8,7 @@ from app.geometry.curve_residuals import compiled
 
 
 @compiled
-def keep_farthest(pixels, curve, limits, keep):
+def keep_farthest_points(pixels, curve, limits, keep):
     """Writes which points are kept: of a curve the one farthest from the middle of its points, and
     after it each that is farthest from those before it.
 
@@ -28,16 +28,16 @@ def keep_farthest(pixels, curve, limits, keep):
         keep[begin:end] = end - begin <= left
         if end - begin > left:
             x, y = pixels[begin:end, 0].mean(), pixels[begin:end, 1].mean()
-            farthest = _move(pixels, apart, begin, end, x, y, True)
+            farthest = _update_distances(pixels, apart, begin, end, x, y, True)
             for nth in range(left):
                 keep[farthest] = True
                 x, y = pixels[farthest]
-                farthest = _move(pixels, apart, begin, end, x, y, nth == 0)
+                farthest = _update_distances(pixels, apart, begin, end, x, y, nth == 0)
         begin = end
 
 
 @compiled
-def _move(pixels, apart, begin, end, x, y, anew):
+def _update_distances(pixels, apart, begin, end, x, y, anew):
     """Lowers each point's squared distance to the nearest chosen one (``anew``: to this one alone);
     returns the point whose distance is largest."""
     farthest, most = begin, -1.0

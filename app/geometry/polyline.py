@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray, require_shape
-from app.geometry.polyline_kernels import clipped, nearest_places
+from app.geometry.polyline_kernels import clip_polyline_into, nearest_places
 
 
 def inside_image(points: FloatArray, width: int, height: int) -> npt.NDArray[np.bool_]:
@@ -36,7 +36,7 @@ def clip_polyline(points: FloatArray, width: int, height: int) -> FloatArray:
     """
     points = require_shape(points, (None, 2), "points")
     room = np.empty((2 * len(points), 2))
-    return room[: clipped(np.ascontiguousarray(points), width, height, room)].copy()
+    return room[: clip_polyline_into(np.ascontiguousarray(points), width, height, room)].copy()
 
 
 def distance_to_polyline(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, FloatArray]:

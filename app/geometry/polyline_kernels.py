@@ -26,7 +26,7 @@ def nearest_places(points, polyline, apart, nearest):
 
 
 @compiled
-def clipped(points, width, height, room):
+def clip_polyline_into(points, width, height, room):
     """How many points of the clipped polyline were written to ``room``, shape (2 N, 2).
 
     ``points`` of shape (N, 2), pixels; those that are NaN are left out, and their neighbours are
@@ -39,7 +39,7 @@ def clipped(points, width, height, room):
         inside = is_inside(points[n, 0], points[n, 1], width, height)
         if before >= 0 and inside != was_inside:
             within, outside = (points[n], points[before]) if inside else (points[before], points[n])
-            count += cross(within, outside, width, height, room[count])
+            count += cross_border(within, outside, width, height, room[count])
         if inside:
             room[count] = points[n]
             count += 1
@@ -54,7 +54,7 @@ def is_inside(x, y, width, height):
 
 
 @compiled
-def cross(within, outside, width, height, place):
+def cross_border(within, outside, width, height, place):
     """1 and the crossing of the border next to ``within`` in ``place``; 0 where there is none."""
     least, found = np.inf, 0
     step_x, step_y = outside[0] - within[0], outside[1] - within[1]

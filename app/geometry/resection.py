@@ -23,10 +23,10 @@ import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.curve_fit import descend
+from app.geometry.curve_fit import minimize_curve_costs
 from app.geometry.curve_residuals import (
-    accumulate,
-    point_rows,
+    accumulate_equations,
+    derivative_rows_of_points,
     residual_rows,
 )
 from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, STUCK, Fit
@@ -139,7 +139,7 @@ def normal_equations(
     cost = np.empty(count)
     gradient = np.empty((count, PARAMETERS))
     information = np.empty((count, PARAMETERS, PARAMETERS))
-    accumulate(
+    accumulate_equations(
         np.ascontiguousarray(parameters),
         curves.kinds,
         curves.shapes,
@@ -180,7 +180,7 @@ def fit_curves(
     information = np.empty((count, PARAMETERS, PARAMETERS))
     accepted, rejected = np.zeros(count), np.zeros(count)
     reasons = np.full(count, NAMES.index(OUT_OF_STEPS))
-    descend(
+    minimize_curve_costs(
         parameters,
         curves.kinds,
         curves.shapes,
@@ -205,7 +205,7 @@ def fit_curves(
     return Fit(parameters, cost, information, accepted, rejected, names)
 
 
-def distances(
+def curve_distances(
     parameters: FloatArray, curves: Curves, curve_points: CurvePoints, half_diagonal: float
 ) -> FloatArray:
     """Distance of each point to its projected curve, pixels, shape (N,).
@@ -213,12 +213,12 @@ def distances(
     Args:
         parameters: One camera, shape (8,).
     """
-    offsets, _ = residuals(parameters, curves, curve_points, half_diagonal)
+    offsets, _ = curve_residuals(parameters, curves, curve_points, half_diagonal)
     distance: FloatArray = np.hypot(offsets[:, 0], offsets[:, 1])
     return distance
 
 
-def residuals(
+def curve_residuals(
     parameters: FloatArray, curves: Curves, curve_points: CurvePoints, half_diagonal: float
 ) -> tuple[FloatArray, FloatArray]:
     """Offset of each point from its projected curve and its derivatives by the camera.
@@ -256,5 +256,5 @@ def projection_jacobians(
         half_diagonals: Half the image diagonals, pixels, shape (N,).
     """
     derivatives = np.empty((len(points), 2, PARAMETERS))
-    point_rows(parameters, points, half_diagonals, derivatives)
+    derivative_rows_of_points(parameters, points, half_diagonals, derivatives)
     return derivatives

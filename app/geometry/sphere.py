@@ -135,7 +135,9 @@ def tight_box(camera: Camera, center: FloatArray, radius: float) -> FloatArray:
     if in_camera[2] <= radius:
         raise DegenerateGeometryError("the ball does not lie wholly in front of the camera")
     if camera.distorts:
-        outline = camera.project(_outline(in_camera, radius) @ camera.rotation + camera.position)
+        outline = camera.project(
+            _outline_points(in_camera, radius) @ camera.rotation + camera.position
+        )
         if camera.is_wide and np.isnan(outline).any():
             raise DegenerateGeometryError(
                 "the ball does not lie wholly in the field of view of the lens"
@@ -148,7 +150,7 @@ def tight_box(camera: Camera, center: FloatArray, radius: float) -> FloatArray:
     return np.concatenate([middle - half, middle + half])
 
 
-def _outline(center: FloatArray, radius: float) -> FloatArray:
+def _outline_points(center: FloatArray, radius: float) -> FloatArray:
     """Points of the circle where rays from the camera touch the sphere, camera frame, (64, 3)."""
     squared = float(center @ center)
     shrink = 1 - radius**2 / squared

@@ -15,7 +15,7 @@ LEAST_WIDTH = 1e-3
 
 
 @compiled
-def aim(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
+def aim_starts(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
     """Writes one start for each stand: level, aimed and zoomed so that the seen curves lie where they are.
 
     Each curve counts as its middle, the less the longer it is: of a long one perhaps a corner is seen.
@@ -31,7 +31,7 @@ def aim(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
         starts: Result: parameters of ``resection``, shape (S, 8).
     """
     total, (column, row), (x, y, z) = 0.0, (0.0, 0.0), (0.0, 0.0, 0.0)
-    weight, seen, middles = _seen(kinds, shapes, pixels, curve)
+    weight, seen, middles = _seen_curves(kinds, shapes, pixels, curve)
     for m in range(len(kinds)):
         total += weight[m]
     for m in range(len(kinds)):
@@ -52,7 +52,7 @@ def aim(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
         length = np.sqrt(fx * fx + fy * fy + fz * fz)
         fx, fy, fz = fx / length, fy / length, fz / length
         pan, tilt = np.arctan2(fx, -fy), np.arccos(fz)
-        wide = _width(stand, (fx, fy, fz), pan, tilt, middles, weight)
+        wide = _seen_width(stand, (fx, fy, fz), pan, tilt, middles, weight)
         focal = min(max(spread_px / max(wide, LEAST_WIDTH), focals[0]), focals[1])
         # Turn so that the aim appears where the annotation has it, not in the middle.
         starts[s, 0] = pan - np.arctan(column / focal)
@@ -64,7 +64,7 @@ def aim(stands, kinds, shapes, pixels, curve, least_spread_px, focals, starts):
 
 
 @compiled
-def _seen(kinds, shapes, pixels, curve):
+def _seen_curves(kinds, shapes, pixels, curve):
     """Of each curve its weight (zero where it is not seen), the mean of its points and its middle."""
     count = len(kinds)
     points, weight = np.zeros(count), np.zeros(count)
@@ -78,12 +78,12 @@ def _seen(kinds, shapes, pixels, curve):
         if points[m] == 0:
             continue
         seen[m] /= points[m]
-        weight[m] = 1 / max(_middle(kinds[m], shapes[m], middles[m]), SHORT_M)
+        weight[m] = 1 / max(_curve_middle(kinds[m], shapes[m], middles[m]), SHORT_M)
     return weight, seen, middles
 
 
 @compiled
-def _middle(kind, shape, middle):
+def _curve_middle(kind, shape, middle):
     """Writes the middle of a curve; returns how long it is, an arc as long as it is wide."""
     if kind == SEGMENT:
         for k in range(3):
@@ -99,7 +99,7 @@ def _middle(kind, shape, middle):
 
 
 @compiled
-def _width(stand, forward, pan, tilt, middles, weight):
+def _seen_width(stand, forward, pan, tilt, middles, weight):
     """How wide a stand sees the middles that are in front of it: weighted root mean square of their
     normalised image coordinates."""
     rx, ry = np.cos(pan), np.sin(pan)

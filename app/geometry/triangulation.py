@@ -50,7 +50,7 @@ def triangulate_pairs(
     return points
 
 
-def moved_points(
+def triangulation_shifts(
     P_a: FloatArray,
     P_b: FloatArray,
     pixels_a: FloatArray,

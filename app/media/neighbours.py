@@ -10,7 +10,7 @@ from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.media.files import has_member, video_times
 from app.media.object_frames import is_stored
-from app.soccer.media import FARTHEST, Media, numbered
+from app.soccer.media import FARTHEST, Media, split_frame_number
 
 
 def neighbours(media: Media, group: str, static: bool, settings: Settings) -> dict[int, Media]:
@@ -45,7 +45,7 @@ def _neighbours_in_video(media: Media, frame: int, count: int) -> Iterator[tuple
 
 
 def _neighbours_among_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:
-    found = numbered(media, group, static)
+    found = split_frame_number(media, group, static)
     if found is None:
         return
     name, head, digits = found

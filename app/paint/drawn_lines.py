@@ -13,10 +13,10 @@ from app.paint.view_proposal import ViewProposal, propose_lines
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.media import Media
-from app.soccer.pitch import Pitch, twin_marking
+from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate, measure
+from app.solving.calibrate import calibrate, measure_calibration
 
 APART_PERCENT = 1.0
 """Of the diagonal: drawn points farther off than this contradict what is proposed."""
@@ -60,7 +60,7 @@ def beside_drawn(
     drawn = {marking: points for marking, points in drawn.items() if points}
     if found.outcome != "proposed" or not drawn:
         return found
-    turned = make_lines({twin_marking(name): points for name, points in found.lines.items()})
+    turned = make_lines({opposite_marking(name): points for name, points in found.lines.items()})
     sides = [_side(lines, drawn, pitch, size, policy) for lines in (found.lines, turned)]
     side = min(sides, key=lambda item: item.cost(FAR_PERCENT / 100 * size.diagonal))
     rest = {name: points for name, points in side.lines.items() if name not in drawn}
@@ -90,7 +90,9 @@ def _side(
     lines: Lines, drawn: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> _Side:
     camera = calibrate(lines, pitch, size, policy).camera
-    fits = measure(Calibration("lines", camera), drawn, policy.fitted(pitch), size).markings
+    fits = measure_calibration(
+        Calibration("lines", camera), drawn, policy.fitted(pitch), size
+    ).markings
     apart = {fit.marking: fit.largest_px for fit in fits if fit.largest_px is not None}
     return _Side(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})
 

@@ -8,7 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from app.geometry.curve_residuals import ideal_pixel, radial_growth, residual, to_camera, unpack
+from app.geometry.curve_residuals import (
+    ideal_pixel,
+    pitch_to_camera,
+    radial_growth_factor,
+    unpack_camera,
+    write_residual,
+)
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -59,7 +65,7 @@ def nearest_place(camera, px, py, shapes, nearest, origin, cell, place):
 @compiled
 def offset_from(camera, place, inside, px, py):
     """Distance of a pixel from a place's tangent in the picture, or from the place at an end."""
-    a, b, c = to_camera(camera, place[0], place[1], 0.0)
+    a, b, c = pitch_to_camera(camera, place[0], place[1], 0.0)
     if c < 0.3:
         return 1e6
     focal = camera[12]
@@ -79,7 +85,7 @@ def unexplained(parameters, points, shapes, nearest, origin, cell, reach, half_d
     """Writes the mean truncated distance of the paint to the nearest marking, 0 to 1."""
     place = np.empty(6)
     for b in range(len(parameters)):
-        camera = unpack(parameters[b], half_diagonal)
+        camera = unpack_camera(parameters[b], half_diagonal)
         total = 0.0
         for n in range(len(points)):
             px, py = ideal_pixel(camera, points[n, 0], points[n, 1])
@@ -108,15 +114,15 @@ def unsupported(
     """
     height, width = distance.shape
     for b in range(len(parameters)):
-        camera = unpack(parameters[b], half_diagonal)
+        camera = unpack_camera(parameters[b], half_diagonal)
         focal, kappa = camera[12], camera[13]
         total, length, off = 0.0, 0.0, 0.0
         for n in range(len(samples)):
-            a, e, c = to_camera(camera, samples[n, 0], samples[n, 1], 0.0)
+            a, e, c = pitch_to_camera(camera, samples[n, 0], samples[n, 1], 0.0)
             if c < 0.3:
                 continue
             px, py = focal * a / c, focal * e / c
-            growth = radial_growth(kappa * (px * px + py * py))
+            growth = radial_growth_factor(kappa * (px * px + py * py))
             x, y = px * growth + center[0], py * growth + center[1]
             if not (0 <= x < width - 0.5 and 0 <= y < height - 0.5):
                 continue
@@ -152,7 +158,7 @@ def refine(
     H, g = np.empty((8, 8)), np.empty(8)
     for b in range(len(parameters)):
         for scale in scales:
-            camera = unpack(parameters[b], half_diagonal)
+            camera = unpack_camera(parameters[b], half_diagonal)
             g[:] = 0.0
             H[:] = 0.0
             for k in range(8):
@@ -164,7 +170,7 @@ def refine(
                 inside = nearest_place(camera, px, py, shapes, nearest, origin, cell, place)
                 if inside < 0 or offset_from(camera, place, inside, px, py) > 3.0 * scale:
                     continue
-                residual(camera, place, inside == 1, points[n], offset, jacobian)
+                write_residual(camera, place, inside == 1, points[n], offset, jacobian)
                 squared = offset[0] * offset[0] + offset[1] * offset[1]
                 root = 1.0 / (1.0 + squared / (scale * scale))
                 w = root * root

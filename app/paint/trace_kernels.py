@@ -10,12 +10,12 @@ from numba import njit
 
 from app.geometry.curve_residuals import (
     NEAR,
-    bent_step,
+    distort_step,
+    pitch_to_camera,
     projection_derivatives,
-    radial_growth,
-    to_camera,
-    turn,
-    unpack,
+    radial_growth_factor,
+    rotate_to_camera,
+    unpack_camera,
 )
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
@@ -46,7 +46,7 @@ def trace_markings(
         marking: Result: index of the curve, shape (N,).
         rows: Result: derivative of the place along the normal by the parameters, shape (N, 8).
     """
-    camera = unpack(parameters, half_diagonal)
+    camera = unpack_camera(parameters, half_diagonal)
     derivatives = np.empty((2, 8))
     place = np.empty(6)
     count = 0
@@ -103,24 +103,24 @@ def at_share(kind, shape, share, place):
 
 @compiled
 def _pixel(camera, principal, place):
-    x, y, z = to_camera(camera, place[0], place[1], place[2])
+    x, y, z = pitch_to_camera(camera, place[0], place[1], place[2])
     if z < NEAR:
         return 0.0, 0.0, False
     px, py = camera[12] * x / z, camera[12] * y / z
-    growth = radial_growth(camera[13] * (px * px + py * py))
+    growth = radial_growth_factor(camera[13] * (px * px + py * py))
     return principal[0] + px * growth, principal[1] + py * growth, True
 
 
 @compiled
 def _direction(camera, place, vx, vy):
     """How a step on the grass looks in the picture, pixels a metre."""
-    ux, uy, uz = to_camera(camera, place[0], place[1], place[2])
-    wx, wy, wz = turn(camera, vx, vy, 0.0)
+    ux, uy, uz = pitch_to_camera(camera, place[0], place[1], place[2])
+    wx, wy, wz = rotate_to_camera(camera, vx, vy, 0.0)
     focal, kappa = camera[12], camera[13]
     nx, ny = ux / uz, uy / uz
     px, py = focal * nx, focal * ny
     ix, iy = focal * (wx - nx * wz) / uz, focal * (wy - ny * wz) / uz
-    _, sx, sy = bent_step(kappa, px, py, ix, iy)
+    _, sx, sy = distort_step(kappa, px, py, ix, iy)
     return sx, sy
 
 

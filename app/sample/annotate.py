@@ -10,7 +10,7 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.instant import PLAYER_RADIUS, TEAM, Instant
-from app.sample.views import FINE, HEIGHT, WIDTH, Indices, inside
+from app.sample.views import FINE, HEIGHT, WIDTH, Indices, is_inside_image
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import Box
 from app.soccer.pitch import CIRCLES, MARKINGS
@@ -35,9 +35,9 @@ def click_lines(rng: np.random.Generator, camera: Camera) -> Lines:
     forgotten rarely, and never one of the last six.
     """
     paths = visible_paths(camera)
-    markings = _remembered(rng, np.flatnonzero(paths.lengths >= SHORTEST_PX))
-    owner, share = _places(rng, markings, paths.lengths)
-    clicks = paths.at(owner, share)
+    markings = _drop_some_markings(rng, np.flatnonzero(paths.lengths >= SHORTEST_PX))
+    owner, share = _draw_click_places(rng, markings, paths.lengths)
+    clicks = paths.pixels_at(owner, share)
     clicks += rng.normal(0, rng.uniform(*CLICK_SIGMA), clicks.shape)
     points = clicks.round(DECIMALS).tolist()
     ends = np.searchsorted(owner, markings, side="right").tolist()
@@ -63,39 +63,39 @@ class VisiblePaths:
     lengths: FloatArray
     before: FloatArray
 
-    def at(self, marking: Indices, share: FloatArray) -> FloatArray:
+    def pixels_at(self, marking: Indices, share: FloatArray) -> FloatArray:
         """Pixels at a share (0 to 1) of the visible length of markings, shape (M, 2)."""
         place = self.before[marking] + share * self.lengths[marking]
-        step = self._step_at(place)
+        step = self._step_at_length(place)
         # At share 1 rounding may fall on the next marking's first step.
-        step = np.clip(step, self._first(marking), self._last(marking))
+        step = np.clip(step, self._first_step(marking), self._last_step(marking))
         size = np.maximum(self.along[step + 1] - self.along[step], 1e-12)
         part = np.clip((place - self.along[step]) / size, 0.0, 1.0)
         places: FloatArray = self.starts[step] + part[:, None] * self.steps[step]
         return places
 
-    def _first(self, marking: Indices) -> Indices:
-        return self._step_at(self.before[marking] + 1e-9)
+    def _first_step(self, marking: Indices) -> Indices:
+        return self._step_at_length(self.before[marking] + 1e-9)
 
-    def _last(self, marking: Indices) -> Indices:
-        return self._step_at(self.before[marking] + self.lengths[marking] - 1e-9)
+    def _last_step(self, marking: Indices) -> Indices:
+        return self._step_at_length(self.before[marking] + self.lengths[marking] - 1e-9)
 
-    def _step_at(self, place: FloatArray) -> Indices:
+    def _step_at_length(self, place: FloatArray) -> Indices:
         return np.asarray(np.searchsorted(self.along, place, side="right") - 1, np.int64)
 
 
 def visible_paths(camera: Camera) -> VisiblePaths:
     """What each marking shows of itself, with its ends on the image border where it is cut."""
     pixels = camera.project(FINE.points)
-    seen = inside(pixels)
+    seen = is_inside_image(pixels)
     finite = ~np.isnan(pixels[:, 0])
     together = FINE.marking[1:] == FINE.marking[:-1]
     shown = together & (seen[1:] | seen[:-1]) & finite[1:] & finite[:-1]
     first = np.flatnonzero(shown)
     a, b = pixels[first], pixels[first + 1]
     enters, leaves = ~seen[first], ~seen[first + 1]
-    a[enters] = _to_border(b[enters], a[enters])
-    b[leaves] = _to_border(a[leaves], b[leaves])
+    a[enters] = _clip_to_border(b[enters], a[enters])
+    b[leaves] = _clip_to_border(a[leaves], b[leaves])
     steps = b - a
     sizes = np.sqrt((steps**2).sum(axis=1))
     lengths = np.zeros(len(MARKINGS))
@@ -105,7 +105,7 @@ def visible_paths(camera: Camera) -> VisiblePaths:
     return VisiblePaths(a, steps, along, lengths, before)
 
 
-def _to_border(inner: FloatArray, outer: FloatArray) -> FloatArray:
+def _clip_to_border(inner: FloatArray, outer: FloatArray) -> FloatArray:
     """Where the ways from pixels in the image to pixels outside leave it, shape (N, 2)."""
     limit = np.array([WIDTH - 1.0, HEIGHT - 1.0])
     step = outer - inner
@@ -116,14 +116,14 @@ def _to_border(inner: FloatArray, outer: FloatArray) -> FloatArray:
     return border
 
 
-def _remembered(rng: np.random.Generator, markings: Indices) -> Indices:
+def _drop_some_markings(rng: np.random.Generator, markings: Indices) -> Indices:
     kept = rng.random(len(markings)) >= FORGOTTEN
     # A reader of the labels counts what is missing: no view shall lose more than a tenth.
     enough = kept.sum() >= max(FEWEST_KEPT, 0.9 * len(markings))
     return markings[kept] if enough else markings
 
 
-def _places(
+def _draw_click_places(
     rng: np.random.Generator, markings: Indices, lengths: FloatArray
 ) -> tuple[Indices, FloatArray]:
     """Where people click: the marking of each click, and the share of its visible length."""

@@ -17,10 +17,10 @@ from app.sample.views import (
     HEIGHT,
     WIDTH,
     Mask,
-    Trials,
-    inside,
+    TrialCameras,
+    count_seen_points,
+    is_inside_image,
     project_trials,
-    seen_points,
 )
 
 CLICK_SIGMA = 1.0
@@ -41,21 +41,21 @@ class Certainty:
     size_sigma: float
 
 
-def certainty(camera: Camera, ball: FloatArray, seen: Mask) -> Certainty:
+def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> Certainty:
     """What a calibration from the visible markings would know about a ball.
 
     Args:
         ball: Pitch frame, metres, shape (3,).
         seen: Which points of ``COARSE`` are in view, shape (N,).
     """
-    counts = np.maximum(seen_points(seen, COARSE), 1)
+    counts = np.maximum(count_seen_points(seen, COARSE), 1)
     index = np.flatnonzero(seen)
     # Annotators click a few points a marking, however many the skeleton has.
     weights = np.minimum(1.0, POINTS_PER_MARKING / counts[COARSE.marking[index]])
     x = camera.pitch_to_camera(np.vstack([COARSE.points[index], ball]))
     jacobian = _point_jacobian(camera, x)
     tangents = COARSE.tangents[index] @ camera.rotation.T
-    normals = _normals(x[:-1], tangents)
+    normals = _projected_normals(x[:-1], tangents)
     rows = normals[:, 0, None] * jacobian[:-1, 0] + normals[:, 1, None] * jacobian[:-1, 1]
     rows *= np.sqrt(weights)[:, None]
     information = np.einsum("ni,nj->ij", rows, rows) / CLICK_SIGMA**2
@@ -68,12 +68,12 @@ def certainty(camera: Camera, ball: FloatArray, seen: Mask) -> Certainty:
     of_ball = jacobian[-1]
     spread = of_ball @ covariance @ of_ball.T
     sigma = float(np.sqrt(max(float(np.linalg.eigvalsh(spread)[-1]), 0.0)))
-    size = _size_gradient(camera, x[-1])
+    size = _ball_size_gradient(camera, x[-1])
     size_sigma = float(np.sqrt(max(float(size @ covariance @ size), 0.0)))
     return Certainty(sigma * float(x[-1, 2]) / focal, size_sigma)
 
 
-def _normals(x: FloatArray, tangents: FloatArray) -> FloatArray:
+def _projected_normals(x: FloatArray, tangents: FloatArray) -> FloatArray:
     """Unit normals of projected markings; points and tangents in the camera frame, (N, 3)."""
     depth = x[:, 2]
     along_u = tangents[:, 0] - tangents[:, 2] * x[:, 0] / depth
@@ -107,7 +107,7 @@ def _point_jacobian(camera: Camera, x: FloatArray) -> FloatArray:
     return jacobian
 
 
-def _size_gradient(camera: Camera, ball: FloatArray) -> FloatArray:
+def _ball_size_gradient(camera: Camera, ball: FloatArray) -> FloatArray:
     """Derivative of log(focal / depth), shape (8,); the ball in the camera frame, (3,)."""
     x, y, depth = ball
     turn = np.array([-y, x, 0.0]) / depth
@@ -151,7 +151,7 @@ class CameraStands:
     seats: dict[str, tuple[FloatArray, ...]]
 
 
-def make_rig(rng: np.random.Generator) -> CameraStands:
+def place_cameras(rng: np.random.Generator) -> CameraStands:
     """Cameras as broadcasters place them."""
     y = rng.uniform(46.0, 90.0)
     height = np.clip(9.5 + 0.24 * (y - 41.0) + rng.normal(0, 2.0), 9.3, 24.7)
@@ -181,7 +181,7 @@ def make_rig(rng: np.random.Generator) -> CameraStands:
     return CameraStands(main, seats)
 
 
-def replay_seat(
+def choose_replay_position(
     rng: np.random.Generator, rig: CameraStands, ball: FloatArray
 ) -> tuple[str, FloatArray]:
     """A replay camera, most often one at the ball's end; where it stands, metres, shape (3,)."""
@@ -193,13 +193,13 @@ def replay_seat(
     return kind, seat + rng.normal(0, 0.25, 3) * (1, 1, 0.3)
 
 
-def parallax(a: FloatArray, b: FloatArray, ball: FloatArray) -> float:
+def parallax_angle_at_ball(a: FloatArray, b: FloatArray, ball: FloatArray) -> float:
     """Angle between the rays from two positions to the ball, radians."""
     u, v = a - ball, b - ball
     return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
 
 
-def aim(
+def find_camera(
     rng: np.random.Generator, position: FloatArray, ball: FloatArray, is_main: bool
 ) -> Camera | None:
     """A camera at that position from which ball and enough markings are in view.
@@ -214,26 +214,28 @@ def aim(
         pitch would determine the camera.
     """
     for attempt in range(ROUNDS):
-        trials = _trials(rng, position, ball, is_main, zoom=1.0 - 0.2 * attempt)
+        trials = _draw_trial_cameras(rng, position, ball, is_main, zoom=1.0 - 0.2 * attempt)
         if trials is None:
             return None
         pixels = project_trials(trials, COARSE.points)
-        seen = inside(pixels, 4.0)
-        good = _acceptable(trials, ball, seen, is_main) & ~_too_close(pixels, seen)
+        seen = is_inside_image(pixels, 4.0)
+        good = _acceptable_trials(trials, ball, seen, is_main) & ~_has_too_close_marking(
+            pixels, seen
+        )
         for index in np.flatnonzero(good):
-            camera = _camera(trials, int(index))
-            if _good(certainty(camera, ball, seen[index])):
+            camera = _camera_of_trial(trials, int(index))
+            if _is_good_certainty(estimate_certainty(camera, ball, seen[index])):
                 return camera
     return None
 
 
-def _good(known: Certainty) -> bool:
+def _is_good_certainty(known: Certainty) -> bool:
     return known.ball_sigma_m < 0.06 and known.size_sigma < 0.04
 
 
-def _trials(
+def _draw_trial_cameras(
     rng: np.random.Generator, position: FloatArray, ball: FloatArray, is_main: bool, zoom: float
-) -> Trials | None:
+) -> TrialCameras | None:
     toward = ball - position
     distance = float(np.linalg.norm(toward))
     low, high = MAIN_FOCAL if is_main else REPLAY_FOCAL
@@ -246,7 +248,7 @@ def _trials(
     u = np.clip(rng.normal(0, 0.24, TRIALS), -0.42, 0.42) * WIDTH
     v = np.clip(rng.normal(0.02, 0.17, TRIALS), -0.38, 0.40) * HEIGHT
     corner = rng.uniform(5.0, 25.0, TRIALS)
-    return Trials(
+    return TrialCameras(
         position=np.broadcast_to(position, (TRIALS, 3)),
         pan=np.arctan2(toward[0], -toward[1]) - np.arctan2(u, focal),
         tilt=np.arccos(toward[2] / distance) + np.arctan2(v, focal),
@@ -256,22 +258,22 @@ def _trials(
     )
 
 
-def _acceptable(trials: Trials, ball: FloatArray, seen: Mask, is_main: bool) -> Mask:
-    counts = seen_points(seen, COARSE)
+def _acceptable_trials(trials: TrialCameras, ball: FloatArray, seen: Mask, is_main: bool) -> Mask:
+    counts = count_seen_points(seen, COARSE)
     markings = counts >= 3
     straight_x = markings[:, COARSE.runs_along_x].sum(axis=1)
     straight_y = markings[:, COARSE.runs_along_y].sum(axis=1)
     good: Mask = (markings.sum(axis=1) >= FEWEST_MARKINGS) & (straight_x >= 1) & (straight_y >= 1)
     # Scraps at the border are easily overlooked, and would count against the annotation.
     good &= (counts == 1).sum(axis=1) <= 1
-    good &= inside(project_trials(trials, ball[None])[:, 0], 30.0)
-    good &= _looks_at_the_pitch(trials)
+    good &= is_inside_image(project_trials(trials, ball[None])[:, 0], 30.0)
+    good &= _shows_pitch_at_bottom(trials)
     if is_main:
         good &= (trials.tilt >= MAIN_TILT[0]) & (trials.tilt <= MAIN_TILT[1])
     return good
 
 
-def _looks_at_the_pitch(trials: Trials) -> Mask:
+def _shows_pitch_at_bottom(trials: TrialCameras) -> Mask:
     """Whether the bottom of the image shows the pitch or its rim, not the own stand, (N,)."""
     rotation = trials.rotation
     ray = rotation[:, 2] + rotation[:, 1] * (CENTER[1] / trials.focal)[:, None]
@@ -282,7 +284,7 @@ def _looks_at_the_pitch(trials: Trials) -> Mask:
     return pitch
 
 
-def _too_close(pixels: FloatArray, seen: Mask) -> Mask:
+def _has_too_close_marking(pixels: FloatArray, seen: Mask) -> Mask:
     """Whether a marking passes so near the camera that its samples stand far apart, shape (N,).
 
     Scorers join samples of a marking by straight lines, which miss a bent image there.
@@ -295,7 +297,7 @@ def _too_close(pixels: FloatArray, seen: Mask) -> Mask:
     return close
 
 
-def _camera(trials: Trials, index: int) -> Camera:
+def _camera_of_trial(trials: TrialCameras, index: int) -> Camera:
     distortion = np.zeros(12)
     distortion[0] = trials.k1[index]
     focal = float(trials.focal[index])

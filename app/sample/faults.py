@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.sample.instant import Instant, later
+from app.sample.instant import Instant, advance_instant
 from app.sample.scene import FAULT_KINDS, PlantedFault
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import View
-from app.soccer.pitch import CIRCLES, twin_marking
+from app.soccer.pitch import CIRCLES, opposite_marking
 
 FAULT_SHARE = 1 / 3
 POINT_SHIFT_PX = (30.0, 90.0)
@@ -46,7 +46,7 @@ def plan_fault(rng: np.random.Generator, views: int) -> FaultPlan | None:
     return FaultPlan(name, index, int(rng.integers(1 << 31)))
 
 
-def beside_main(rng: np.random.Generator, main: FloatArray) -> tuple[FloatArray, float]:
+def position_beside_main(rng: np.random.Generator, main: FloatArray) -> tuple[FloatArray, float]:
     """A replay camera next to the main camera, and its distance from it, metres."""
     direction = rng.normal(0, 1, 3) * (1.0, 0.6, 0.3)
     distance = float(rng.uniform(*TINY_BASELINE_M))
@@ -69,7 +69,7 @@ def another_instant(
     for _ in range(30):
         angle, distance = rng.uniform(0, 2 * np.pi), rng.uniform(*BALL_SHIFT_M)
         shift = np.array([np.cos(angle), np.sin(angle), -abs(rng.normal(0, 0.25))]) * distance
-        moved = later(instant, float(rng.choice([-1, 1]) * rng.uniform(0.3, 0.9)), shift)
+        moved = advance_instant(instant, float(rng.choice([-1, 1]) * rng.uniform(0.3, 0.9)), shift)
         moved_by = float(np.linalg.norm(moved.ball - instant.ball))
         gap = _ray_gap(main, instant.ball, replay, moved.ball)
         on_pitch = abs(moved.ball[0]) < 53.5 and abs(moved.ball[1]) < 34.5
@@ -87,7 +87,7 @@ def _ray_gap(a: FloatArray, ball_a: FloatArray, b: FloatArray, ball_b: FloatArra
     return float(abs((b - a) @ normal) / max(float(np.linalg.norm(normal)), 1e-12))
 
 
-def spoil_view(plan: FaultPlan, view: View) -> tuple[View, PlantedFault]:
+def plant_annotation_fault(plan: FaultPlan, view: View) -> tuple[View, PlantedFault]:
     """Plant a fault of annotation into a view.
 
     Args:
@@ -97,14 +97,14 @@ def spoil_view(plan: FaultPlan, view: View) -> tuple[View, PlantedFault]:
     if plan.kind == "missing_ball":
         return replace(view, balls=()), PlantedFault(plan.kind, view.key)
     if plan.kind == "swapped_sides":
-        lines = {twin_marking(name): points for name, points in view.station.lines.items()}
+        lines = {opposite_marking(name): points for name, points in view.station.lines.items()}
         return _with_lines(view, make_lines(lines)), PlantedFault(plan.kind, view.key)
     if plan.kind == "bad_point":
-        return _move_point(rng, view)
-    return _mislabel(rng, view)
+        return _misplace_point(rng, view)
+    return _swap_label(rng, view)
 
 
-def leave_undrawn(plan: FaultPlan, view: View) -> tuple[View, tuple[PlantedFault, ...]]:
+def remove_markings(plan: FaultPlan, view: View) -> tuple[View, tuple[PlantedFault, ...]]:
     """Take the points of straight markings away that are plain to see, as if nobody drew them.
 
     Args:
@@ -112,7 +112,9 @@ def leave_undrawn(plan: FaultPlan, view: View) -> tuple[View, tuple[PlantedFault
     """
     rng = np.random.default_rng([plan.seed, 0xBAD])
     lines = dict(view.station.lines)
-    plain = sorted(n for n, p in lines.items() if n not in CIRCLES and _span(p) > PLAIN_PX)
+    plain = sorted(
+        n for n, p in lines.items() if n not in CIRCLES and _extent_of_points(p) > PLAIN_PX
+    )
     count = min(UNDRAWN, len(plain))
     chosen = [str(name) for name in rng.choice(plain or [""], count, replace=False)]
     for name in chosen:
@@ -121,9 +123,13 @@ def leave_undrawn(plan: FaultPlan, view: View) -> tuple[View, tuple[PlantedFault
     return _with_lines(view, make_lines(lines)), faults
 
 
-def _move_point(rng: np.random.Generator, view: View) -> tuple[View, PlantedFault]:
+def _misplace_point(rng: np.random.Generator, view: View) -> tuple[View, PlantedFault]:
     lines = dict(view.station.lines)
-    straight = [n for n, p in lines.items() if n not in CIRCLES and len(p) >= 3 and _span(p) > 60]
+    straight = [
+        n
+        for n, p in lines.items()
+        if n not in CIRCLES and len(p) >= 3 and _extent_of_points(p) > 60
+    ]
     marking = str(rng.choice(straight or list(lines)))
     points = list(lines[marking])
     index = int(rng.integers(len(points)))
@@ -137,59 +143,64 @@ def _move_point(rng: np.random.Generator, view: View) -> tuple[View, PlantedFaul
     return _with_lines(view, make_lines(lines)), fault
 
 
-def _mislabel(rng: np.random.Generator, view: View) -> tuple[View, PlantedFault]:
+def _swap_label(rng: np.random.Generator, view: View) -> tuple[View, PlantedFault]:
     lines = dict(view.station.lines)
     mistakes = [
         (true, label)
         for true, points in lines.items()
-        for label in confusions(true)
-        if label not in lines and _span(points) > 60
+        for label in confusable_markings(true)
+        if label not in lines and _extent_of_points(points) > 60
     ]
     if not mistakes:
         # All that could be confused is annotated itself: the wrong clicks replace the right ones.
-        longest = max(lines, key=lambda name: _span(lines[name]))
-        mistakes = [(longest, label) for label in confusions(longest)]
+        longest = max(lines, key=lambda name: _extent_of_points(lines[name]))
+        mistakes = [(longest, label) for label in confusable_markings(longest)]
     true, label = mistakes[int(rng.integers(len(mistakes)))]
     lines[label] = lines.pop(true)
     return _with_lines(view, make_lines(lines)), PlantedFault("wrong_label", view.key, label, true)
 
 
-def confusions(marking: str) -> tuple[str, ...]:
+def confusable_markings(marking: str) -> tuple[str, ...]:
     """Names that annotators write for this marking by mistake.
 
     Example:
         >>> confusions("Small rect. left main")
         ('Big rect. left main', 'Small rect. right main')
     """
-    other_side = _swap(marking, "left", "right")
+    other_side = _swap_words(marking, "left", "right")
     if marking in CIRCLES:
         return tuple(name for name in CIRCLES if name != marking)
     if "rect." in marking:
-        kind = _swap(marking, "Big", "Small")
-        return (kind, other_side if marking.endswith("main") else _swap(marking, "top", "bottom"))
+        kind = _swap_words(marking, "Big", "Small")
+        return (
+            kind,
+            other_side if marking.endswith("main") else _swap_words(marking, "top", "bottom"),
+        )
     if marking == "Middle line":
         return ("Side line left", "Side line right")
     if marking.startswith("Side line"):
         sides = ("left", "right") if marking.endswith(("top", "bottom")) else ("top", "bottom")
         opposite = (
-            other_side if marking.endswith(("left", "right")) else _swap(marking, "top", "bottom")
+            other_side
+            if marking.endswith(("left", "right"))
+            else _swap_words(marking, "top", "bottom")
         )
         return (opposite, *(f"Side line {side}" for side in sides))
     if "post" in marking:
         goal, post = marking.split(" post ")
         return (
-            f"{goal} post {_swap(post, 'left', 'right')}",
-            f"{_swap(goal, 'left', 'right')} post {post}",
+            f"{goal} post {_swap_words(post, 'left', 'right')}",
+            f"{_swap_words(goal, 'left', 'right')} post {post}",
         )
     return (other_side,)
 
 
-def _swap(text: str, a: str, b: str) -> str:
+def _swap_words(text: str, a: str, b: str) -> str:
     words = {a: b, b: a}
     return " ".join(words.get(word, word) for word in text.split(" "))
 
 
-def _span(points: tuple[tuple[float, float], ...]) -> float:
+def _extent_of_points(points: tuple[tuple[float, float], ...]) -> float:
     array = np.array(points)
     return float(np.linalg.norm(array.max(axis=0) - array.min(axis=0)))
 

@@ -83,7 +83,7 @@ def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -
     return people
 
 
-def kit_of(look: Look, index: int) -> Outfit:
+def outfit_of_person(look: Look, index: int) -> Outfit:
     """What person ``index`` of an instant wears."""
     if index == 2 * TEAM:
         return look.referee
@@ -112,9 +112,11 @@ def draw_person(
     skin, hair, boots = (
         choices[int(rng.integers(len(choices)))] for choices in (SKIN, HAIR, BOOTS)
     )
-    painter = _Painter(patch, person, kit_of(look, person.index), skin, hair, boots, lit_from)
+    painter = _PersonPainter(
+        patch, person, outfit_of_person(look, person.index), skin, hair, boots, lit_from
+    )
     painter.draw(number)
-    patch.lay(gain)
+    patch.draw_on_frame(gain)
 
 
 _SHIFT = 4
@@ -133,25 +135,25 @@ def draw_distant_person(image: Image, person: DrawnPerson, look: Look, gain: Col
     Args:
         gain: Light on the person, per channel.
     """
-    kit, metre = kit_of(look, person.index), person.height * person.scale
+    kit, metre = outfit_of_person(look, person.index), person.height * person.scale
     joints = np.round(person.joints * (1 << _SHIFT)).astype(int)
     for a, b, radius, part in _DISTANT:
-        colour = _lit(getattr(kit, part), gain)
+        colour = _apply_light(getattr(kit, part), gain)
         ends = joints[INDEX[a]].tolist(), joints[INDEX[b]].tolist()
         wide = max(1, round(2 * radius * metre))
         cv2.line(image, *ends, colour, wide, cv2.LINE_AA, _SHIFT)
     head = joints[INDEX["head"]].tolist()
-    skin = _lit(SKIN[person.index % len(SKIN)], gain)
+    skin = _apply_light(SKIN[person.index % len(SKIN)], gain)
     cv2.circle(image, head, round(0.056 * metre * (1 << _SHIFT)), skin, -1, cv2.LINE_AA, _SHIFT)
 
 
-def _lit(colour: Colour, gain: Colour) -> Colour:
+def _apply_light(colour: Colour, gain: Colour) -> Colour:
     b, g, r = (0.86 * channel * light for channel, light in zip(colour, gain, strict=True))
     return b, g, r
 
 
 @dataclass
-class _Painter:
+class _PersonPainter:
     patch: Patch
     person: DrawnPerson
     kit: Outfit
@@ -163,75 +165,82 @@ class _Painter:
     def draw(self, number: int) -> None:
         """Limbs far from the camera first, then the torso, then the near ones."""
         parts: list[tuple[float, Callable[[], None]]] = [
-            (self._depth("chest", "pelvis"), partial(self._torso_and_head, number))
+            (self._mean_depth("chest", "pelvis"), partial(self._draw_torso_and_head, number))
         ]
         for side in ("l", "r"):
-            nudge = self._behind(side)
-            leg, arm = partial(self._leg, side), partial(self._arm, side)
-            parts.append((self._depth(f"hip_{side}", f"knee_{side}") + nudge, leg))
-            parts.append((self._depth(f"elbow_{side}", f"hand_{side}") + nudge, arm))
+            nudge = self._limb_depth_offset(side)
+            leg, arm = partial(self._draw_leg, side), partial(self._draw_arm, side)
+            parts.append((self._mean_depth(f"hip_{side}", f"knee_{side}") + nudge, leg))
+            parts.append((self._mean_depth(f"elbow_{side}", f"hand_{side}") + nudge, arm))
         for _, paint in sorted(parts, key=lambda part: -part[0]):
             paint()
 
-    def _behind(self, side: str) -> float:
+    def _limb_depth_offset(self, side: str) -> float:
         # Breaks ties the way the body is turned; a limb is beside the torso, not within.
         away = np.sin(self.person.turn) * (1.0 if side == "l" else -1.0)
         return 0.03 * float(np.sign(away)) * float(abs(away) > 0.2) - 0.01
 
-    def _depth(self, a: str, b: str) -> float:
+    def _mean_depth(self, a: str, b: str) -> float:
         return float(self.person.depths[INDEX[a]] + self.person.depths[INDEX[b]]) / 2
 
-    def _at(self, joint: str) -> FloatArray:
+    def _joint_pixel(self, joint: str) -> FloatArray:
         point: FloatArray = self.person.joints[INDEX[joint]]
         return point
 
-    def _size(self, share: float) -> float:
+    def _pixels_of_share(self, share: float) -> float:
         return share * self.person.height * self.person.scale
 
-    def _limb(self, a: FloatArray, b: FloatArray, ra: float, rb: float, colour: Colour) -> None:
-        ra, rb = self._size(ra), self._size(rb)
-        self.patch.capsule(a, b, ra, rb, _dim(colour, 0.66))
+    def _draw_limb(
+        self, a: FloatArray, b: FloatArray, ra: float, rb: float, colour: Colour
+    ) -> None:
+        ra, rb = self._pixels_of_share(ra), self._pixels_of_share(rb)
+        self.patch.capsule(a, b, ra, rb, _dim_colour(colour, 0.66))
         shift = np.array([0.26 * self.lit_from, -0.10])
         self.patch.capsule(a + shift * ra, b + shift * rb, ra * 0.72, rb * 0.72, colour)
 
-    def _leg(self, side: str) -> None:
+    def _draw_leg(self, side: str) -> None:
         hip, knee, ankle, toe = (
-            self._at(f"{joint}_{side}") for joint in ("hip", "knee", "ankle", "toe")
+            self._joint_pixel(f"{joint}_{side}") for joint in ("hip", "knee", "ankle", "toe")
         )
-        self._limb(ankle, toe, 0.024, 0.016, self.boots)
-        self._limb(knee, ankle, 0.033, 0.023, self.kit.socks)
+        self._draw_limb(ankle, toe, 0.024, 0.016, self.boots)
+        self._draw_limb(knee, ankle, 0.033, 0.023, self.kit.socks)
         cuff = hip + 0.62 * (knee - hip)
-        self._limb(cuff, knee, 0.042, 0.034, self.skin)
-        self._limb(hip, cuff, 0.058, 0.056, self.kit.shorts)
+        self._draw_limb(cuff, knee, 0.042, 0.034, self.skin)
+        self._draw_limb(hip, cuff, 0.058, 0.056, self.kit.shorts)
 
-    def _arm(self, side: str) -> None:
+    def _draw_arm(self, side: str) -> None:
         shoulder, elbow, hand = (
-            self._at(f"{joint}_{side}") for joint in ("shoulder", "elbow", "hand")
+            self._joint_pixel(f"{joint}_{side}") for joint in ("shoulder", "elbow", "hand")
         )
         keeper = self.person.index in (0, TEAM)
-        self._limb(elbow, hand, 0.023, 0.018, self.kit.shirt if keeper else self.skin)
+        self._draw_limb(elbow, hand, 0.023, 0.018, self.kit.shirt if keeper else self.skin)
         if keeper:
-            self.patch.disc(hand, self._size(0.030), (230, 234, 236))
+            self.patch.disc(hand, self._pixels_of_share(0.030), (230, 234, 236))
         cuff = shoulder + 0.75 * (elbow - shoulder)
-        self._limb(cuff, elbow, 0.025, 0.023, self.skin)
+        self._draw_limb(cuff, elbow, 0.025, 0.023, self.skin)
         sleeve = self.kit.second if self.kit.pattern == "halves" else self.kit.shirt
-        self._limb(shoulder, cuff, 0.036, 0.034, sleeve)
+        self._draw_limb(shoulder, cuff, 0.036, 0.034, sleeve)
 
-    def _torso_and_head(self, number: int) -> None:
-        self._torso()
-        self._limb(self._at("hip_l"), self._at("hip_r"), 0.060, 0.060, self.kit.shorts)
+    def _draw_torso_and_head(self, number: int) -> None:
+        self._draw_torso()
+        self._draw_limb(
+            self._joint_pixel("hip_l"), self._joint_pixel("hip_r"), 0.060, 0.060, self.kit.shorts
+        )
         if number:
-            self._number(number)
-        neck, head = self._at("chest"), self._at("head")
-        self._limb(
+            self._draw_shirt_number(number)
+        neck, head = self._joint_pixel("chest"), self._joint_pixel("head")
+        self._draw_limb(
             neck + 0.42 * (head - neck), neck + 0.65 * (head - neck), 0.026, 0.026, self.skin
         )
-        self._head(head)
+        self._draw_head(head)
 
-    def _torso(self) -> None:
-        top, low = self._at("chest"), self._at("pelvis")
-        chest, waist = self._size(self._reach(0.108, 0.066)), self._size(self._reach(0.080, 0.058))
-        self.patch.capsule(top, low, chest * 0.92, waist, _dim(self.kit.shirt, 0.66))
+    def _draw_torso(self) -> None:
+        top, low = self._joint_pixel("chest"), self._joint_pixel("pelvis")
+        chest, waist = (
+            self._pixels_of_share(self._half_width_in_view(0.108, 0.066)),
+            self._pixels_of_share(self._half_width_in_view(0.080, 0.058)),
+        )
+        self.patch.capsule(top, low, chest * 0.92, waist, _dim_colour(self.kit.shirt, 0.66))
         # The shirt is a cylinder around the spine; each strip has its own light and colour.
         for left, right in pairwise(_TURNS):
             middle = (left + right) / 2
@@ -241,9 +250,9 @@ class _Painter:
             )
             quad = np.array([top, top, low, low]) + rim.T * [[chest], [chest], [waist], [waist]]
             colour = self._strip_colour(float(middle))
-            self.patch.polygon(quad, _dim(colour, float(light)))
+            self.patch.polygon(quad, _dim_colour(colour, float(light)))
 
-    def _reach(self, side: float, front: float) -> float:
+    def _half_width_in_view(self, side: float, front: float) -> float:
         return float(np.hypot(side * np.cos(self.person.turn), front * np.sin(self.person.turn)))
 
     def _strip_colour(self, angle: float) -> Colour:
@@ -254,37 +263,41 @@ class _Painter:
         }
         return kit.second if second.get(kit.pattern) else kit.shirt
 
-    def _number(self, number: int) -> None:
+    def _draw_shirt_number(self, number: int) -> None:
         """On the back, where it can be read."""
         facing_away = -float(np.cos(self.person.turn))
-        tall = self._size(0.15) * self.patch.fine
-        if facing_away < 0.45 or tall < 14 or self._size(0.15) < 7:
+        tall = self._pixels_of_share(0.15) * self.patch.fine
+        if facing_away < 0.45 or tall < 14 or self._pixels_of_share(0.15) < 7:
             return
         text, font = str(number), cv2.FONT_HERSHEY_DUPLEX
         (width, height), _ = cv2.getTextSize(text, font, 1.0, 2)
-        scale = min(tall / height, self._size(0.15) * facing_away * self.patch.fine / width)
+        scale = min(
+            tall / height, self._pixels_of_share(0.15) * facing_away * self.patch.fine / width
+        )
         bright = sum(self.kit.shirt) > 330 or self.kit.pattern == "stripes"
         ink = (30, 28, 28, 255) if bright else (240, 240, 240, 255)
-        center = self._at("chest") + 0.36 * (self._at("pelvis") - self._at("chest"))
+        center = self._joint_pixel("chest") + 0.36 * (
+            self._joint_pixel("pelvis") - self._joint_pixel("chest")
+        )
         x, y = self.patch.to_fine(center) / 16
         origin = (int(x - width * scale / 2), int(y + height * scale / 2))
         thick = max(1, round(scale * 3))
         cv2.putText(self.patch.pixels, text, origin, font, scale, ink, thick, cv2.LINE_AA)
 
-    def _head(self, head: FloatArray) -> None:
-        radius = self._size(0.056)
+    def _draw_head(self, head: FloatArray) -> None:
+        radius = self._pixels_of_share(0.056)
         toward = float(np.cos(self.person.turn))
         side = float(np.sin(self.person.turn))
-        self.patch.disc(head, radius, _dim(self.hair, 0.9))
+        self.patch.disc(head, radius, _dim_colour(self.hair, 0.9))
         if toward > -0.35:
             # The face: shifted the way the person looks, below the hair line.
             share = min(1.0, 0.62 + 0.4 * toward)
             face = head + np.array([-side * 0.42, 0.26]) * radius
-            self.patch.disc(face, radius * 0.84 * share, _dim(self.skin, 0.78))
+            self.patch.disc(face, radius * 0.84 * share, _dim_colour(self.skin, 0.78))
             lit = face + np.array([0.16 * self.lit_from, -0.06]) * radius
             self.patch.disc(lit, radius * 0.66 * share, self.skin)
 
 
-def _dim(colour: Colour, light: float) -> Colour:
+def _dim_colour(colour: Colour, light: float) -> Colour:
     b, g, r = (min(255.0, channel * light) for channel in colour)
     return b, g, r

@@ -22,8 +22,15 @@ from app.sample.look import Look
 from app.sample.patch import Image
 from app.sample.pose import pose_people
 from app.sample.props import draw_ball, draw_goal_posts, draw_net
-from app.sample.render import bowl_of, eye_of, gain_at, lit_from, noise_tiles, turf_of
-from app.sample.surface import shade
+from app.sample.render import (
+    light_direction_in_image,
+    light_gain_at,
+    noise_tiles,
+    shading_camera,
+    shading_grass,
+    shading_stadium,
+)
+from app.sample.surface import shade_frame
 from app.sample.views import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
 
 STRIP = 16
@@ -42,7 +49,9 @@ GRAIN = 0.9
 LEVEL = np.pi / 2
 
 
-def aimed(position: FloatArray, aims: FloatArray, focal: FloatArray, roll: float) -> list[Camera]:
+def aim_cameras(
+    position: FloatArray, aims: FloatArray, focal: FloatArray, roll: float
+) -> list[Camera]:
     """Cameras of one place that look at places in turn; the lens follows the zoom.
 
     Args:
@@ -84,13 +93,13 @@ class Backdrop:
     focal: float
     horizon: float
 
-    def seen_by(self, camera: Camera) -> Image:
+    def render_from(self, camera: Camera) -> Image:
         """What a camera at the place sees, shape (720, 1280, 3)."""
         rows, columns = (
             np.arange(-GRID, size + GRID, GRID) + GRID / 2 - 0.5 for size in (HEIGHT, WIDTH)
         )
         grid = np.stack(np.meshgrid(columns, rows), axis=-1)
-        pan, rise = _directions(camera, grid.reshape(-1, 2), self.pan)
+        pan, rise = _pixel_directions(camera, grid.reshape(-1, 2), self.pan)
         across, down = (
             cv2.resize(
                 part.reshape(grid.shape[:2]).astype(np.float32),
@@ -103,7 +112,9 @@ class Backdrop:
         )  # fmt: skip
 
 
-def _directions(camera: Camera, pixels: FloatArray, pan: float) -> tuple[FloatArray, FloatArray]:
+def _pixel_directions(
+    camera: Camera, pixels: FloatArray, pan: float
+) -> tuple[FloatArray, FloatArray]:
     """How far to the right of a pan the rays of pixels go, radians, and how far they fall a metre, both shape (N,)."""
     ray = camera.rays(pixels)
     ahead = ray[:, 0] * np.sin(pan) - ray[:, 1] * np.cos(pan)
@@ -118,7 +129,7 @@ def make_backdrop(cameras: Sequence[Camera], look: Look) -> Backdrop:
         [(x, y) for x in across for y in down if x in across[[0, -1]] or y in down[[0, -1]]]
     )
     middle = np.radians(cameras[len(cameras) // 2].pan_tilt_roll_degrees[0])
-    seen = [_directions(camera, rim, middle) for camera in [*cameras[::5], cameras[-1]]]
+    seen = [_pixel_directions(camera, rim, middle) for camera in [*cameras[::5], cameras[-1]]]
     pan, rise = (np.concatenate(part) for part in zip(*seen, strict=True))
     size = float(np.ptp(pan) * np.ptp(rise))
     focal = min(max(camera.focal_length[0] for camera in cameras), (MOST_PIXELS / size) ** 0.5)
@@ -132,10 +143,12 @@ def make_backdrop(cameras: Sequence[Camera], look: Look) -> Backdrop:
     background = np.empty((height, width), np.uint8)
     exposure, light = np.array(look.light.exposure), np.full((height, STRIP), 255, np.uint8)
     strip, behind = np.empty((height, STRIP, 3), np.uint8), np.empty((height, STRIP), np.uint8)
-    bowl = bowl_of(cameras[0], look)
+    bowl = shading_stadium(cameras[0], look)
     for left in range(0, width, STRIP):
-        eye = eye_of(_level(drawn, cameras[0], drawn.pan + (left + STRIP / 2) / focal, STRIP))
-        shade(strip, behind, light, exposure, eye, turf_of(look), bowl, *noise_tiles())
+        eye = shading_camera(
+            _level_camera(drawn, cameras[0], drawn.pan + (left + STRIP / 2) / focal, STRIP)
+        )
+        shade_frame(strip, behind, light, exposure, eye, shading_grass(look), bowl, *noise_tiles())
         columns = min(STRIP, width - left)
         drawn.image[:, left : left + columns] = strip[:, :columns]
         background[:, left : left + columns] = behind[:, :columns]
@@ -146,7 +159,7 @@ def make_backdrop(cameras: Sequence[Camera], look: Look) -> Backdrop:
     return drawn
 
 
-def _level(backdrop: Backdrop, camera: Camera, pan: float, width: int) -> Camera:
+def _level_camera(backdrop: Backdrop, camera: Camera, pan: float, width: int) -> Camera:
     """A level camera at the same place, whose rows are those of the cylinder where it looks."""
     return Camera(
         rotation=rotation_from_pan_tilt_roll(pan, LEVEL, 0.0),
@@ -171,7 +184,7 @@ def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: Look) -> N
     left = round((pan - backdrop.pan) * backdrop.focal - wide / 2)
     if left < 0 or left + wide > width or far < 10.0:
         return
-    flat = _level(backdrop, camera, pan, wide)
+    flat = _level_camera(backdrop, camera, pan, wide)
     angle = (np.arange(left, left + wide) / backdrop.focal + backdrop.pan - pan)[None]
     fall = (np.arange(height)[:, None] - backdrop.horizon) / np.cos(angle)
     there = np.tan(angle) * backdrop.focal + wide / 2 + np.zeros((height, 1))
@@ -191,31 +204,31 @@ def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: Look) -> N
     cv2.copyTo(np.asarray(cv2.remap(plane, *wanted, cv2.INTER_LINEAR)), there_too, area)
 
 
-def take(backdrop: Backdrop, camera: Camera, instant: Instant, look: Look) -> Image:
+def render_picture(backdrop: Backdrop, camera: Camera, instant: Instant, look: Look) -> Image:
     """A picture: blue green red, shape (720, 1280, 3), without noise and captions."""
-    image = backdrop.seen_by(camera)
+    image = backdrop.render_from(camera)
     people = people_in_view(camera, instant, pose_people(instant), image)
     for person in people:
-        _darken(image, camera, instant.feet[person.index], 0.42)
+        _draw_soft_shadow(image, camera, instant.feet[person.index], 0.42)
     if instant.ball[2] > -3.0:
-        _darken(image, camera, instant.ball[:2], 0.16)
-    side, gain = lit_from(camera, look), look.light.exposure
+        _draw_soft_shadow(image, camera, instant.ball[:2], 0.16)
+    side, gain = light_direction_in_image(camera, look), look.light.exposure
     depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
     is_drawn = depth < 0.5
     for person in sorted(people, key=lambda one: -float(one.depths.mean())):
         if not is_drawn and person.depths.mean() < depth:
-            draw_ball(image, camera, instant, gain_at(look, instant.ball[:2]), side)
+            draw_ball(image, camera, instant, light_gain_at(look, instant.ball[:2]), side)
             is_drawn = True
         if person.scale * person.height < TALL_PX:
             draw_distant_person(image, person, look, gain)
         else:
             draw_person(image, person, look, instant.numbers[person.index], gain, side)
     if not is_drawn:
-        draw_ball(image, camera, instant, gain_at(look, instant.ball[:2]), side)
+        draw_ball(image, camera, instant, light_gain_at(look, instant.ball[:2]), side)
     return image
 
 
-def hides(camera: Camera, instant: Instant) -> bool:
+def is_ball_hidden(camera: Camera, instant: Instant) -> bool:
     """Whether somebody stands between a camera and the ball."""
     toward = camera.position[:2] - instant.ball[:2]
     away = instant.feet - instant.ball[:2]
@@ -233,7 +246,7 @@ def hides(camera: Camera, instant: Instant) -> bool:
     )
 
 
-def _darken(image: Image, camera: Camera, place: FloatArray, radius: float) -> None:
+def _draw_soft_shadow(image: Image, camera: Camera, place: FloatArray, radius: float) -> None:
     """The soft shadow below somebody or something that stands at a place on the grass."""
     corners = place + radius * np.array([(-1.3, -0.8), (1.3, -0.8), (1.3, 0.8), (-1.3, 0.8)])
     pixels = camera.project(np.column_stack([corners, np.zeros(4)]))
@@ -244,26 +257,26 @@ def _darken(image: Image, camera: Camera, place: FloatArray, radius: float) -> N
     if (low < 0).any() or high[0] > columns or high[1] > rows or (high - low < 2).any():
         return
     area = image[low[1] : high[1], low[0] : high[0]]
-    light = cv2.resize(_shadow(), (high - low).tolist())
+    light = cv2.resize(_shadow_mask(), (high - low).tolist())
     area[...] = (area * light[..., None]).astype(np.uint8)
 
 
 @lru_cache(maxsize=1)
-def _shadow() -> FloatArray:
+def _shadow_mask() -> FloatArray:
     y, x = np.mgrid[-1:1:25j, -1:1:25j]
     return np.asarray(1.0 - 0.5 * np.clip(1.2 * (1 - np.hypot(x, y)), 0, 1))
 
 
 def add_grain(image: Image, number: int) -> Image:
     """The picture with the sensor's noise of a frame."""
-    lighter, darker = _grain()
+    lighter, darker = _grain_tiles()
     row, column = (number * 7919) % 61, (number * 104_729) % 67
     there = np.s_[row : row + HEIGHT, column : column + WIDTH]
     return np.asarray(cv2.subtract(cv2.add(image, lighter[there]), darker[there]), np.uint8)
 
 
 @lru_cache(maxsize=1)
-def _grain() -> tuple[Image, Image]:
+def _grain_tiles() -> tuple[Image, Image]:
     noise = np.random.default_rng(7).normal(0, GRAIN, (HEIGHT + 61, WIDTH + 67, 1)).round()
     both = [
         np.repeat(np.clip(sign * noise, 0, 255), 3, axis=2).astype(np.uint8) for sign in (1, -1)

@@ -59,7 +59,7 @@ def make_instant(rng: np.random.Generator, numbers: tuple[int, ...]) -> Instant:
     return Instant(
         ball=ball,
         spin=rng.normal(0, 1.4, 3),
-        feet=spread_people(feet),
+        feet=push_people_apart(feet),
         heading=heading,
         speed=speed,
         stride=rng.uniform(0, 2 * np.pi, PEOPLE),
@@ -77,7 +77,7 @@ def shirt_numbers(rng: np.random.Generator) -> tuple[int, ...]:
     return (*teams, 0)
 
 
-def later(instant: Instant, seconds: float, ball_shift: FloatArray) -> Instant:
+def advance_instant(instant: Instant, seconds: float, ball_shift: FloatArray) -> Instant:
     """The moment some seconds later (earlier if negative): everybody ran on, the ball moved.
 
     Args:
@@ -91,12 +91,12 @@ def later(instant: Instant, seconds: float, ball_shift: FloatArray) -> Instant:
         instant,
         ball=ball,
         spin=instant.spin + 0.7 * seconds,
-        feet=spread_people(feet),
+        feet=push_people_apart(feet),
         stride=instant.stride + 9.0 * seconds,
     )
 
 
-def clear_view(instant: Instant, cameras: FloatArray) -> Instant:
+def clear_lines_of_sight(instant: Instant, cameras: FloatArray) -> Instant:
     """The same moment with nobody between the ball and a camera, or inside the ball.
 
     Args:
@@ -104,11 +104,11 @@ def clear_view(instant: Instant, cameras: FloatArray) -> Instant:
     """
     feet = instant.feet.copy()
     for _ in range(3):
-        _step_aside(feet, instant.ball, cameras)
+        _move_people_aside(feet, instant.ball, cameras)
     return replace(instant, feet=feet)
 
 
-def _step_aside(feet: FloatArray, ball: FloatArray, cameras: FloatArray) -> None:
+def _move_people_aside(feet: FloatArray, ball: FloatArray, cameras: FloatArray) -> None:
     for camera in cameras:
         toward = camera - ball
         distance = float(np.hypot(toward[0], toward[1]))
@@ -166,7 +166,7 @@ def _place_people(rng: np.random.Generator, ball: FloatArray, attack: float) -> 
     return inside
 
 
-def spread_people(feet: FloatArray) -> FloatArray:
+def push_people_apart(feet: FloatArray) -> FloatArray:
     feet = feet.copy()
     for _ in range(4):
         offset = feet[:, None] - feet[None]

@@ -124,31 +124,31 @@ def make_look(index: int, seed: int, evening: bool) -> Look:
     """The look of match ``index``: neighbours differ in kits, grass and light."""
     rng = np.random.default_rng([seed, index, 0x100C])
     home, away = _PAIRS[(index + seed) % len(_PAIRS)]
-    keepers = [_far_from(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)]
-    referee = _far_from(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
+    keepers = [_colour_far_from(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)]
+    referee = _colour_far_from(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
     return Look(
         seed=int(rng.integers(1 << 31)),
         home=home,
         away=away,
-        home_keeper=_plain(keepers[0]),
-        away_keeper=_plain(keepers[1]),
+        home_keeper=_plain_outfit(keepers[0]),
+        away_keeper=_plain_outfit(keepers[1]),
         referee=Outfit(referee, _BLACK, _BLACK, _BLACK),
-        light=_light(rng, index, evening),
-        grass=_grass(rng, index),
-        stands=_stands(rng, home, away),
+        light=_make_light(rng, index, evening),
+        grass=_make_grass(rng, index),
+        stands=_make_stands(rng, home, away),
     )
 
 
-def _plain(colour: Colour) -> Outfit:
+def _plain_outfit(colour: Colour) -> Outfit:
     return Outfit(colour, _BLACK, colour, colour)
 
 
-def _far_from(choices: tuple[Colour, ...], taken: tuple[Colour, ...], skip: int) -> Colour:
+def _colour_far_from(choices: tuple[Colour, ...], taken: tuple[Colour, ...], skip: int) -> Colour:
     distances = [min(float(np.linalg.norm(np.subtract(c, t))) for t in taken) for c in choices]
     return choices[int(np.argsort(distances)[::-1][skip])]
 
 
-def _light(rng: np.random.Generator, index: int, evening: bool) -> Light:
+def _make_light(rng: np.random.Generator, index: int, evening: bool) -> Light:
     if evening:
         length = rng.uniform(0.9, 1.3)
         shifts = [(sx * length, sy * length * 0.8) for sx in (-1.0, 1.0) for sy in (-1.0, 1.0)]
@@ -179,7 +179,7 @@ def _light(rng: np.random.Generator, index: int, evening: bool) -> Light:
     )
 
 
-def _grass(rng: np.random.Generator, index: int) -> Grass:
+def _make_grass(rng: np.random.Generator, index: int) -> Grass:
     # Between a yellowish spring pitch and a deep blue-green one.
     tone = rng.uniform(0, 1)
     colour = (48.0 + 20 * tone, 124.0 - 8 * tone, 92.0 - 24 * tone)
@@ -191,7 +191,7 @@ def _grass(rng: np.random.Generator, index: int) -> Grass:
     )
 
 
-def _stands(rng: np.random.Generator, home: Outfit, away: Outfit) -> Stands:
+def _make_stands(rng: np.random.Generator, home: Outfit, away: Outfit) -> Stands:
     depth, rake = rng.uniform(15, 22), rng.uniform(0.50, 0.62)
     first_top = 1.6 + depth * rake
     second = rng.uniform(12, 18)

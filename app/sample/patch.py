@@ -47,11 +47,15 @@ class Patch:
 
     def polygon(self, points: FloatArray, colour: Colour) -> None:
         """Fill a convex polygon, image pixels, shape (N, 2)."""
-        cv2.fillConvexPoly(self.pixels, self.to_fine(points), _paint(colour, 1.0), 8, _SHIFT)
+        cv2.fillConvexPoly(
+            self.pixels, self.to_fine(points), _premultiplied_colour(colour, 1.0), 8, _SHIFT
+        )
 
     def disc(self, center: FloatArray, radius: float, colour: Colour) -> None:
         """Fill a circle; centre and radius in image pixels."""
-        self._disc(float(center[0]), float(center[1]), radius, _paint(colour, 1.0))
+        self._draw_disc(
+            float(center[0]), float(center[1]), radius, _premultiplied_colour(colour, 1.0)
+        )
 
     def capsule(
         self, a: FloatArray, b: FloatArray, radius_a: float, radius_b: float, colour: Colour
@@ -59,26 +63,26 @@ class Patch:
         """Fill a limb: two circles and what lies between them, image pixels."""
         # Plain numbers: a frame has thousands of limbs, and arrays of two are slow.
         ax, ay, bx, by = float(a[0]), float(a[1]), float(b[0]), float(b[1])
-        paint = _paint(colour, 1.0)
-        self._disc(ax, ay, radius_a, paint)
-        self._disc(bx, by, radius_b, paint)
+        paint = _premultiplied_colour(colour, 1.0)
+        self._draw_disc(ax, ay, radius_a, paint)
+        self._draw_disc(bx, by, radius_b, paint)
         length = math.hypot(bx - ax, by - ay)
         if length < 1e-6:
             return
         nx, ny = (ay - by) / length, (bx - ax) / length
         quad = [
-            self._fixed(ax + nx * radius_a, ay + ny * radius_a),
-            self._fixed(bx + nx * radius_b, by + ny * radius_b),
-            self._fixed(bx - nx * radius_b, by - ny * radius_b),
-            self._fixed(ax - nx * radius_a, ay - ny * radius_a),
+            self._to_fixed_point(ax + nx * radius_a, ay + ny * radius_a),
+            self._to_fixed_point(bx + nx * radius_b, by + ny * radius_b),
+            self._to_fixed_point(bx - nx * radius_b, by - ny * radius_b),
+            self._to_fixed_point(ax - nx * radius_a, ay - ny * radius_a),
         ]
         cv2.fillConvexPoly(self.pixels, np.array(quad, np.int32), paint, 8, _SHIFT)
 
-    def _disc(self, x: float, y: float, radius: float, paint: Paint) -> None:
+    def _draw_disc(self, x: float, y: float, radius: float, paint: Paint) -> None:
         size = max(1, round(radius * self.fine * _SUB))
-        cv2.circle(self.pixels, self._fixed(x, y), size, paint, -1, 8, _SHIFT)
+        cv2.circle(self.pixels, self._to_fixed_point(x, y), size, paint, -1, 8, _SHIFT)
 
-    def _fixed(self, x: float, y: float) -> tuple[int, int]:
+    def _to_fixed_point(self, x: float, y: float) -> tuple[int, int]:
         """As ``to_fine``, for one point."""
         return (
             round(((x - self.left + 0.5) * self.fine - 0.5) * _SUB),
@@ -88,9 +92,11 @@ class Patch:
     def polyline(self, points: FloatArray, colour: Colour, opacity: float, thickness: int) -> None:
         """A thin line through image pixels, ``thickness`` in enlarged pixels."""
         path = [self.to_fine(points).reshape(-1, 1, 2)]
-        cv2.polylines(self.pixels, path, False, _paint(colour, opacity), thickness, 8, _SHIFT)
+        cv2.polylines(
+            self.pixels, path, False, _premultiplied_colour(colour, opacity), thickness, 8, _SHIFT
+        )
 
-    def lay(self, gain: Colour = (1.0, 1.0, 1.0)) -> None:
+    def draw_on_frame(self, gain: Colour = (1.0, 1.0, 1.0)) -> None:
         """Put it on the frame.
 
         Args:
@@ -106,6 +112,6 @@ class Patch:
         area[...] = np.clip(mixed, 0, 255).astype(np.uint8)
 
 
-def _paint(colour: Colour, opacity: float) -> Paint:
+def _premultiplied_colour(colour: Colour, opacity: float) -> Paint:
     b, g, r = colour
     return b * opacity, g * opacity, r * opacity, 255.0 * opacity

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
-from app.sample.instant import BALL_DIAMETER, FORMATION, PEOPLE, TEAM, Instant, spread_people
+from app.sample.instant import BALL_DIAMETER, FORMATION, PEOPLE, TEAM, Instant, push_people_apart
 
 RADIUS = BALL_DIAMETER / 2
 GRAVITY, DRAG = 9.81, 0.012
@@ -132,31 +132,31 @@ def _play_ball(
             place += BALL_STEP * velocity
         if held and now >= until:
             held, kicked = False, step
-            velocity, until = _kick(place, now, rng)
+            velocity, until = _plan_pass(place, now, rng)
         elif (
             not held
             and place[2] < RADIUS + 0.08
             and (now >= until or (np.abs(place[:2]) > REACH + 3.0).any())
         ):
             held, until = True, now + rng.uniform(0.4, 1.6)
-            way = _target(now, rng) - place[:2]
+            way = _pass_target(now, rng) - place[:2]
             velocity = np.array([*(rng.uniform(0.5, 3.5) * way / np.linalg.norm(way)), 0.0])
             place[2] = RADIUS
             passes.append((kicked, step))
     return np.array(places), modes, passes
 
 
-def _target(now: float, rng: np.random.Generator) -> FloatArray:
+def _pass_target(now: float, rng: np.random.Generator) -> FloatArray:
     focus = ATTACK_M * np.sin(2 * np.pi * (now / ATTACK_SECONDS + 0.08))
     aim = np.array([focus, 0.0]) + rng.normal(0, (8.0, 12.0))
     return np.asarray(np.clip(aim, -REACH, REACH))
 
 
-def _kick(
+def _plan_pass(
     place: FloatArray, now: float, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:  # fmt: skip
     """Velocity of a pass, and when somebody may stop it."""
-    way = _target(now, rng) - place[:2]
+    way = _pass_target(now, rng) - place[:2]
     far = float(np.linalg.norm(way)) + 1e-6
     if far > 14.0 and rng.random() < 0.75:
         lasts = float(np.clip(far / 15.0, 1.0, 2.4))
@@ -173,14 +173,16 @@ def _run_people(
     steps = len(ball) // every
     phase, pace = rng.uniform(0, 2 * np.pi, (2, PEOPLE, 2)), rng.uniform(0.25, 0.6, (PEOPLE, 2))
     passes = [*passes, (len(ball), len(ball))]
-    feet = spread_people(_spots(ball[0, :2]))
+    feet = push_people_apart(_formation_positions(ball[0, :2]))
     velocity, smooth = np.zeros((PEOPLE, 2)), ball[0, :2].copy()
     turn, receiver = 0, 0
     all_feet, all_velocity = np.empty((2, steps, PEOPLE, 2))
     for step in range(steps):
         at, now = step * every, step * PEOPLE_STEP
         smooth += PEOPLE_STEP / 1.2 * (ball[at, :2] - smooth)
-        wanted = _spots(smooth) + 2.2 * np.sin(phase[0] + pace * now) * np.cos(phase[1])
+        wanted = _formation_positions(smooth) + 2.2 * np.sin(phase[0] + pace * now) * np.cos(
+            phase[1]
+        )
         caps = np.full(PEOPLE, RUN)
         while at >= passes[turn + 1][0] if turn + 1 < len(passes) else False:
             turn += 1
@@ -197,12 +199,12 @@ def _run_people(
         pull = (wanted - feet) / 0.7
         pull *= np.minimum(1.0, caps / np.maximum(np.linalg.norm(pull, axis=1), 1e-9))[:, None]
         velocity += PEOPLE_STEP / 0.35 * (pull - velocity)
-        feet = spread_people(feet + PEOPLE_STEP * velocity)
+        feet = push_people_apart(feet + PEOPLE_STEP * velocity)
         all_feet[step], all_velocity[step] = feet, velocity
     return all_feet, all_velocity
 
 
-def _spots(ball: FloatArray) -> FloatArray:
+def _formation_positions(ball: FloatArray) -> FloatArray:
     """Where people would stand for a ball there, shape (23, 2)."""
     focus = ball * (0.72, 0.35)
     teams = [

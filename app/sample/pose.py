@@ -48,18 +48,20 @@ def pose_people(instant: Instant) -> Pose:
     local = np.zeros((len(effort), len(JOINTS), 3))  # forward, left, up; share of height
     lean = 0.04 + 0.20 * effort
     chest_up = np.array([0.29])
-    _put(local, "pelvis", 0 * lean, 0.0, 0.51)
-    _put(local, "chest", np.sin(lean) * chest_up, 0.0, 0.51 + np.cos(lean) * chest_up)
-    _put(local, "head", np.sin(lean) * 0.43, 0.0, 0.51 + np.cos(lean) * 0.42)
+    _set_joint(local, "pelvis", 0 * lean, 0.0, 0.51)
+    _set_joint(local, "chest", np.sin(lean) * chest_up, 0.0, 0.51 + np.cos(lean) * chest_up)
+    _set_joint(local, "head", np.sin(lean) * 0.43, 0.0, 0.51 + np.cos(lean) * 0.42)
     for side, sign in (("l", 1.0), ("r", -1.0)):
-        _leg(local, side, sign, effort, instant.stride)
-        _arm(local, side, sign, effort, instant.stride, lean)
+        _place_leg_joints(local, side, sign, effort, instant.stride)
+        _place_arm_joints(local, side, sign, effort, instant.stride, lean)
     lowest = np.minimum(local[:, INDEX["ankle_l"], 2], local[:, INDEX["ankle_r"], 2])
     local[:, :, 2] += (0.035 - lowest)[:, None]
-    return Pose(_to_pitch(local, instant))
+    return Pose(_to_pitch_frame(local, instant))
 
 
-def _leg(local: FloatArray, side: str, sign: float, effort: FloatArray, stride: FloatArray) -> None:
+def _place_leg_joints(
+    local: FloatArray, side: str, sign: float, effort: FloatArray, stride: FloatArray
+) -> None:
     phase = stride + (0.0 if sign > 0 else np.pi)
     thigh = effort * 0.85 * np.sin(phase) + 0.06
     bend = 0.10 + effort * (0.55 + 0.85 * np.cos(phase))
@@ -68,11 +70,11 @@ def _leg(local: FloatArray, side: str, sign: float, effort: FloatArray, stride: 
     shin = thigh - np.clip(bend, 0.03, 1.9)
     ankle_f, ankle_u = knee_f + 0.235 * np.sin(shin), knee_u - 0.235 * np.cos(shin)
     spread = (0.060 + 0.03 * (1 - effort)) * sign
-    _put(local, f"hip_{side}", hip[0], hip[1], hip[2])
-    _put(local, f"knee_{side}", knee_f, (hip[1] + spread) / 2, knee_u)
-    _put(local, f"ankle_{side}", ankle_f, spread, ankle_u)
+    _set_joint(local, f"hip_{side}", hip[0], hip[1], hip[2])
+    _set_joint(local, f"knee_{side}", knee_f, (hip[1] + spread) / 2, knee_u)
+    _set_joint(local, f"ankle_{side}", ankle_f, spread, ankle_u)
     foot = np.clip(shin, -1.2, 0.3)
-    _put(
+    _set_joint(
         local,
         f"toe_{side}",
         ankle_f + 0.095 * np.cos(foot),
@@ -81,7 +83,7 @@ def _leg(local: FloatArray, side: str, sign: float, effort: FloatArray, stride: 
     )
 
 
-def _arm(
+def _place_arm_joints(
     local: FloatArray, side: str, sign: float, effort: FloatArray, stride: FloatArray, lean: FloatArray
 ) -> None:  # fmt: skip
     swing = -effort * 0.8 * np.sin(stride + (0.0 if sign > 0 else np.pi))
@@ -89,12 +91,12 @@ def _arm(
     top_f, top_u = np.sin(lean) * 0.275, 0.51 + np.cos(lean) * 0.285
     elbow_f, elbow_u = top_f + 0.165 * np.sin(swing), top_u - 0.165 * np.cos(swing)
     hand_f, hand_u = elbow_f + 0.15 * np.sin(swing + bend), elbow_u - 0.15 * np.cos(swing + bend)
-    _put(local, f"shoulder_{side}", top_f, 0.098 * sign, top_u)
-    _put(local, f"elbow_{side}", elbow_f, 0.140 * sign, elbow_u)
-    _put(local, f"hand_{side}", hand_f, 0.130 * sign, hand_u)
+    _set_joint(local, f"shoulder_{side}", top_f, 0.098 * sign, top_u)
+    _set_joint(local, f"elbow_{side}", elbow_f, 0.140 * sign, elbow_u)
+    _set_joint(local, f"hand_{side}", hand_f, 0.130 * sign, hand_u)
 
 
-def _put(
+def _set_joint(
     local: FloatArray,
     joint: str,
     forward: FloatArray | float,
@@ -105,7 +107,7 @@ def _put(
     local[:, index, 0], local[:, index, 1], local[:, index, 2] = forward, left, up
 
 
-def _to_pitch(local: FloatArray, instant: Instant) -> FloatArray:
+def _to_pitch_frame(local: FloatArray, instant: Instant) -> FloatArray:
     scaled = local * instant.height[:, None, None]
     cosine, sine = np.cos(instant.heading)[:, None], np.sin(instant.heading)[:, None]
     # z points down, so left of somebody who faces +x is -y.

@@ -62,7 +62,7 @@ LESSONS = (
 def make_practice() -> list[Scene]:
     """The scenes of all lessons, in their order."""
     stage = practice_stage()
-    return [make_scene(stage, lesson.number, _plan(lesson)) for lesson in LESSONS]
+    return [make_scene(stage, lesson.number, _fault_plan_of_lesson(lesson)) for lesson in LESSONS]
 
 
 def practice_stage() -> Stage:
@@ -70,7 +70,7 @@ def practice_stage() -> Stage:
     return make_stage(0, MATCH_GROUPS, SEED)
 
 
-def _plan(lesson: Lesson) -> FaultPlan | None:
+def _fault_plan_of_lesson(lesson: Lesson) -> FaultPlan | None:
     if lesson.kind == CLEAN:
         return None
     return FaultPlan(lesson.kind, lesson.view, lesson.seed)

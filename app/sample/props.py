@@ -23,10 +23,10 @@ WHITE: Colour = (238.0, 240.0, 240.0)
 
 def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     """The net of the goal at x = ``sign`` * 52.5 m."""
-    strands = _strands(sign)
+    strands = _net_cords(sign)
     everything = camera.project(np.vstack(strands))
     scale = _pixels_per_metre(camera, sign)
-    if scale is None or np.isnan(everything).any() or not _in_frame(everything, image):
+    if scale is None or np.isnan(everything).any() or not _is_in_frame(everything, image):
         return
     patch = Patch(everything.min(axis=0) - 2, everything.max(axis=0) + 2, 2, image)
     if patch.is_empty:
@@ -37,11 +37,11 @@ def draw_net(image: Image, camera: Camera, sign: float, gain: Colour) -> None:
     ends = np.cumsum([len(strand) for strand in strands])
     for path in np.split(everything, ends[:-1]):
         patch.polyline(path, WHITE, opacity, max(1, round(wide)))
-    patch.lay(gain)
+    patch.draw_on_frame(gain)
 
 
 @lru_cache(maxsize=2)
-def _strands(sign: float) -> list[FloatArray]:
+def _net_cords(sign: float) -> list[FloatArray]:
     """Cords of the net: across the back, over the roof and down, and on both sides."""
     half = GOAL_WIDTH / 2
     profile = np.array(
@@ -49,25 +49,25 @@ def _strands(sign: float) -> list[FloatArray]:
     )
     cords = []
     for y in np.linspace(-half, half, round(GOAL_WIDTH / MESH) + 1):
-        cords.append(_on_goal(sign, profile, y))
+        cords.append(_goal_points(sign, profile, y))
     lengths = np.hypot(*np.diff(profile, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     for s in np.arange(MESH, along[-1], MESH):
         depth, up = (np.interp(s, along, profile[:, axis]) for axis in (0, 1))
         sag = 0.05 * np.sin(np.linspace(0, np.pi, 7))
         row = np.column_stack([depth + sag, np.full(7, up)])
-        cords.append(_on_goal(sign, row, np.linspace(-half, half, 7)))
+        cords.append(_goal_points(sign, row, np.linspace(-half, half, 7)))
     for y in (-half, half):
         for up in np.arange(0.0, GOAL_HEIGHT, MESH):
             end = NET_DEPTH_LOW + (NET_DEPTH_TOP - NET_DEPTH_LOW) * up / GOAL_HEIGHT
-            cords.append(_on_goal(sign, np.array([(0.0, up), (end, up)]), y))
+            cords.append(_goal_points(sign, np.array([(0.0, up), (end, up)]), y))
         for depth in np.arange(MESH, NET_DEPTH_LOW, MESH):
             top = GOAL_HEIGHT * min(1.0, (NET_DEPTH_LOW - depth) / (NET_DEPTH_LOW - NET_DEPTH_TOP))
-            cords.append(_on_goal(sign, np.array([(depth, 0.0), (depth, top)]), y))
+            cords.append(_goal_points(sign, np.array([(depth, 0.0), (depth, top)]), y))
     return cords
 
 
-def _on_goal(sign: float, profile: FloatArray, y: FloatArray | float) -> FloatArray:
+def _goal_points(sign: float, profile: FloatArray, y: FloatArray | float) -> FloatArray:
     x = sign * (HALF_LENGTH + profile[:, 0])
     return np.column_stack([x, np.broadcast_to(y, x.shape), -profile[:, 1]])
 
@@ -80,7 +80,7 @@ def draw_goal_posts(image: Image, camera: Camera, sign: float, gain: Colour) -> 
     bars = [np.column_stack([np.full(9, sign * HALF_LENGTH), p[:, 0], -p[:, 1]]) for p in pieces]
     pixels = [camera.project(bar) for bar in bars]
     everything = np.vstack(pixels)
-    if np.isnan(everything).any() or not _in_frame(everything, image):
+    if np.isnan(everything).any() or not _is_in_frame(everything, image):
         return
     depths = [camera.pitch_to_camera(bar)[:, 2] for bar in bars]
     radii = [POST_RADIUS * camera.focal_length[0] / depth for depth in depths]
@@ -99,7 +99,7 @@ def draw_goal_posts(image: Image, camera: Camera, sign: float, gain: Colour) -> 
                     radius[i + 1] * share,
                     colour,
                 )
-    patch.lay(gain)
+    patch.draw_on_frame(gain)
 
 
 def draw_ball(
@@ -123,8 +123,8 @@ def draw_ball(
     xs = (np.arange(left, right)[:, None] + offsets).ravel()
     ys = (np.arange(top, bottom)[:, None] + offsets).ravel()
     grid = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
-    hit, normals = _meet_sphere(camera, grid, instant.ball, radius)
-    colour = _leather(camera, normals, instant.spin, lit_from) * np.array(gain)
+    hit, normals = _intersect_sphere(camera, grid, instant.ball, radius)
+    colour = _ball_colours(camera, normals, instant.spin, lit_from) * np.array(gain)
     shape = (bottom - top, fine, right - left, fine)
     cover = hit.reshape(shape).mean(axis=(1, 3))[..., None]
     summed = (colour * hit[:, None]).reshape(*shape, 3).mean(axis=(1, 3))
@@ -132,7 +132,7 @@ def draw_ball(
     area[...] = np.clip(area * (1 - cover) + summed, 0, 255).astype(np.uint8)
 
 
-def _meet_sphere(
+def _intersect_sphere(
     camera: Camera, pixels: FloatArray, center: FloatArray, radius: float
 ) -> tuple[FloatArray, FloatArray]:
     """1 where the ray of a pixel meets the sphere, and the normal there."""
@@ -147,7 +147,9 @@ def _meet_sphere(
     return hit.astype(np.float64), normals
 
 
-def _leather(camera: Camera, normals: FloatArray, spin: FloatArray, lit_from: float) -> FloatArray:
+def _ball_colours(
+    camera: Camera, normals: FloatArray, spin: FloatArray, lit_from: float
+) -> FloatArray:
     """White with dark pentagons at the corners of an icosahedron, lit from above."""
     golden = (1 + 5**0.5) / 2
     corners = np.array(
@@ -173,7 +175,7 @@ def _pixels_per_metre(camera: Camera, sign: float) -> float | None:
     return camera.focal_length[0] / depth if depth > 0.5 else None
 
 
-def _in_frame(pixels: FloatArray, image: Image) -> bool:
+def _is_in_frame(pixels: FloatArray, image: Image) -> bool:
     rows, columns = image.shape[:2]
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     return bool((high > -20).all() and low[0] < columns + 20 and low[1] < rows + 20)

@@ -24,14 +24,21 @@ from app.formats.camera_json import camera_to_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.progress import ReportProgress
-from app.sample.film import Backdrop, add_grain, aimed, hides, make_backdrop, take
+from app.sample.film import (
+    Backdrop,
+    add_grain,
+    aim_cameras,
+    is_ball_hidden,
+    make_backdrop,
+    render_picture,
+)
 from app.sample.fixture import make_fixture
 from app.sample.instant import BALL_DIAMETER, TEAM, shirt_numbers
 from app.sample.order import RECORDING_SECONDS, SEED, SHORTEST_RECORDING
 from app.sample.patch import Image
 from app.sample.play import Play, make_play
 from app.sample.scoreboard import draw_scoreboard
-from app.sample.views import HEIGHT, WIDTH, inside
+from app.sample.views import HEIGHT, WIDTH, is_inside_image
 
 FPS, REPLAY_FPS = 25, 50
 """Of the video and of the main camera; of the cameras of replays."""
@@ -50,7 +57,7 @@ EnteredBy = Literal["start", "cut", "dissolve", "wipe"]
 
 
 @dataclass(frozen=True)
-class Part:
+class ShotPlan:
     """One shot of a recording.
 
     Attributes:
@@ -71,16 +78,16 @@ class Part:
 
 
 PARTS = (
-    Part("main", 27, "start"), Part("closeup", 5), Part("main", 26),
-    Part("replay", 11, "wipe", 0.5, 0), Part("main", 24, "wipe"),
-    Part("other", 4), Part("main", 25, "dissolve"),
-    Part("replay", 13, "wipe", 0.25, 1), Part("main", 24, "wipe"),
-    Part("closeup", 5), Part("main", 16),
+    ShotPlan("main", 27, "start"), ShotPlan("closeup", 5), ShotPlan("main", 26),
+    ShotPlan("replay", 11, "wipe", 0.5, 0), ShotPlan("main", 24, "wipe"),
+    ShotPlan("other", 4), ShotPlan("main", 25, "dissolve"),
+    ShotPlan("replay", 13, "wipe", 0.25, 1), ShotPlan("main", 24, "wipe"),
+    ShotPlan("closeup", 5), ShotPlan("main", 16),
 )  # fmt: skip
 """Three minutes."""
 
 
-def parts_of(seconds: float) -> list[Part]:
+def plan_shots(seconds: float) -> list[ShotPlan]:
     """What a recording of so many seconds shows: ``PARTS``, shorter or longer and several times.
 
     Raises:
@@ -91,21 +98,22 @@ def parts_of(seconds: float) -> list[Part]:
     times = max(1, round(seconds / RECORDING_SECONDS))
     scale = seconds / (times * RECORDING_SECONDS)
     parts = [
-        Part(p.kind, p.seconds * scale, p.entered_by, p.speed, p.stand, p.between) for p in PARTS
+        ShotPlan(p.kind, p.seconds * scale, p.entered_by, p.speed, p.stand, p.between)
+        for p in PARTS
     ]
-    again = [Part("main", parts[0].seconds), *parts[1:]]
+    again = [ShotPlan("main", parts[0].seconds), *parts[1:]]
     return parts + again * (times - 1)
 
 
 @dataclass(frozen=True, eq=False)
-class _Taken:
+class _FilmedShot:
     """A shot with its cameras: picture k of its camera is taken ``start + k / rate`` seconds after play began.
 
     ``first`` and ``last`` are the frames of the video that show it alone, ``begin`` the one that would
     show picture 0. ``source`` is the number of the live shot that a replay shows again.
     """
 
-    part: Part
+    part: ShotPlan
     number: int
     first: int
     last: int
@@ -152,7 +160,7 @@ def write_recording(
     out: Path,
     seconds: float = RECORDING_SECONDS,
     seed: int = SEED,
-    parts: Sequence[Part] | None = None,
+    parts: Sequence[ShotPlan] | None = None,
     since: float = 0.0,
     progress: ReportProgress | None = None,
 ) -> RecordingReport:
@@ -173,7 +181,7 @@ def write_recording(
     """
     if out.suffix.lower() not in (".mp4", ".avi", ".mkv"):
         raise InputError(f"{out.name} has no ending of a video", hint="Name it like film.mp4.")
-    play, shots = _planned(list(parts) if parts else parts_of(seconds), seed, since)
+    play, shots = _plan_recording(list(parts) if parts else plan_shots(seconds), seed, since)
     total = shots[-1].last + 1
     out.parent.mkdir(parents=True, exist_ok=True)
     part, truth = out.with_name(f".{out.stem}{PARTIAL}{out.suffix}"), out.with_suffix(".json")
@@ -181,12 +189,12 @@ def write_recording(
         video = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*"mp4v"), FPS, (WIDTH, HEIGHT))
         if not video.isOpened():
             raise InputError(f"no video can be written to {out.parent}")
-        for number, image in enumerate(_pictures(shots, play, seed)):
+        for number, image in enumerate(_render_frames(shots, play, seed)):
             video.write(image)
             if progress is not None:
                 progress(number + 1, total)
         video.release()
-        text = json_text(_truth(play, shots, since), compact=True)
+        text = json_text(_recording_truth(play, shots, since), compact=True)
         truth.write_text(text + "\n", encoding="utf-8")
         part.replace(out)
     finally:
@@ -194,7 +202,9 @@ def write_recording(
     return RecordingReport(str(out), str(truth), total, total / FPS, len(shots))
 
 
-def _planned(parts: list[Part], seed: int, since: float) -> tuple[Play, list[_Taken]]:
+def _plan_recording(
+    parts: list[ShotPlan], seed: int, since: float
+) -> tuple[Play, list[_FilmedShot]]:
     """The play of a recording, and the shots that show it."""
     bounds = [round(FPS * end) for end in accumulate((p.seconds for p in parts), initial=0.0)]
     soft = [*(SOFT.get(part.entered_by, 0) for part in parts), 0]
@@ -212,7 +222,7 @@ def _planned(parts: list[Part], seed: int, since: float) -> tuple[Play, list[_Ta
             if live is None:
                 raise InputError(f"shot {number + 1} replays, and no live shot is before it")
             source = live[0]
-            start = _liveliest(play, *live[1:], part.seconds * part.speed)
+            start = _start_of_liveliest_stretch(play, *live[1:], part.seconds * part.speed)
         elif part.kind == "main":
             live = number, since + first / FPS, since + last / FPS
         low, high = begin - soft[number] // 2, end + soft[number + 1] // 2
@@ -220,12 +230,14 @@ def _planned(parts: list[Part], seed: int, since: float) -> tuple[Play, list[_Ta
             math.floor((frame - begin) * part.speed * rate / FPS) for frame in (low, high)
         )
         times = start + np.arange(lowest, highest + 2) / rate
-        cameras = _cameras(part, play, times)
-        shots.append(_Taken(part, number, first, last, begin, start, rate, lowest, cameras, source))
+        cameras = _cameras_of_shot(part, play, times)
+        shots.append(
+            _FilmedShot(part, number, first, last, begin, start, rate, lowest, cameras, source)
+        )
     return play, shots
 
 
-def _liveliest(play: Play, first: float, last: float, length: float) -> float:
+def _start_of_liveliest_stretch(play: Play, first: float, last: float, length: float) -> float:
     """When a replay begins: the stretch of a live shot in which the ball goes farthest, heights above all."""
     if length > last - first:
         raise InputError("a replay is longer than the live shot before it")
@@ -238,18 +250,18 @@ def _liveliest(play: Play, first: float, last: float, length: float) -> float:
     return float(starts[np.argmax(covered)]) + (0.007 if length < last - first - 0.1 else 0.0)
 
 
-def _cameras(part: Part, play: Play, times: FloatArray) -> list[Camera]:
+def _cameras_of_shot(part: ShotPlan, play: Play, times: FloatArray) -> list[Camera]:
     """The cameras of a shot at times."""
     if part.kind == "main":
-        return _following(play, times, MAIN, 0.7, 1650.0, 0.004)
+        return _cameras_following_ball(play, times, MAIN, 0.7, 1650.0, 0.004)
     if part.kind == "replay":
-        return _following(play, times, STANDS[part.stand], 0.45, 2300.0, -0.006)
+        return _cameras_following_ball(play, times, STANDS[part.stand], 0.45, 2300.0, -0.006)
     if part.kind == "other":
         across = np.linspace(-9.0, 9.0, len(times)) + 0.2 * (times[0] % 60)
         aims = np.column_stack(
             [across, np.full((len(times), 1), -50.0), np.full((len(times), 1), -13.0)]
         )
-        return aimed(MAIN, aims, np.full(len(times), CROWD_FOCAL), 0.0)  # fmt: skip
+        return aim_cameras(MAIN, aims, np.full(len(times), CROWD_FOCAL), 0.0)  # fmt: skip
     instants = [play.at(time) for time in times]
     # Somebody who stands where few lines are: a camera cannot be told from what is seen.
     outfield = np.r_[1:TEAM, TEAM + 1 : 2 * TEAM]
@@ -260,37 +272,39 @@ def _cameras(part: Part, play: Play, times: FloatArray) -> list[Camera]:
     )
     who = outfield[int(np.argmin(lonely))]
     feet = np.array([instant.feet[who] for instant in instants])
-    aims = np.column_stack([_smoothed(feet, times, 0.3), np.full(len(times), -1.05)])
-    return aimed(MAIN, aims, np.full(len(times), CLOSEUP_FOCAL), 0.0)
+    aims = np.column_stack([_smooth_over_time(feet, times, 0.3), np.full(len(times), -1.05)])
+    return aim_cameras(MAIN, aims, np.full(len(times), CLOSEUP_FOCAL), 0.0)
 
 
-def _following(
+def _cameras_following_ball(
     play: Play, times: FloatArray, position: FloatArray, late: float, focal: float, roll: float
 ) -> list[Camera]:
     """Cameras that follow the ball, smoothly and a little late, and zoom in where play is near a goal."""
     step = times[1] - times[0]
     margin = round(4 * late / step)
     wide = times[0] + step * np.arange(-margin, len(times) + margin)
-    ball = _smoothed(play.ball_at(np.maximum(wide - 0.25 * late, 0.0))[:, :2], wide, late)
+    ball = _smooth_over_time(play.ball_at(np.maximum(wide - 0.25 * late, 0.0))[:, :2], wide, late)
     end = np.abs(ball[:, 0]) / 45.0
     zoom = 0.42 * np.minimum(end, 1.0) ** 2 + 0.05 * np.sin(2 * np.pi * wide / 17.0)
     seen = np.s_[margin : margin + len(times)]
     # Operators keep the middle of the pitch in the picture, and the ball out of its middle.
     aims = np.column_stack([ball[seen] * (0.93, 0.62), np.zeros(len(times))])
     far = float(np.hypot(*position[:2])) / 64.0
-    return aimed(position, aims, focal * far * np.exp(_smoothed(zoom, wide, 1.0)[seen]), roll)
+    return aim_cameras(
+        position, aims, focal * far * np.exp(_smooth_over_time(zoom, wide, 1.0)[seen]), roll
+    )
 
 
-def _smoothed(values: FloatArray, times: FloatArray, seconds: float) -> FloatArray:
+def _smooth_over_time(values: FloatArray, times: FloatArray, seconds: float) -> FloatArray:
     """Values over time as somebody follows them, of the same shape."""
     step = times[1] - times[0]
     return np.asarray(gaussian_filter1d(values, seconds / step, axis=0, mode="nearest"))
 
 
-class _Camera:
+class _ShotRenderer:
     """Takes the pictures of one shot."""
 
-    def __init__(self, shot: _Taken, play: Play, backdrop: Backdrop, seed: int) -> None:
+    def __init__(self, shot: _FilmedShot, play: Play, backdrop: Backdrop, seed: int) -> None:
         self.shot, self._play, self._backdrop = shot, play, backdrop
         self._fixture = make_fixture(MATCH, seed)
         self._kept: dict[int, Image] = {}
@@ -300,24 +314,26 @@ class _Camera:
         picture, is_mix = self.shot.shown(number)
         low = math.floor(picture)
         if not is_mix:
-            return self._captioned(self._taken(low), picture)
+            return self._add_caption(self._render_picture(low), picture)
         share = picture - low
-        both = self._taken(low), self._taken(low + 1)
+        both = self._render_picture(low), self._render_picture(low + 1)
         mixed = np.asarray(cv2.addWeighted(both[0], 1 - share, both[1], share, 0), np.uint8)
-        return self._captioned(mixed, picture)
+        return self._add_caption(mixed, picture)
 
-    def _taken(self, picture: int) -> Image:
+    def _render_picture(self, picture: int) -> Image:
         found = self._kept.get(picture)
         if found is None:
             shot = self.shot
             instant = self._play.at(max(shot.seconds(picture), 0.0))
-            image = take(self._backdrop, shot.camera(picture), instant, self._fixture.look)
+            image = render_picture(
+                self._backdrop, shot.camera(picture), instant, self._fixture.look
+            )
             found = add_grain(image, shot.number * 1009 + picture)
             self._kept = {k: v for k, v in self._kept.items() if k == picture - 1}
             self._kept[picture] = found
         return found
 
-    def _captioned(self, image: Image, picture: float) -> Image:
+    def _add_caption(self, image: Image, picture: float) -> Image:
         kind = self.shot.part.kind
         if kind not in ("main", "replay"):
             return image
@@ -328,24 +344,24 @@ class _Camera:
         return image
 
 
-def _pictures(shots: list[_Taken], play: Play, seed: int) -> Iterator[Image]:
+def _render_frames(shots: list[_FilmedShot], play: Play, seed: int) -> Iterator[Image]:
     """All frames of the video, in their order."""
     look = make_fixture(MATCH, seed).look
     main = [camera for shot in shots if shot.part.kind == "main" for camera in shot.cameras]
     shared = make_backdrop(main, look) if main else None
 
-    def camera_of(shot: _Taken) -> _Camera:
+    def renderer_of(shot: _FilmedShot) -> _ShotRenderer:
         known = shared if shot.part.kind == "main" else None
-        return _Camera(shot, play, known or make_backdrop(shot.cameras, look), seed)
+        return _ShotRenderer(shot, play, known or make_backdrop(shot.cameras, look), seed)
 
-    at, frame = camera_of(shots[0]), 0
+    at, frame = renderer_of(shots[0]), 0
     for shot, follower in pairwise([*shots, None]):
         assert shot is not None
         for frame in range(shot.first, shot.last + 1):
             yield at.frame(frame)
         if follower is None:
             return
-        following = camera_of(follower)
+        following = renderer_of(follower)
         length = follower.first - shot.last - 1
         for number in range(length):
             share = (number + 1) / (length + 1)
@@ -384,7 +400,7 @@ def draw_logo(picture: Image, share: float, turn: int = 0) -> Image:
     return picture
 
 
-def _truth(play: Play, shots: list[_Taken], since: float) -> dict[str, Any]:
+def _recording_truth(play: Play, shots: list[_FilmedShot], since: float) -> dict[str, Any]:
     """What is true of a recording, as JSON; times are seconds after its first frame."""
     frames, links = [], []
     for shot in shots:
@@ -409,14 +425,14 @@ def _truth(play: Play, shots: list[_Taken], since: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _frame_truth(play: Play, shot: _Taken, frame: int) -> dict[str, Any]:
+def _frame_truth(play: Play, shot: _FilmedShot, frame: int) -> dict[str, Any]:
     picture, is_mix = shot.shown(frame)
     low = math.floor(picture)
     seconds = max(shot.seconds(picture), 0.0)
     camera, instant = shot.camera(low), play.at(seconds)
     pixel = camera.project(instant.ball[None])[0]
     depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
-    in_view = bool(inside(pixel[None])[0]) and depth > 0
+    in_view = bool(is_inside_image(pixel[None])[0]) and depth > 0
     before = shot.shown(frame - 1)
     return {
         "frame": frame,
@@ -429,5 +445,5 @@ def _frame_truth(play: Play, shot: _Taken, frame: int) -> dict[str, Any]:
         "mode": play.mode_at(seconds),
         "pixel": pixel.tolist() if in_view else None,
         "diameter_px": BALL_DIAMETER * camera.focal_length[0] / depth if in_view else None,
-        "hidden": in_view and hides(camera, instant),
+        "hidden": in_view and is_ball_hidden(camera, instant),
     }

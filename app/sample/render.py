@@ -20,7 +20,14 @@ from app.sample.pose import INDEX, LIMBS, Pose, pose_people
 from app.sample.props import draw_ball, draw_goal_posts, draw_net
 from app.sample.scene import Scene
 from app.sample.scoreboard import draw_scoreboard
-from app.sample.surface import BOARD_HEIGHT, TILE, Bowl, Eye, Turf, shade
+from app.sample.surface import (
+    BOARD_HEIGHT,
+    TILE,
+    ShadingCamera,
+    ShadingGrass,
+    ShadingStadium,
+    shade_frame,
+)
 from app.sample.views import HEIGHT, WIDTH
 
 Tile = npt.NDArray[np.float32]
@@ -51,21 +58,22 @@ def noise_tiles() -> tuple[Tile, Tile]:
     """Wrapping noise with unit spread: broad patches, and blades of grass."""
     rng = np.random.default_rng(20_260_101)
     coarse = sum(
-        weight * _smooth(rng, sigma) for sigma, weight in ((24.0, 0.6), (9.0, 0.5), (3.0, 0.6))
+        weight * _smooth_noise(rng, sigma)
+        for sigma, weight in ((24.0, 0.6), (9.0, 0.5), (3.0, 0.6))
     )
-    fine = 0.8 * _smooth(rng, 0.8) + 0.5 * _smooth(rng, 2.2)
-    return _unit(np.asarray(coarse)), _unit(np.asarray(fine))
+    fine = 0.8 * _smooth_noise(rng, 0.8) + 0.5 * _smooth_noise(rng, 2.2)
+    return _to_unit_spread(np.asarray(coarse)), _to_unit_spread(np.asarray(fine))
 
 
-def _smooth(rng: np.random.Generator, sigma: float) -> Tile:
+def _smooth_noise(rng: np.random.Generator, sigma: float) -> Tile:
     noise = rng.standard_normal((TILE, TILE)).astype(np.float32)
     margin = int(4 * sigma) + 1
     wrapped = np.pad(noise, margin, mode="wrap")
     blurred = cv2.GaussianBlur(wrapped, (0, 0), sigma)[margin:-margin, margin:-margin]
-    return _unit(blurred)
+    return _to_unit_spread(blurred)
 
 
-def _unit(tile: npt.NDArray[Any]) -> Tile:
+def _to_unit_spread(tile: npt.NDArray[Any]) -> Tile:
     unit: Tile = ((tile - tile.mean()) / tile.std()).astype(np.float32)
     return unit
 
@@ -80,7 +88,7 @@ def board_atlas(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
     rng = np.random.default_rng([seed, 0xB0])
     order = rng.permutation(len(BRANDS))[:PANELS]
     width = int(PANEL_METRES / BOARD_HEIGHT * BOARD_PIXELS)
-    strip = np.hstack([_panel(*BRANDS[index], width) for index in order])
+    strip = np.hstack([_board_image(*BRANDS[index], width) for index in order])
     sizes, rows, top = [], [], 0
     for level in range(SIZES):
         height, length = BOARD_PIXELS >> level, strip.shape[1] >> level
@@ -93,7 +101,7 @@ def board_atlas(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
     return np.vstack(sizes), np.array(rows, dtype=np.float64)
 
 
-def _panel(
+def _board_image(
     text: str, ground: tuple[int, int, int], letters: tuple[int, int, int], width: int
 ) -> Image:
     panel = np.full((BOARD_PIXELS, width, 3), ground, np.uint8)
@@ -126,19 +134,19 @@ def shadow_mask(
     ball_radius = BALL_DIAMETER / 2
     for lamp in light.lamps:
         layer = np.full_like(left, 255)
-        _draw_people(layer, camera, pose, lamp)
-        _draw_ball(layer, camera, instant.ball, lamp, ball_radius)
+        _draw_shadows_of_people(layer, camera, pose, lamp)
+        _draw_shadow_of_ball(layer, camera, instant.ball, lamp, ball_radius)
         sigma = float(np.clip(light.softness * scale / HALVED, 0.5, 7.0))
-        left = _darken(left, cv2.GaussianBlur(layer, (0, 0), sigma))
-    left = _darken(left, _contact(left, camera, instant, scale))
+        left = _darken_by_layer(left, cv2.GaussianBlur(layer, (0, 0), sigma))
+    left = _darken_by_layer(left, _contact_shadows(left, camera, instant, scale))
     return np.asarray(cv2.resize(left, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
-def _darken(light: Image, layer: npt.NDArray[Any]) -> Image:
+def _darken_by_layer(light: Image, layer: npt.NDArray[Any]) -> Image:
     return np.asarray(cv2.multiply(light, layer, scale=1 / 255), np.uint8)
 
 
-def _draw_people(layer: Image, camera: Camera, pose: Pose, lamp: Lamp) -> None:
+def _draw_shadows_of_people(layer: Image, camera: Camera, pose: Pose, lamp: Lamp) -> None:
     shade = int(255 * (1 - lamp.darkness))
     ends = np.array([[INDEX[a], INDEX[b]] for a, b, _, _ in LIMBS])
     radii = np.array([(ra, rb) for _, _, ra, rb in LIMBS]) * 1.8
@@ -154,10 +162,12 @@ def _draw_people(layer: Image, camera: Camera, pose: Pose, lamp: Lamp) -> None:
         low, high = hulls.min(axis=1), hulls.max(axis=1)
         shown = (high > 0).all(axis=1) & (low[:, 0] < columns) & (low[:, 1] < rows)
     for hull in hulls[shown]:
-        _fill(layer, hull, shade)
+        _fill_polygon(layer, hull, shade)
 
 
-def _draw_ball(layer: Image, camera: Camera, ball: FloatArray, lamp: Lamp, radius: float) -> None:
+def _draw_shadow_of_ball(
+    layer: Image, camera: Camera, ball: FloatArray, lamp: Lamp, radius: float
+) -> None:
     shift = np.array(lamp.shift)
     length = float(np.hypot(*shift))
     along = shift / max(length, 1e-9)
@@ -167,21 +177,21 @@ def _draw_ball(layer: Image, camera: Camera, ball: FloatArray, lamp: Lamp, radiu
     center = ball[:2] - ball[2] * shift
     pixels = _project_ground(camera, center + radius * rim)
     if np.isfinite(pixels).all():
-        _fill(layer, pixels, int(255 * (1 - lamp.darkness)))
+        _fill_polygon(layer, pixels, int(255 * (1 - lamp.darkness)))
 
 
-def _contact(like: Image, camera: Camera, instant: Instant, scale: float) -> Image:
+def _contact_shadows(like: Image, camera: Camera, instant: Instant, scale: float) -> Image:
     """The dark patch right below feet and ball, whatever the light."""
     layer = np.full_like(like, 255)
     for place in instant.feet:
         pixels = _project_ground(camera, place + 0.30 * _CIRCLE)
         if np.isfinite(pixels).all():
-            _fill(layer, pixels, 168)
+            _fill_polygon(layer, pixels, 168)
     height = -float(instant.ball[2]) - BALL_DIAMETER / 2
     if height < 0.3:
         pixels = _project_ground(camera, instant.ball[:2] + 0.11 * _CIRCLE)
         if np.isfinite(pixels).all():
-            _fill(layer, pixels, int(120 + 300 * height))
+            _fill_polygon(layer, pixels, int(120 + 300 * height))
     sigma = float(np.clip(0.06 * scale / HALVED, 0.5, 6.0))
     return np.asarray(cv2.GaussianBlur(layer, (0, 0), sigma), np.uint8)
 
@@ -192,7 +202,7 @@ def _project_ground(camera: Camera, places: FloatArray) -> FloatArray:
     return (pixels + 0.5) / HALVED - 0.5
 
 
-def _fill(layer: Image, points: FloatArray, shade: int) -> None:
+def _fill_polygon(layer: Image, points: FloatArray, shade: int) -> None:
     fixed = np.clip(np.round(points * (1 << _SHIFT)), -(1 << 20), 1 << 20).astype(np.int32)
     cv2.fillConvexPoly(layer, cv2.convexHull(fixed), shade, 8, _SHIFT)
 
@@ -217,7 +227,7 @@ def render(scene: Scene, view_key: str) -> Image:
     image = _empty_stadium(camera, instant, look)
     _draw_movers(image, camera, instant, look)
     number = sum(map(ord, scene.truth.key + view_key))
-    image = _develop(image, np.random.default_rng([look.seed, number]))
+    image = _apply_lens_and_sensor(image, np.random.default_rng([look.seed, number]))
     main = scene.group.views[0]
     time = str(main.extras.metadata[IMAGE]["gameTime"])
     draw_scoreboard(image, scene.fixture, time, main.key == view_key)
@@ -229,14 +239,14 @@ def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
     background = np.empty((HEIGHT, WIDTH), np.uint8)
     shadow = shadow_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
     exposure = np.array(look.light.exposure)
-    shade(
+    shade_frame(
         image,
         background,
         shadow,
         exposure,
-        eye_of(camera),
-        turf_of(look),
-        bowl_of(camera, look),
+        shading_camera(camera),
+        shading_grass(look),
+        shading_stadium(camera, look),
         *noise_tiles(),
     )
     # A long lens that is focused on the play shows the crowd out of focus.
@@ -246,19 +256,19 @@ def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
     return image
 
 
-def eye_of(camera: Camera) -> Eye:
-    """The camera as ``shade`` takes it."""
+def shading_camera(camera: Camera) -> ShadingCamera:
+    """The camera as ``shade_frame`` takes it."""
     lens = (camera.focal_length[0], *camera.principal_point, float(camera.distortion[0]))
-    return Eye(camera.rotation, camera.position, *lens)
+    return ShadingCamera(camera.rotation, camera.position, *lens)
 
 
-def turf_of(look: Look) -> Turf:
+def shading_grass(look: Look) -> ShadingGrass:
     """The grass of a match."""
     grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
-    return Turf(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
+    return ShadingGrass(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def bowl_of(camera: Camera, look: Look) -> Bowl:
+def shading_stadium(camera: Camera, look: Look) -> ShadingStadium:
     """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
     atlas, levels = board_atlas(look.seed)
@@ -267,7 +277,7 @@ def bowl_of(camera: Camera, look: Look) -> Bowl:
     # A camera beyond a line stands before the boards of that side, or among the crowd.
     ends = [sign * x - HALF_LENGTH < beyond - 1.0 for sign in (1, -1)]
     sides = [sign * y - HALF_WIDTH < along - 2.0 for sign in (1, -1)]
-    return Bowl(
+    return ShadingStadium(
         seen=np.array([*ends, *sides]),
         beyond=beyond,
         along=along,
@@ -286,7 +296,7 @@ def bowl_of(camera: Camera, look: Look) -> Bowl:
 
 def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> None:
     """Everything that stands on the grass, far things first."""
-    side = lit_from(camera, look)
+    side = light_direction_in_image(camera, look)
     gain = look.light.exposure
     # Play is between the goal lines: a goal hides it, or is hidden, as a whole.
     near_goals = [sign for sign in (-1.0, 1.0) if sign * camera.position[0] > HALF_LENGTH]
@@ -310,13 +320,13 @@ def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, side:
         if depth < 0.5:
             continue
         if person is None:
-            draw_ball(image, camera, instant, gain_at(look, instant.ball[:2]), side)
+            draw_ball(image, camera, instant, light_gain_at(look, instant.ball[:2]), side)
         else:
-            gain = gain_at(look, instant.feet[person.index])
+            gain = light_gain_at(look, instant.feet[person.index])
             draw_person(image, person, look, instant.numbers[person.index], gain, side)
 
 
-def lit_from(camera: Camera, look: Look) -> float:
+def light_direction_in_image(camera: Camera, look: Look) -> float:
     """Which side of the image the light comes from, -1 left to +1 right."""
     if len(look.light.lamps) > 1:
         return 0.3
@@ -325,7 +335,7 @@ def lit_from(camera: Camera, look: Look) -> float:
     return float(-(camera.rotation[0] @ shift) / max(length, 0.3))
 
 
-def gain_at(look: Look, place: FloatArray) -> Colour:
+def light_gain_at(look: Look, place: FloatArray) -> Colour:
     """Light on somebody who stands there, per channel."""
     b, g, r = look.light.exposure
     if look.light.shade is None:
@@ -335,22 +345,22 @@ def gain_at(look: Look, place: FloatArray) -> Colour:
     return b * left, g * left, r * left
 
 
-def _develop(image: Image, rng: np.random.Generator) -> Image:
+def _apply_lens_and_sensor(image: Image, rng: np.random.Generator) -> Image:
     """What lens and sensor add: softness, a darker border, grain."""
     soft = cv2.GaussianBlur(image, (0, 0), 0.6)
     row, column = (int(v) for v in rng.integers(0, (HEIGHT, WIDTH)))
-    noise = np.roll(_grain(), (-row, -column), axis=(0, 1))
-    return np.asarray(np.clip(soft * _border() + noise + 0.5, 0, 255), np.uint8)
+    noise = np.roll(_sensor_grain(), (-row, -column), axis=(0, 1))
+    return np.asarray(np.clip(soft * _vignette() + noise + 0.5, 0, 255), np.uint8)
 
 
 @lru_cache(maxsize=1)
-def _border() -> npt.NDArray[np.float32]:
+def _vignette() -> npt.NDArray[np.float32]:
     """How much of the light the lens lets through, shape (720, 1280, 1)."""
     y, x = np.linspace(-1, 1, HEIGHT)[:, None], np.linspace(-1, 1, WIDTH)
     return (1.03 - 0.09 * (x * x + y * y))[..., None].astype(np.float32)
 
 
 @lru_cache(maxsize=1)
-def _grain() -> npt.NDArray[np.float32]:
+def _sensor_grain() -> npt.NDArray[np.float32]:
     rng = np.random.default_rng(7)
     return rng.normal(0, GRAIN, (HEIGHT, WIDTH, 1)).astype(np.float32)

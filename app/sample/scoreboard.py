@@ -19,24 +19,24 @@ LIGHT = (240, 240, 240)
 def draw_scoreboard(image: Image, fixture: Fixture, game_time: str, is_main: bool) -> None:
     """Teams, score and time on the main camera; a small mark on replays."""
     if not is_main:
-        _cell(image, LEFT, 84, "REPLAY", (36, 36, 190), LIGHT)
+        _draw_text_cell(image, LEFT, 84, "REPLAY", (36, 36, 190), LIGHT)
         return
     look = fixture.look
     clock = game_time.split(" - ")[-1]
     home, away = fixture.score
     x = LEFT
-    x = _cell(image, x, 66, clock, LIGHT, DARK)
-    x = _team(image, x, fixture.home, look.home.shirt)
-    x = _cell(image, x, 62, f"{home} - {away}", (96, 60, 24), LIGHT)
-    _team(image, x, fixture.away, look.away.shirt)
+    x = _draw_text_cell(image, x, 66, clock, LIGHT, DARK)
+    x = _draw_team(image, x, fixture.home, look.home.shirt)
+    x = _draw_text_cell(image, x, 62, f"{home} - {away}", (96, 60, 24), LIGHT)
+    _draw_team(image, x, fixture.away, look.away.shirt)
 
 
-def _team(image: Image, x: int, name: str, colour: Colour) -> int:
+def _draw_team(image: Image, x: int, name: str, colour: Colour) -> int:
     cv2.rectangle(image, (x, TOP), (x + 5, TOP + HEIGHT), colour, -1)
-    return _cell(image, x + 6, 58, name[:3].upper(), DARK, LIGHT)
+    return _draw_text_cell(image, x + 6, 58, name[:3].upper(), DARK, LIGHT)
 
 
-def _cell(
+def _draw_text_cell(
     image: Image, x: int, width: int, text: str,
     ground: tuple[int, int, int], ink: tuple[int, int, int],
 ) -> int:  # fmt: skip

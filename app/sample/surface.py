@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.sample.paint import HALF_LENGTH, HALF_WIDTH, painted, step
+from app.sample.paint import HALF_LENGTH, HALF_WIDTH, edge_coverage, paint_coverage
 
 BOARD_HEIGHT = 0.95
 SEAT_WIDTH, ROW_DEPTH = 0.54, 0.86
@@ -23,7 +23,7 @@ _WALL, _CROWD = 0, 1
 _jit = numba.njit(cache=True, nogil=True, fastmath=False)
 
 
-class Eye(NamedTuple):
+class ShadingCamera(NamedTuple):
     """The camera: R, position in the pitch frame, and lens (pixels; first radial coefficient)."""
 
     rotation: FloatArray
@@ -34,7 +34,7 @@ class Eye(NamedTuple):
     k1: float
 
 
-class Turf(NamedTuple):
+class ShadingGrass(NamedTuple):
     """The grass: its colour, and how it is mown.
 
     ``across``: in bands across the pitch, or along it; ``band`` is their width, metres. ``edge``
@@ -53,7 +53,7 @@ class Turf(NamedTuple):
     darkness: float
 
 
-class Bowl(NamedTuple):
+class ShadingStadium(NamedTuple):
     """What stands around the grass.
 
     ``seen``: for +x, -x, +y, -y whether the side has boards and stands (it has none where the
@@ -80,7 +80,7 @@ class Bowl(NamedTuple):
 
 
 @_jit
-def _hash(i: int, j: int, k: int) -> float:
+def _cell_hash(i: int, j: int, k: int) -> float:
     """A number in [0, 1) that belongs to the cell (i, j) of layer k."""
     h = np.uint32(i * 374761393 + j * 668265263 + k * 2147483647 + 1013904223)
     h = np.uint32((h ^ (h >> np.uint32(13))) * np.uint32(1274126177))
@@ -89,7 +89,7 @@ def _hash(i: int, j: int, k: int) -> float:
 
 
 @_jit
-def _tile(tile: np.ndarray, x: float, y: float) -> float:
+def _sample_tile(tile: np.ndarray, x: float, y: float) -> float:
     """Bilinear value of a wrapping noise tile; x and y in cells."""
     fx, fy = math.floor(x), math.floor(y)
     i, j = int(fx), int(fy)
@@ -103,7 +103,7 @@ def _tile(tile: np.ndarray, x: float, y: float) -> float:
 
 
 @_jit
-def _bands(s: float, band: float, width: float) -> float:
+def _mowing_bands(s: float, band: float, width: float) -> float:
     """-1 and +1 in turn along s, smoothed over a footprint of that width."""
     edge = min(max(width, 0.12), band)
     phase = s / band
@@ -118,7 +118,7 @@ def _bands(s: float, band: float, width: float) -> float:
 
 
 @_jit
-def _side_hit(
+def _hit_side(
     s0: float, ds: float, h0: float, dh: float, board: float, along: float, dalong: float,
     reach: float, profile: np.ndarray,
 ) -> tuple[float, int, float]:  # fmt: skip
@@ -149,7 +149,7 @@ def _side_hit(
 
 
 @_jit
-def _board(
+def _shade_board(
     out: np.ndarray, u: float, h: float, foot: float, atlas: np.ndarray, levels: np.ndarray
 ) -> None:
     """Colour of an advertising board; ``levels`` holds first row, height, width of each size."""
@@ -172,20 +172,20 @@ def _board(
 
 
 @_jit
-def _fill(out: np.ndarray, colour: np.ndarray, gain: float, more: float = 0.0) -> None:
+def _set_colour(out: np.ndarray, colour: np.ndarray, gain: float, more: float = 0.0) -> None:
     """Set a colour: written out, for each pixel of a frame asks for several."""
     for c in range(3):
         out[c] = colour[c] * gain + more
 
 
 @_jit
-def _dim(out: np.ndarray, gain: float) -> None:
+def _dim_colour(out: np.ndarray, gain: float) -> None:
     for c in range(3):
         out[c] *= gain
 
 
 @_jit
-def _crowd(
+def _shade_crowd(
     out: np.ndarray, u: float, v: float, layer: int, foot: float,
     crowd: np.ndarray, seat: np.ndarray, empty: float,
 ) -> None:  # fmt: skip
@@ -194,20 +194,20 @@ def _crowd(
     lu, lv = u / SEAT_WIDTH - column, v / ROW_DEPTH - row
     i, j = int(column), int(row)
     if i % 24 == 0:
-        _fill(out, seat, 0.0, 106.0 if lv > 0.5 else 80.0)
+        _set_colour(out, seat, 0.0, 106.0 if lv > 0.5 else 80.0)
         return
-    if _hash(i, j, layer) < empty:
-        _fill(out, seat, 1.0 if 0.15 < lv < 0.7 else 0.55)
+    if _cell_hash(i, j, layer) < empty:
+        _set_colour(out, seat, 1.0 if 0.15 < lv < 0.7 else 0.55)
         return
-    clothes = crowd[int(_hash(i, j, layer + 7) * crowd.shape[0])]
+    clothes = crowd[int(_cell_hash(i, j, layer + 7) * crowd.shape[0])]
     if lv < 0.68 and abs(lu - 0.5) < 0.42:
-        light = 0.62 + 0.5 * _hash(i, j, layer + 13)
-        _fill(out, clothes, light * (0.62 + 0.38 * min(1.0, lv / 0.4)))
+        light = 0.62 + 0.5 * _cell_hash(i, j, layer + 13)
+        _set_colour(out, clothes, light * (0.62 + 0.38 * min(1.0, lv / 0.4)))
     elif 0.5 < lv < 0.92 and abs(lu - 0.5) < 0.2:
-        tone = 0.4 + 0.5 * _hash(i, j, layer + 5)
+        tone = 0.4 + 0.5 * _cell_hash(i, j, layer + 5)
         out[0], out[1], out[2] = 126.0 * tone, 158.0 * tone, 208.0 * tone
     else:
-        _fill(out, clothes, 0.0, 43.0)
+        _set_colour(out, clothes, 0.0, 43.0)
     # Where a person is smaller than a pixel, only the mean of the crowd is left.
     blur = min(max((foot - 0.25) / 0.6, 0.0), 0.8)
     for c in range(3):
@@ -215,22 +215,22 @@ def _crowd(
 
 
 @_jit
-def _grass(
+def _shade_grass(
     out: np.ndarray, gx: float, gy: float, distance: float, foot: float, wx: float, wy: float,
-    view_x: float, view_y: float, turf: Turf, coarse: np.ndarray, fine: np.ndarray,
+    view_x: float, view_y: float, turf: ShadingGrass, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Colour of the grass without lines and shadows."""
     # Mown grass bends: a band shines when one looks along the way the mower went.
     if turf.across:
-        tone = _bands(gx, turf.band, wx) * (0.3 + 0.7 * abs(view_y))
+        tone = _mowing_bands(gx, turf.band, wx) * (0.3 + 0.7 * abs(view_y))
     else:
-        tone = _bands(gy + 0.5 * turf.band, turf.band, wy) * (0.3 + 0.7 * abs(view_x))
+        tone = _mowing_bands(gy + 0.5 * turf.band, turf.band, wy) * (0.3 + 0.7 * abs(view_x))
     if abs(gx) > HALF_LENGTH + 2.5 or abs(gy) > HALF_WIDTH + 2.2:
         tone *= 0.15
-    patches = _tile(coarse, gx * 8.0, gy * 8.0)
-    broad = _tile(coarse, gx * 1.1 + 77.0, gy * 1.1 + 31.0)
-    blades = _tile(fine, gx * 60.0, gy * 60.0)
-    tufts = _tile(fine, gx * 11.0 + 9.0, gy * 11.0 + 5.0)
+    patches = _sample_tile(coarse, gx * 8.0, gy * 8.0)
+    broad = _sample_tile(coarse, gx * 1.1 + 77.0, gy * 1.1 + 31.0)
+    blades = _sample_tile(fine, gx * 60.0, gy * 60.0)
+    tufts = _sample_tile(fine, gx * 11.0 + 9.0, gy * 11.0 + 5.0)
     near, middle = min(1.0, 0.03 / (foot + 1e-6)), min(1.0, 0.16 / (foot + 1e-6))
     light = 1.0 + 0.5 * turf.contrast * tone + 0.055 * broad + 0.05 * patches * middle
     light += 0.10 * blades * near + 0.065 * tufts * middle
@@ -242,9 +242,9 @@ def _grass(
 
 
 @_jit
-def _lawn(
+def _shade_lawn(
     out: np.ndarray, gx: float, gy: float, ray: np.ndarray, t: float,
-    R: np.ndarray, focal: float, turf: Turf, coarse: np.ndarray, fine: np.ndarray,
+    R: np.ndarray, focal: float, turf: ShadingGrass, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Colour of a place on the grass, with its lines and the shadow of the stand."""
     dx, dy, dz = ray[0], ray[1], ray[2]
@@ -256,16 +256,16 @@ def _lawn(
     wx, wy = abs(ax_x) + abs(ay_x), abs(ax_y) + abs(ay_y)
     foot = math.sqrt(abs(ax_x * ay_y - ax_y * ay_x))
     flat = math.sqrt(dx * dx + dy * dy) + 1e-9
-    _grass(out, gx, gy, t * flat, foot, wx, wy, dx / flat, dy / flat, turf, coarse, fine)
+    _shade_grass(out, gx, gy, t * flat, foot, wx, wy, dx / flat, dy / flat, turf, coarse, fine)
     if abs(gx) < HALF_LENGTH + 1.0 and abs(gy) < HALF_WIDTH + 1.0:
-        paint = painted(gx, gy, ax_x, ax_y, ay_x, ay_y)
+        paint = paint_coverage(gx, gy, ax_x, ax_y, ay_x, ay_y)
         if paint > 0.0:
-            paint *= min(1.0, 0.93 + 0.07 * _tile(fine, gx * 25.0, gy * 25.0))
+            paint *= min(1.0, 0.93 + 0.07 * _sample_tile(fine, gx * 25.0, gy * 25.0))
             out[0] += paint * (226.0 - out[0])
             out[1] += paint * (234.0 - out[1])
             out[2] += paint * (231.0 - out[2])
     edge = gy - (turf.edge + turf.slope * gx)
-    _dim(out, 1.0 - turf.darkness * step(edge, max(0.5, wy)))
+    _dim_colour(out, 1.0 - turf.darkness * edge_coverage(edge, max(0.5, wy)))
 
 
 @_jit
@@ -283,14 +283,14 @@ def _first_hit(
         if not seen[k] or ds <= 1e-9 or s0 + ds * best < board:
             continue
         reach += along if k < 2 else beyond
-        t, what, at = _side_hit(s0, ds, -C[2], -ray[2], board, C[other], ray[other], reach, profile)
+        t, what, at = _hit_side(s0, ds, -C[2], -ray[2], board, C[other], ray[other], reach, profile)
         if what >= 0 and t < best:
             best, part, place, side = t, what, at, k
     return best, part, place, side
 
 
 @_jit
-def _stand(
+def _shade_stand(
     out: np.ndarray, part: int, place: float, u: float, side: int, foot: float,
     profile: np.ndarray, kinds: np.ndarray, crowd: np.ndarray, seat: np.ndarray,
     wall: np.ndarray, empty: float,
@@ -300,19 +300,19 @@ def _stand(
     rise = profile[part, 1] - profile[part - 1, 1]
     share, kind = place / math.hypot(run, rise), kinds[part - 1]
     if kind == _CROWD:
-        _crowd(out, u, place, side * 31 + part * 101, foot, crowd, seat, empty)
-        _dim(out, 1.0 - 0.35 * share)
+        _shade_crowd(out, u, place, side * 31 + part * 101, foot, crowd, seat, empty)
+        _dim_colour(out, 1.0 - 0.35 * share)
     elif kind == _WALL:
         if part > 1 and 0.35 < share < 0.6:
-            _fill(out, seat, 0.55, 50.0)
+            _set_colour(out, seat, 0.55, 50.0)
         else:
-            _fill(out, wall, 0.8 + 0.2 * share)
+            _set_colour(out, wall, 0.8 + 0.2 * share)
     else:
-        _fill(out, wall, 1.2 if u % 7.0 > 0.5 else 0.9)
+        _set_colour(out, wall, 1.2 if u % 7.0 > 0.5 else 0.9)
 
 
 @_jit
-def _aim(ray: np.ndarray, R: np.ndarray, k1: float, a: float, b: float) -> None:
+def _pixel_ray(ray: np.ndarray, R: np.ndarray, k1: float, a: float, b: float) -> None:
     """Direction of the ray of a pixel, pitch frame; along the optical axis it has length 1."""
     d2, s = a * a + b * b, 1.0
     for _ in range(4):
@@ -322,16 +322,16 @@ def _aim(ray: np.ndarray, R: np.ndarray, k1: float, a: float, b: float) -> None:
 
 
 @_jit
-def _sky(out: np.ndarray, ray: np.ndarray, sky: np.ndarray) -> None:
+def _shade_sky(out: np.ndarray, ray: np.ndarray, sky: np.ndarray) -> None:
     up = min(1.0, -ray[2] / math.hypot(ray[0], ray[1]) * 3.0)
     for c in range(3):
         out[c] = sky[0, c] + up * (sky[1, c] - sky[0, c])
 
 
 @_jit
-def shade(
+def shade_frame(
     image: np.ndarray, background: np.ndarray, shadow: np.ndarray, exposure: np.ndarray,
-    eye: Eye, turf: Turf, bowl: Bowl, coarse: np.ndarray, fine: np.ndarray,
+    eye: ShadingCamera, turf: ShadingGrass, bowl: ShadingStadium, coarse: np.ndarray, fine: np.ndarray,
 ) -> None:  # fmt: skip
     """Paint the whole frame.
 
@@ -349,7 +349,7 @@ def shade(
     ray, colour = np.zeros(3), np.zeros(3)
     for row in range(image.shape[0]):
         for column in range(image.shape[1]):
-            _aim(ray, R, eye.k1, (column - eye.x0) / eye.focal, (row - eye.y0) / eye.focal)
+            _pixel_ray(ray, R, eye.k1, (column - eye.x0) / eye.focal, (row - eye.y0) / eye.focal)
             ground = -C[2] / ray[2] if ray[2] > 1e-9 else _FAR
             t, part, place, side = _first_hit(
                 C, ray, ground, seen, bowl.beyond, bowl.along, profile
@@ -359,24 +359,24 @@ def shade(
                 end, rim = abs(x) - HALF_LENGTH, abs(y) - HALF_WIDTH
                 far = end > bowl.beyond + 0.2 or rim > bowl.along + 0.2
                 if far:
-                    _fill(colour, wall, 0.9)
+                    _set_colour(colour, wall, 0.9)
                 else:
-                    _lawn(colour, x, y, ray, t, R, eye.focal, turf, coarse, fine)
-                _dim(colour, shadow[row, column] / 255.0)
+                    _shade_lawn(colour, x, y, ray, t, R, eye.focal, turf, coarse, fine)
+                _dim_colour(colour, shadow[row, column] / 255.0)
             elif part == _GROUND:
-                _sky(colour, ray, sky)
+                _shade_sky(colour, ray, sky)
             else:
                 u = (y if side < 2 else -x) * (1.0 if side % 2 == 0 else -1.0)
                 far = part != _BOARD
                 if far:
-                    _stand(
+                    _shade_stand(
                         colour, part, place, u, side, foot,
                         profile, kinds, crowd, seat, wall, bowl.empty,
                     )  # fmt: skip
-                    _dim(colour, bowl.light)
+                    _dim_colour(colour, bowl.light)
                 else:
-                    _board(colour, u, place, foot, atlas, levels)
-                    _dim(colour, 0.9)
+                    _shade_board(colour, u, place, foot, atlas, levels)
+                    _dim_colour(colour, 0.9)
             background[row, column] = 255 if far else 0
             for c in range(3):
                 image[row, column, c] = np.uint8(min(max(colour[c] * exposure[c], 0.0), 255.0))

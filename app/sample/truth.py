@@ -85,13 +85,13 @@ def _truth_from_json(key: str, value: Any, path: str) -> SceneTruth:
             ViewTruth(
                 name,
                 camera_from_json(view["camera"], path, f"{key} {name}"),
-                _triple(view["ball"]),
+                _to_triple(view["ball"]),
                 Box(*(float(number) for number in view["ball_box"])),
             )
             for name, view in value["views"].items()
         )
         faults = tuple(_fault_from_json(fault) for fault in value["faults"])
-        return SceneTruth(key, _triple(value["ball"]), views, faults)
+        return SceneTruth(key, _to_triple(value["ball"]), views, faults)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise DatasetFormatError(
             path, key, None, f"is not the truth of a group: {error}"
@@ -112,6 +112,6 @@ def _fault_from_json(value: dict[str, Any]) -> PlantedFault:
     )
 
 
-def _triple(value: Any) -> tuple[float, float, float]:
+def _to_triple(value: Any) -> tuple[float, float, float]:
     x, y, z = (float(number) for number in value)
     return x, y, z

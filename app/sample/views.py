@@ -22,7 +22,7 @@ Indices = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Skeleton:
+class MarkingPoints:
     """Points along every marking of the pitch, one after the other.
 
     Attributes:
@@ -44,7 +44,7 @@ class Skeleton:
     runs_along_y: Mask
 
 
-def make_skeleton(spacing: float, fewest: int) -> Skeleton:
+def sample_marking_points(spacing: float, fewest: int) -> MarkingPoints:
     """Sample the markings at most ``spacing`` metres apart, each at ``fewest`` points or more."""
     points, tangents, counts = [], [], []
     for marking in MARKINGS:
@@ -60,7 +60,7 @@ def make_skeleton(spacing: float, fewest: int) -> Skeleton:
     ends = np.cumsum(counts, dtype=np.int64)
     straight = [name not in CIRCLES and not name.startswith("Goal") for name in MARKINGS]
     first = [tangent[0] for tangent in tangents]
-    return Skeleton(
+    return MarkingPoints(
         points=np.vstack(points),
         tangents=np.vstack(tangents),
         starts=ends - np.array(counts, dtype=np.int64),
@@ -75,12 +75,12 @@ def make_skeleton(spacing: float, fewest: int) -> Skeleton:
     )
 
 
-COARSE = make_skeleton(spacing=3.0, fewest=5)
-FINE = make_skeleton(spacing=0.6, fewest=9)
+COARSE = sample_marking_points(spacing=3.0, fewest=5)
+FINE = sample_marking_points(spacing=0.6, fewest=9)
 
 
 @dataclass(frozen=True)
-class Trials:
+class TrialCameras:
     """Trial cameras: position (N, 3), pan, tilt, roll in radians, focal length, k1, all (N,)."""
 
     position: FloatArray
@@ -104,7 +104,7 @@ class Trials:
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def project_trials(trials: Trials, points: FloatArray) -> FloatArray:
+def project_trials(trials: TrialCameras, points: FloatArray) -> FloatArray:
     """Pixels of every point under every trial camera, NaN where not visible, shape (N, M, 2).
 
     Args:
@@ -128,7 +128,7 @@ def project_trials(trials: Trials, points: FloatArray) -> FloatArray:
     return np.stack([x * scale + CENTER[0], y * scale + CENTER[1]], axis=-1)
 
 
-def inside(pixels: FloatArray, margin: float = 0.0) -> Mask:
+def is_inside_image(pixels: FloatArray, margin: float = 0.0) -> Mask:
     """Whether each pixel lies in the image, at least ``margin`` pixels from its border."""
     with np.errstate(invalid="ignore"):
         x, y = pixels[..., 0], pixels[..., 1]
@@ -137,6 +137,6 @@ def inside(pixels: FloatArray, margin: float = 0.0) -> Mask:
         )
 
 
-def seen_points(seen: Mask, skeleton: Skeleton) -> Indices:
+def count_seen_points(seen: Mask, skeleton: MarkingPoints) -> Indices:
     """How many points of each marking are seen, (..., N) booleans to (..., 26) counts."""
     return np.add.reduceat(seen.astype(np.int64), skeleton.starts, axis=-1)

@@ -49,7 +49,7 @@ class SampleReport:
 
 
 @dataclass(frozen=True)
-class _Job:
+class _GroupsJob:
     """Some groups of one match, for one process."""
 
     match: int
@@ -62,7 +62,7 @@ class _Job:
 
 
 @dataclass(frozen=True)
-class _Labelled:
+class _LabelledMatch:
     """One match whose labels are written: key and truth of its groups, as text."""
 
     truths: list[tuple[str, str]]
@@ -101,9 +101,9 @@ def write_sample(
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; the sample needs a folder")
     counts = group_counts(groups)
-    with _staged(out) as folder:
-        whole = [_Job(i, n, 0, n, seed, faults, folder) for i, n in enumerate(counts)]
-        with _mapper(workers, len(whole) if labels_only else groups) as run:
+    with _staging_folder(out) as folder:
+        whole = [_GroupsJob(i, n, 0, n, seed, faults, folder) for i, n in enumerate(counts)]
+        with _open_job_map(workers, len(whole) if labels_only else groups) as run:
             # With frames, drawing them is nearly all of the work, so it alone is reported.
             report = _write_labels(folder, whole, run, groups, progress if labels_only else None)
             if not labels_only:
@@ -112,7 +112,7 @@ def write_sample(
 
 
 @contextmanager
-def _staged(out: Path) -> Iterator[Path]:
+def _staging_folder(out: Path) -> Iterator[Path]:
     """A folder beside ``out``, whose files go there when all are written; else nothing is left."""
     out = Path.cwd() / out
     above = [path for path in out.parents if not path.exists()]
@@ -136,7 +136,7 @@ def _staged(out: Path) -> Iterator[Path]:
 
 
 def _write_labels(
-    out: Path, jobs: list[_Job], run: _Mapper, total: int, progress: ReportProgress | None
+    out: Path, jobs: list[_GroupsJob], run: _OrderedMap, total: int, progress: ReportProgress | None
 ) -> SampleReport:
     done = views = faults = 0
     temporary = out / f".{TRUTH}.part"
@@ -154,14 +154,14 @@ def _write_labels(
     return SampleReport(len(jobs), done, views, faults)
 
 
-def _label_match(job: _Job) -> _Labelled:
+def _label_match(job: _GroupsJob) -> _LabelledMatch:
     scenes = make_match(job.match, job.groups, job.seed, job.faults)
     write_soccernet_v3(job.out, [scene.group for scene in scenes])
     truths = [
         (scene.truth.key, json_text(truth_to_json(scene.truth), ascii_=True, compact=True))
         for scene in scenes
     ]
-    return _Labelled(
+    return _LabelledMatch(
         truths,
         views=sum(len(scene.group.views) for scene in scenes),
         faults=sum(len(scene.truth.faults) for scene in scenes),
@@ -169,10 +169,14 @@ def _label_match(job: _Job) -> _Labelled:
 
 
 def _write_frames(
-    out: Path, matches: list[_Job], run: _Mapper, total: int, progress: ReportProgress | None
+    out: Path,
+    matches: list[_GroupsJob],
+    run: _OrderedMap,
+    total: int,
+    progress: ReportProgress | None,
 ) -> None:
     done = 0
-    jobs = [part for match in matches for part in _parts(match)]
+    jobs = [part for match in matches for part in _split_job(match)]
     drawn = zip(jobs, run(_draw_groups, jobs), strict=True)
     for match, parts in groupby(drawn, key=lambda pair: pair[0].match):
         archive = out / make_fixture(match, jobs[0].seed).folder / ARCHIVE
@@ -187,13 +191,13 @@ def _write_frames(
         temporary.replace(archive)
 
 
-def _parts(job: _Job) -> Iterator[_Job]:
+def _split_job(job: _GroupsJob) -> Iterator[_GroupsJob]:
     for first in range(0, job.groups, GROUPS_PER_JOB):
         last = min(first + GROUPS_PER_JOB, job.groups)
-        yield _Job(job.match, job.groups, first, last, job.seed, job.faults, job.out)
+        yield _GroupsJob(job.match, job.groups, first, last, job.seed, job.faults, job.out)
 
 
-def _draw_groups(job: _Job) -> list[tuple[str, bytes]]:
+def _draw_groups(job: _GroupsJob) -> list[tuple[str, bytes]]:
     """Name and JPEG of every frame of the job's groups."""
     numbers = range(job.first, job.last)
     members = []
@@ -205,7 +209,7 @@ def _draw_groups(job: _Job) -> list[tuple[str, bytes]]:
     return members
 
 
-class _Mapper:
+class _OrderedMap:
     """Runs a function over jobs in order, in this process or in several."""
 
     def __init__(self, pool: ProcessPoolExecutor | None) -> None:
@@ -216,13 +220,13 @@ class _Mapper:
 
 
 @contextmanager
-def _mapper(workers: int | None, jobs: int) -> Iterator[_Mapper]:
+def _open_job_map(workers: int | None, jobs: int) -> Iterator[_OrderedMap]:
     count = min(workers or os.cpu_count() or 1, jobs)
     if count == 1:
-        yield _Mapper(None)
+        yield _OrderedMap(None)
         return
     with spawned_pool(count, _use_one_thread) as pool:
-        yield _Mapper(pool)
+        yield _OrderedMap(pool)
 
 
 def _use_one_thread() -> None:

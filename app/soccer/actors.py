@@ -35,7 +35,7 @@ def person_of(actor: str) -> str:
     return actor.partition(TOKEN)[0]
 
 
-def is_of(actor: str, name: str) -> bool:
+def is_actor_of(actor: str, name: str) -> bool:
     """Whether an actor is a person of that name, one of their tokens, or that very token.
 
     Example:

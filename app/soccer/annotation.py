@@ -78,10 +78,10 @@ class Extras:
     @property
     def places(self) -> tuple[Box, ...]:
         """Where its boxes lie, pixels; what has no corners that are numbers is left out."""
-        return tuple(box for item in self.boxes if (box := _corner_box(item)) is not None)
+        return tuple(box for item in self.boxes if (box := _box_from_corners(item)) is not None)
 
 
-def _corner_box(item: Mapping[str, Any]) -> Box | None:
+def _box_from_corners(item: Mapping[str, Any]) -> Box | None:
     """A box in the shape that all readers give them: ``{"points": {"x1", "y1", "x2", "y2"}}``."""
     try:
         left, top, right, bottom = (float(item["points"][name]) for name in CORNERS)

@@ -19,7 +19,7 @@ _SAME = 0.02
 """Sizes that differ by less are the same: pictures are cut and rounded."""
 
 
-def other_size(camera: Camera, size: ImageSize) -> ImageSize | None:
+def size_centred_on_principal_point(camera: Camera, size: ImageSize) -> ImageSize | None:
     """The size whose middle a camera's principal point is; None where it may be the middle of ``size``.
 
     The middle is ((W - 1) / 2, (H - 1) / 2) or (W / 2, H / 2): tools differ. A size counts when it is

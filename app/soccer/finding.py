@@ -76,7 +76,7 @@ class Finding:
     @property
     def is_unusable_ball(self) -> bool:
         """Whether nobody can use the ball of which it is said: accepting it needs a reason."""
-        return makes_unusable(self.kind, self.number)
+        return makes_ball_unusable(self.kind, self.number)
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class PlacedFinding(Finding):
     place: tuple[float, float] | None = None
 
 
-def makes_unusable(kind: str, number: float | None) -> bool:
+def makes_ball_unusable(kind: str, number: float | None) -> bool:
     """Whether a finding of that kind and number says that the ball cannot be used."""
     if kind == "high_uncertainty":
         # An infinite sigma is null in a table.

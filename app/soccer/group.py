@@ -88,7 +88,7 @@ class Station:
         lines = {**self.lines, **dict.fromkeys(self.not_visible, ())}
         return {marking: lines[marking] for marking in sorted(lines)}
 
-    def with_given(
+    def with_given_camera(
         self, given: Camera | None, covariance: tuple[float, ...] | None = None
     ) -> Station:
         """This station with another given camera; what was known of the old one is not of it."""
@@ -117,7 +117,7 @@ class View:
         return self.station.size
 
     @property
-    def takes_paint(self) -> bool:
+    def can_use_paint(self) -> bool:
         """Whether the paint of its picture could place its camera.
 
         A static camera is that of many pictures, a given one is what it is, and a picture that was

@@ -27,7 +27,7 @@ _NUMBERED = re.compile(r"(.*?)([0-9]{1,12})", re.DOTALL)
 _LAST_NUMBER = re.compile(r"([0-9]+)[^0-9]*")
 
 
-def counts_time(media: Media, group: str, static: bool) -> bool:
+def is_numbered_in_time(media: Media, group: str, static: bool) -> bool:
     """Whether the name of a frame counts time, so that there may be neighbours.
 
     Args:
@@ -38,21 +38,21 @@ def counts_time(media: Media, group: str, static: bool) -> bool:
     """
     if is_address(media.path):
         return False
-    return media.frame is not None or numbered(media, group, static) is not None
+    return media.frame is not None or split_frame_number(media, group, static) is not None
 
 
-def numbered(media: Media, group: str, static: bool) -> tuple[PurePath, str, str] | None:
+def split_frame_number(media: Media, group: str, static: bool) -> tuple[PurePath, str, str] | None:
     """Name of a frame, what stands before its number, and the number; None: it counts no time."""
     name = PurePosixPath(media.member) if media.member is not None else PurePath(media.path)
     found = _NUMBERED.fullmatch(name.stem)
     if found is None:
         return None
-    by_frame = static and _number(group) == int(found[2])
+    by_frame = static and _last_number(group) == int(found[2])
     if not by_frame and name.parent.name != CLIP_FOLDER:
         return None
     return name, found[1], found[2]
 
 
-def _number(group: str) -> int | None:
+def _last_number(group: str) -> int | None:
     found = _LAST_NUMBER.search(group.rsplit("/", 1)[-1])
     return int(found[1]) if found else None

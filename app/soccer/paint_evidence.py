@@ -175,7 +175,7 @@ def evidence_from_json(value: Any) -> PaintEvidence:
     """
     try:
         points = {
-            canonical_marking(name): _points(value["points"][name])
+            canonical_marking(name): _paint_points_from_rows(value["points"][name])
             for name in sorted(value["points"])
         }
         return PaintEvidence(points, str(value["version"]))
@@ -183,7 +183,7 @@ def evidence_from_json(value: Any) -> PaintEvidence:
         raise InputError(f"this is not evidence of paint: {error}") from error
 
 
-def _points(rows: Any) -> tuple[PaintPoint, ...]:
+def _paint_points_from_rows(rows: Any) -> tuple[PaintPoint, ...]:
     points = tuple(PaintPoint(float(x), float(y), float(sigma)) for x, y, sigma in rows)
     if not math.isfinite(sum(map(sum, points))) or any(not point.sigma_px > 0 for point in points):
         raise ValueError("a point is not x, y and a standard deviation above zero")

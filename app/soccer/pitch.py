@@ -74,21 +74,21 @@ def canonical_marking(name: str) -> str:
     return stripped
 
 
-def marking_like(name: str) -> str | None:
+def find_marking_like(name: str) -> str | None:
     """The marking that a name means, whatever its capitals, spaces, dots and underscores.
 
     Example:
         >>> marking_like("Big_rect_left_top"), marking_like("Line unknown")
         ('Big rect. left top', None)
     """
-    return _LOOSE.get(_letters(name))
+    return _LOOSE.get(_letters_and_digits(name))
 
 
-def _letters(name: str) -> str:
+def _letters_and_digits(name: str) -> str:
     return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
-def twin_marking(marking: str) -> str:
+def opposite_marking(marking: str) -> str:
     """The marking that this one becomes when the pitch is turned by 180 degrees.
 
     Example:
@@ -103,7 +103,7 @@ def twin_marking(marking: str) -> str:
 
 
 _KNOWN = frozenset(MARKINGS)
-_LOOSE = {_letters(marking): marking for marking in MARKINGS}
+_LOOSE = {_letters_and_digits(marking): marking for marking in MARKINGS}
 _SWAP = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 
 
@@ -165,7 +165,7 @@ class Pitch:
         """Geometry of each marking, by name."""
         half = FRAME_WIDTH / 2
         beside, inside = half * (self.goal != "inner"), half * (self.goal == "laws")
-        return _shapes(self.length / 2, self.width / 2, beside, inside)
+        return _marking_shapes(self.length / 2, self.width / 2, beside, inside)
 
     def with_goal(self, goal: GoalEdge) -> Pitch:
         """The same pitch with that line of its goals, and of its lines."""
@@ -202,7 +202,7 @@ def _sample_arc(arc: Arc, spacing: float) -> FloatArray:
     return np.column_stack([x, y, np.zeros_like(x)])
 
 
-def _shapes(
+def _marking_shapes(
     half_length: float, half_width: float, beside: float, inside: float
 ) -> dict[str, Segment | Arc]:
     """All shapes; those of goals lie ``beside`` their inner edges, lines ``inside`` the plan, metres.
@@ -211,11 +211,11 @@ def _shapes(
     """
     end, side_line, radius = half_length - inside, half_width - inside, CIRCLE_RADIUS - inside
     shapes: dict[str, Segment | Arc] = {
-        "Side line top": _grass((-end, -side_line), (end, -side_line)),
-        "Side line bottom": _grass((-end, side_line), (end, side_line)),
-        "Side line left": _grass((-end, -side_line), (-end, side_line)),
-        "Side line right": _grass((end, -side_line), (end, side_line)),
-        "Middle line": _grass((0.0, -side_line), (0.0, side_line)),
+        "Side line top": _grass_segment((-end, -side_line), (end, -side_line)),
+        "Side line bottom": _grass_segment((-end, side_line), (end, side_line)),
+        "Side line left": _grass_segment((-end, -side_line), (-end, side_line)),
+        "Side line right": _grass_segment((end, -side_line), (end, side_line)),
+        "Middle line": _grass_segment((0.0, -side_line), (0.0, side_line)),
         "Circle central": Arc((0.0, 0.0), radius, 0.0, 2 * math.pi),
     }
     # The penalty arc is what lies outside the penalty area.
@@ -229,9 +229,9 @@ def _shapes(
             front = goal_line - sign * (depth - inside)
             left, right = sorted((sign * end, front))
             half = width / 2 - inside
-            shapes[f"{name} {side} top"] = _grass((left, -half), (right, -half))
-            shapes[f"{name} {side} bottom"] = _grass((left, half), (right, half))
-            shapes[f"{name} {side} main"] = _grass((front, -half), (front, half))
+            shapes[f"{name} {side} top"] = _grass_segment((left, -half), (right, -half))
+            shapes[f"{name} {side} bottom"] = _grass_segment((left, half), (right, half))
+            shapes[f"{name} {side} main"] = _grass_segment((front, -half), (front, half))
         mark = goal_line - sign * PENALTY_MARK_DISTANCE
         facing = 0.0 if side == "left" else math.pi
         shapes[f"Circle {side}"] = Arc(
@@ -249,5 +249,5 @@ def _shapes(
     return shapes
 
 
-def _grass(start: tuple[float, float], end: tuple[float, float]) -> Segment:
+def _grass_segment(start: tuple[float, float], end: tuple[float, float]) -> Segment:
     return Segment((*start, 0.0), (*end, 0.0))

@@ -24,7 +24,7 @@ SUBJECTS = (*GATES, BOXES, FINDINGS, NOISE, PITCH, CALIBRATION)
 """What a threshold can be about, in the order in which people read a policy."""
 
 
-def _threshold(
+def _threshold_field(
     default: float | bool | str | None,
     subject: str,
     label: str,
@@ -52,25 +52,27 @@ def _threshold(
 class CalibrationPolicy:
     """The part of the policy that a view's calibration depends on."""
 
-    robust_scale_px: float = _threshold(
+    robust_scale_px: float = _threshold_field(
         2.0, CALIBRATION, "Scale of the robust loss", "px at 960x540", 0.2, 20.0
     )
     """Scale of the soft-L1 loss at 960 x 540; grows with the diagonal."""
-    distortion_mean: float = _threshold(0.025, CALIBRATION, "Expected distortion", "", -0.3, 0.3)
+    distortion_mean: float = _threshold_field(
+        0.025, CALIBRATION, "Expected distortion", "", -0.3, 0.3
+    )
     """Mean of the prior on kappa, the displacement at the image's corner as a share of half the
     diagonal: broadcast lenses show pincushion."""
-    distortion_sigma: float = _threshold(
+    distortion_sigma: float = _threshold_field(
         0.03, CALIBRATION, "Standard deviation of the distortion", "", 0.001, 0.5
     )
     """Standard deviation of that prior."""
-    check_labels: bool = _threshold(True, CALIBRATION, "Leave out markings found mislabelled")
+    check_labels: bool = _threshold_field(True, CALIBRATION, "Leave out markings found mislabelled")
     """Leave out markings that are found mislabelled."""
-    share_position: bool = _threshold(
+    share_position: bool = _threshold_field(
         False, CALIBRATION, "Use the shared position of a match", later=True, shown=False
     )
     """Where the main camera stands is known from the match's other pictures, where that was
     accepted. Not in the ``repr``, which keys calibrations: they are keyed by the position itself."""
-    source: Literal["lines", "paint"] = _threshold(
+    source: Literal["lines", "paint"] = _threshold_field(
         "lines",
         CALIBRATION,
         "Source of cameras",
@@ -80,7 +82,7 @@ class CalibrationPolicy:
     )
     """``lines``: what was clicked; ``paint``: started by the clicks, drawn onto what was read of the
     paint in the picture. Not in the ``repr`` either: calibrations are keyed by what was read."""
-    line_sigma_px: float | None = _threshold(
+    line_sigma_px: float | None = _threshold_field(
         None,
         CALIBRATION,
         "Sigma of a point on a line",
@@ -92,7 +94,7 @@ class CalibrationPolicy:
     )
     """Of a clicked point across its marking, about which images differ; None: what real annotations
     show, and each image by itself. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
-    line_share: float | None = _threshold(
+    line_share: float | None = _threshold_field(
         None,
         CALIBRATION,
         "Share of its variance common to a marking",
@@ -103,7 +105,7 @@ class CalibrationPolicy:
         shown=False,
     )
     """What the points of a marking have in common of that variance; None: weighed image by image."""
-    shortest_marking_px: float = _threshold(
+    shortest_marking_px: float = _threshold_field(
         0.0,
         CALIBRATION,
         "Shortest undrawn marking that JaC counts as missing",
@@ -116,7 +118,7 @@ class CalibrationPolicy:
     """0: each one, as the public evaluator does. Stubs of a few pixels at the border of a picture
     are none that people draw. Not in the ``repr``: ``calibration_key`` knows it where it is set."""
 
-    lone_frames: Literal["exact", "professional", "any"] = _threshold(
+    lone_frames: Literal["exact", "professional", "any"] = _threshold_field(
         "exact",
         CALIBRATION,
         "Pitch and picture of a frame alone",
@@ -129,7 +131,7 @@ class CalibrationPolicy:
     as the Laws allow, and the picture may have been stretched or cropped. Not in the ``repr``: what
     it makes of a calibration has a key of its own."""
 
-    goal: Literal["inner", "middle", "laws"] = _threshold(
+    goal: Literal["inner", "middle", "laws"] = _threshold_field(
         "inner",
         CALIBRATION,
         "What people click of goals and lines",
@@ -165,7 +167,7 @@ class Policy:
 
     name: str = "paper"
     calibration: CalibrationPolicy = field(default_factory=CalibrationPolicy)
-    jac_gamma_percent: float = _threshold(
+    jac_gamma_percent: float = _threshold_field(
         0.5,
         "jac",
         "Tolerance of the field lines",
@@ -174,64 +176,64 @@ class Policy:
         5.0,
         choices=GAMMAS_PERCENT,
     )
-    min_jac: float = _threshold(0.75, "jac", "Share of field lines that fit", "", 0.0, 1.0)
+    min_jac: float = _threshold_field(0.75, "jac", "Share of field lines that fit", "", 0.0, 1.0)
     """A view qualifies strictly above."""
-    min_agreement: float | None = _threshold(
+    min_agreement: float | None = _threshold_field(
         None, "agreement", "Smallest agreement with the paint", "", 0.0, 1.0, later=True
     )
     """Supported times explained of a view whose paint was read; a view falls below."""
-    tau_percent: float = _threshold(
+    tau_percent: float = _threshold_field(
         1.0, "reprojection", "Largest reprojection error", "% of diagonal", 0.05, 5.0
     )
-    min_baseline_m: float = _threshold(1.0, "baseline", "Smallest baseline", "m", 0.0, 50.0)
-    ball_diameter_m: float = _threshold(0.226, BOXES, "Diameter of the ball", "m", 0.2, 0.25)
-    point: Literal["mean", "best"] = _threshold(
+    min_baseline_m: float = _threshold_field(1.0, "baseline", "Smallest baseline", "m", 0.0, 50.0)
+    ball_diameter_m: float = _threshold_field(0.226, BOXES, "Diameter of the ball", "m", 0.2, 0.25)
+    point: Literal["mean", "best"] = _threshold_field(
         "mean", BOXES, "Exported 3D point", choices=("mean", "best"), later=True
     )
     """``mean`` of the valid pairs, as in the paper, or ``best``: the most likely point over all
     views. Boxes, errors and exports follow it; the gates judge the mean."""
-    min_parallax_degrees: float | None = _threshold(
+    min_parallax_degrees: float | None = _threshold_field(
         None, "parallax", "Smallest parallax", "degrees", 0.0, 45.0
     )
-    max_sigma_m: float | None = _threshold(
+    max_sigma_m: float | None = _threshold_field(
         None, "sigma", "Largest sigma of the position", "m", 0.01, 5.0
     )
-    min_p_value: float | None = _threshold(
+    min_p_value: float | None = _threshold_field(
         None, "chi_square", "Smallest p-value of the residuals", "", 0.0, 0.01, later=True
     )
     """How unlikely by chance alone the residuals of the views in valid pairs may be."""
-    low_parallax_degrees: float = _threshold(
+    low_parallax_degrees: float = _threshold_field(
         5.0, FINDINGS, "Finding: parallax below", "degrees", 0.0, 45.0
     )
     """Below: the finding ``low_parallax``; it is no gate of the policy ``paper``."""
-    noise: Literal["fixed", "estimated"] = _threshold(
+    noise: Literal["fixed", "estimated"] = _threshold_field(
         FIXED, NOISE, "Noise of clicks", choices=(FIXED, ESTIMATED), later=True
     )
     """``fixed``: the sigmas of clicks are those that stand here, as in the paper; ``estimated``: they
     are the dataset's own, and solving it sets them."""
-    click_sigma_px: float = _threshold(
+    click_sigma_px: float = _threshold_field(
         1.0, NOISE, "Sigma of a clicked ball", "px at 1920x1080", 0.1, 10.0
     )
     """Standard deviation of an annotated ball centre at 1920 x 1080; grows with the diagonal."""
-    box_sigma_share: float = _threshold(
+    box_sigma_share: float = _threshold_field(
         0.04, NOISE, "Sigma of a ball, of its diameter", "share", 0.0, 0.5
     )
     """What the diameter of a ball's box adds to that standard deviation, as a share of it."""
-    given_sigma_px: float = _threshold(
+    given_sigma_px: float = _threshold_field(
         0.0, NOISE, "Sigma of a ball by a given camera", "px at 1920x1080", 0.0, 30.0, later=True
     )
     """What a given camera of unknown exactness adds to it, in pixels of the ball's image."""
-    below_grass_m: float = _threshold(
+    below_grass_m: float = _threshold_field(
         0.5, FINDINGS, "Finding: below the grass by more than", "m", 0.0, 5.0
     )
-    max_height_m: float = _threshold(40.0, FINDINGS, "Finding: higher than", "m", 1.0, 100.0)
-    outside_pitch_m: float = _threshold(
+    max_height_m: float = _threshold_field(40.0, FINDINGS, "Finding: higher than", "m", 1.0, 100.0)
+    outside_pitch_m: float = _threshold_field(
         10.0, FINDINGS, "Finding: outside the pitch by more than", "m", 0.0, 50.0
     )
-    pitch_length_m: float = _threshold(
+    pitch_length_m: float = _threshold_field(
         105.0, PITCH, "Length of the pitch, where none is known", "m", 90.0, 120.0
     )
-    pitch_width_m: float = _threshold(
+    pitch_width_m: float = _threshold_field(
         68.0, PITCH, "Width of the pitch, where none is known", "m", 45.0, 90.0
     )
 
@@ -242,12 +244,12 @@ class Policy:
     @cached_property
     def hash(self) -> str:
         """Digest of every value but the name."""
-        return _digest(digested_values(self))
+        return _digest_of_values(digested_values(self))
 
     @cached_property
     def calibration_hash(self) -> str:
         """Digest of what a calibration depends on."""
-        return _digest(digested_calibration(self.calibration))
+        return _digest_of_values(digested_calibration(self.calibration))
 
 
 def digested_values(policy: Policy) -> dict[str, Any]:
@@ -256,7 +258,7 @@ def digested_values(policy: Policy) -> dict[str, Any]:
     A threshold that came later counts only where it asks for something else than before it came:
     the hash of a policy, and of each version that was frozen with it, stays what it was.
     """
-    values = _comparisons_of(policy)
+    values = _values_without_later_defaults(policy)
     del values["name"]
     values["calibration"] = digested_calibration(policy.calibration)
     return values
@@ -264,10 +266,10 @@ def digested_values(policy: Policy) -> dict[str, Any]:
 
 def digested_calibration(policy: CalibrationPolicy) -> dict[str, Any]:
     """The same of its part for calibrations."""
-    return _comparisons_of(policy)
+    return _values_without_later_defaults(policy)
 
 
-def _comparisons_of(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
+def _values_without_later_defaults(policy: Policy | CalibrationPolicy) -> dict[str, Any]:
     values = asdict(policy)
     for item in fields(policy):
         if item.metadata.get("later") and values[item.name] == item.default:
@@ -404,6 +406,6 @@ THRESHOLDS = tuple(
 """Every threshold, those of the gates first and in their order."""
 
 
-def _digest(values: object) -> str:
+def _digest_of_values(values: object) -> str:
     text = json.dumps(values, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -30,7 +30,7 @@ class LeftOut:
     note: str | None = None
 
 
-def left_out(reason: str | None, note: str | None) -> LeftOut | None:
+def make_left_out(reason: str | None, note: str | None) -> LeftOut | None:
     """What a person says of a view that is left out; None when they say nothing.
 
     Raises:
@@ -45,7 +45,7 @@ def left_out(reason: str | None, note: str | None) -> LeftOut | None:
             "a note needs a reason beside it" if reason is None else f'"{reason}" is not a reason'
         )
         raise InputError(f"{problem}; reasons are {known}", pointer="/reason")
-    require_words(reason, note)
+    require_explanation(reason, note)
     return LeftOut(reason, note)
 
 
@@ -64,7 +64,7 @@ def checked_note(note: str | None) -> str | None:
     return note
 
 
-def require_words(reason: str | None, note: str | None) -> None:
+def require_explanation(reason: str | None, note: str | None) -> None:
     """Raise InputError where a reason says nothing by itself, and no note does."""
     if reason == "other" and note is None:
         raise InputError('the reason "other" needs a note', pointer="/note")

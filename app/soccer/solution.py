@@ -176,7 +176,7 @@ class Calibration:
         return tuple(map(sum, zip(known, self.pitch_covariance or [0.0] * 64, strict=True)))
 
     @property
-    def is_bare(self) -> bool:
+    def is_given_without_uncertainty(self) -> bool:
         """Whether the camera came with the data and nobody says how exact it is."""
         return self.source == "given" and not self.is_known
 
@@ -331,7 +331,9 @@ class ViewSolution:
     """Where the 3D ball is to be seen; None without a camera, and where it is not in front of it."""
 
 
-def margin_of(value: float, threshold: float | None, *, at_most: bool = False) -> float | None:
+def margin_to_threshold(
+    value: float, threshold: float | None, *, at_most: bool = False
+) -> float | None:
     """How far a value is from its threshold, as a share of the threshold.
 
     Shares of different gates compare with each other, which metres and pixels do not.
@@ -360,7 +362,7 @@ def margin_of(value: float, threshold: float | None, *, at_most: bool = False) -
 class Gate:
     """One gate as judged for the group.
 
-    ``margin`` is how far the value is from the threshold, as ``margin_of`` counts it.
+    ``margin`` is how far the value is from the threshold, as a share of it.
 
     Attributes:
         margin: Distance of the value from the threshold, as a share of the threshold: 0.25 is

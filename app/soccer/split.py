@@ -88,7 +88,7 @@ class Splitter:
         split.check()
         if split.kind != "match":
             return Splitter(split)
-        return Splitter(split, _drawn(split, set(matches)))
+        return Splitter(split, _draw_test_matches(split, set(matches)))
 
     def group(self, match: str, given: str, views: Sequence[str]) -> str:
         """Split of a group; empty where its views are on both sides."""
@@ -96,29 +96,29 @@ class Splitter:
             return given
         if self.split.kind == "match":
             return TEST if match in self.tests else TRAIN
-        sides = {self._side(view) for view in views}
+        sides = {self._side_of_view(view) for view in views}
         return sides.pop() if len(sides) == 1 else ""
 
     def views(self, views: Sequence[str]) -> dict[str, str] | None:
         """Split by view; None where all views go with their group."""
-        if self.split.kind != "camera" or len({self._side(view) for view in views}) == 1:
+        if self.split.kind != "camera" or len({self._side_of_view(view) for view in views}) == 1:
             return None
-        return {view: self._side(view) for view in views}
+        return {view: self._side_of_view(view) for view in views}
 
-    def _side(self, view: str) -> str:
+    def _side_of_view(self, view: str) -> str:
         return TEST if view in self.split.test_cameras else TRAIN
 
 
-def _drawn(split: Split, matches: set[str]) -> frozenset[str]:
+def _draw_test_matches(split: Split, matches: set[str]) -> frozenset[str]:
     """The matches that test: those whose digests with the seed are the smallest."""
     if len(matches) < 2:
         raise InputError(
             "a split by match needs at least two matches", hint="Take the given split instead."
         )
     count = min(max(1, round(split.test_share * len(matches))), len(matches) - 1)
-    ranked = sorted(matches, key=lambda match: (_rank(split.seed, match), match))
+    ranked = sorted(matches, key=lambda match: (_seeded_digest(split.seed, match), match))
     return frozenset(ranked[:count])
 
 
-def _rank(seed: int, match: str) -> str:
+def _seeded_digest(seed: int, match: str) -> str:
     return hashlib.sha256(f"{seed}:{match}".encode()).hexdigest()

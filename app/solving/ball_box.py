@@ -30,7 +30,7 @@ def fit_ball(
         ball: The ball of the view, in view.
         point: The triangulated ball, pitch frame, metres, shape (3,).
         diameter_m: True diameter, metres.
-        expected: What ``expect_ball`` says of the same, so that its box is not fitted twice.
+        expected: What ``predict_ball_in_view`` says of the same, so that its box is not fitted twice.
 
     Returns:
         The parts that do not exist are None: no box for a point behind the camera, no size
@@ -41,10 +41,10 @@ def fit_ball(
     pixel = camera.project(point[None])[0]
     seen = not np.isnan(pixel[0])
     error = float(np.hypot(*(pixel - center))) if seen else None
-    diameter, off_ray = _optimal(camera, center, point, diameter_m)
+    diameter, off_ray = _optimal_diameter_or_none(camera, center, point, diameter_m)
     annotated = ball.box.diameter if ball.box is not None else None
     depth = float(camera.pitch_to_camera(point[None])[0, 2])
-    alone = _monocular(camera, ball, diameter_m)
+    alone = _position_from_box(camera, ball, diameter_m)
     return BallFit(
         reprojected=ImagePoint(float(pixel[0]), float(pixel[1])) if seen else None,
         error_px=error,
@@ -64,7 +64,7 @@ def fit_ball(
     )
 
 
-def expect_ball(
+def predict_ball_in_view(
     calibration: Calibration, size: ImageSize, ball: Ball3D, diameter_m: float
 ) -> ExpectedBall | None:
     """Where a view should show the 3D ball; None where it has no camera or the ball is behind it.
@@ -91,14 +91,16 @@ def expect_ball(
     )
 
 
-def _monocular(camera: Camera, ball: BallAnnotation, diameter_m: float) -> FloatArray | None:
+def _position_from_box(
+    camera: Camera, ball: BallAnnotation, diameter_m: float
+) -> FloatArray | None:
     if ball.box is None or ball.box.diameter <= 0:
         return None
     found = position_from_diameter(camera, np.array(ball.box.center), ball.box.diameter, diameter_m)
     return found if np.isfinite(found).all() else None
 
 
-def _optimal(
+def _optimal_diameter_or_none(
     camera: Camera, center: ImagePoint, point: FloatArray, diameter_m: float
 ) -> tuple[float | None, float | None]:
     try:

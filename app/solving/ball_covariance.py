@@ -25,7 +25,7 @@ _ROUNDING = 1e-9
 """Sums this close to a limit, relatively, are computed once more the exact way."""
 
 
-def click_variance(
+def ball_click_variance(
     diagonal: FloatArray,
     ball_px: FloatArray,
     policy: Policy,
@@ -52,7 +52,7 @@ def click_variance(
     return np.float_power(noise * sigma, 2)
 
 
-def carried_covariances(
+def projected_calibration_covariances(
     parameters: FloatArray, covariances: FloatArray, points: FloatArray, diagonals: FloatArray
 ) -> FloatArray:
     """Covariance of the projected points due to that of the calibrations, square pixels, (N, 2, 2).
@@ -68,7 +68,7 @@ def carried_covariances(
     return carried
 
 
-def picture_covariances(
+def projected_picture_covariances(
     parameters: FloatArray,
     covariances: FloatArray,
     points: FloatArray,
@@ -76,7 +76,7 @@ def picture_covariances(
     pictures: FloatArray,
     stretches: FloatArray,
 ) -> FloatArray:
-    """``carried_covariances`` where pictures may have been stretched or cropped, (N, 2, 2).
+    """``projected_calibration_covariances`` where pictures may have been stretched or cropped, (N, 2, 2).
 
     A wider picture moves what is beside the axis, another axis moves everything: both go together
     with the camera, so neither is known as badly as it would be alone.
@@ -84,7 +84,7 @@ def picture_covariances(
     Args:
         parameters: Of the cameras as the pictures were taken, shape (N, 8).
         covariances: Of the parameters, shape (N, 8, 8).
-        points: As in ``carried_covariances``.
+        points: As in ``projected_calibration_covariances``.
         diagonals: As there.
         pictures: Covariances of aspect and shifts with all eleven numbers, shape (N, 3, 11).
         stretches: Aspect, and how far right of the axis the point is seen, pixels, shape (N, 2).
@@ -103,7 +103,7 @@ def picture_covariances(
     return found
 
 
-def known_covariances(facts: Facts, views: IntArray, points: FloatArray) -> FloatArray:
+def calibration_pixel_covariances(facts: Facts, views: IntArray, points: FloatArray) -> FloatArray:
     """Covariance of balls' pixels due to calibrations whose covariance is known, (N, 2, 2).
 
     Args:
@@ -113,10 +113,10 @@ def known_covariances(facts: Facts, views: IntArray, points: FloatArray) -> Floa
     """
     numbers = facts.rows("view_parameters", views), facts.rows("view_covariance", views)
     diagonals = facts.view_diagonal[views]
-    found = carried_covariances(*numbers, points, diagonals)
+    found = projected_calibration_covariances(*numbers, points, diagonals)
     rows = np.flatnonzero(facts.view_changed[views])
     if len(rows):
-        found[rows] = picture_covariances(
+        found[rows] = projected_picture_covariances(
             numbers[0][rows],
             numbers[1][rows],
             points[rows],
@@ -127,7 +127,7 @@ def known_covariances(facts: Facts, views: IntArray, points: FloatArray) -> Floa
     return found
 
 
-def click_covariances(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
+def click_pixel_covariances(facts: Facts, views: IntArray, policy: Policy) -> FloatArray:
     """Covariance of the ball's pixel by the click and by given cameras, square pixels, (N, 2, 2).
 
     Args:
@@ -135,7 +135,7 @@ def click_covariances(facts: Facts, views: IntArray, policy: Policy) -> FloatArr
         views: Rows of the views, shape (N,).
         policy: Holds the noises.
     """
-    noise = click_variance(
+    noise = ball_click_variance(
         facts.view_diagonal[views],
         facts.view_ball_px[views],
         policy,
@@ -157,10 +157,10 @@ def pixel_covariances(
         points: The ball of each of them, pitch frame, metres, shape (N, 3).
         policy: Holds the noises.
     """
-    found = click_covariances(facts, views, policy)
+    found = click_pixel_covariances(facts, views, policy)
     known = np.flatnonzero(facts.view_known[views])
     rows = views[known]
-    found[known] += known_covariances(facts, rows, points[known])
+    found[known] += calibration_pixel_covariances(facts, rows, points[known])
     return found
 
 
@@ -180,11 +180,11 @@ def calibration_covariance(
     known = numbers.parameters[None], numbers.covariance[None]
     where = point[None], np.array([size.diagonal])
     if numbers.picture is None:
-        found = carried_covariances(*known, *where)
+        found = projected_calibration_covariances(*known, *where)
     else:
         right = camera.project(point[None])[0, 0] - camera.principal_point[0]
         stretch = np.array([[camera_aspect(camera), right]])
-        found = picture_covariances(*known, *where, numbers.picture[None], stretch)
+        found = projected_picture_covariances(*known, *where, numbers.picture[None], stretch)
     alone: FloatArray = found[0]
     return alone
 
@@ -210,11 +210,11 @@ def ray_covariances(
         policy: Holds the noises.
     """
     diagonals = np.array([observation.size.diagonal for observation in observations])
-    noise = click_variance(
+    noise = ball_click_variance(
         diagonals,
         np.array([observation.diameter_px for observation in observations]),
         policy,
-        np.array([observation.is_bare for observation in observations]),
+        np.array([observation.is_given_without_uncertainty for observation in observations]),
         np.array([observation.noise for observation in observations]),
     )
     found: FloatArray = noise[:, None, None] * np.eye(2)
@@ -230,11 +230,13 @@ def ray_covariances(
         rows = [*plain]
         parameters = np.array([item.parameters for item in plain.values()])
         covariances = np.array([item.covariance for item in plain.values()])
-        found[rows] += carried_covariances(parameters, covariances, points[rows], diagonals[rows])
+        found[rows] += projected_calibration_covariances(
+            parameters, covariances, points[rows], diagonals[rows]
+        )
     return found
 
 
-def longest_sigma(covariances: FloatArray) -> FloatArray:
+def major_axis_sigma(covariances: FloatArray) -> FloatArray:
     """Standard deviation along the longest axis, metres, infinite where nothing is known, (N,).
 
     Args:
@@ -246,13 +248,13 @@ def longest_sigma(covariances: FloatArray) -> FloatArray:
     return sigma
 
 
-def is_certain(sigma: FloatArray, limit_m: float) -> BoolArray:
+def is_sigma_within(sigma: FloatArray, limit_m: float) -> BoolArray:
     """Whether standard deviations along the longest axis are at most so many metres, NaN is not, (N,)."""
     certain: BoolArray = limit_m - sigma >= 0
     return certain
 
 
-def is_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
+def is_covariance_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
     """Whether the standard deviation along the longest axis is at most so many metres, (N,).
 
     Args:
@@ -264,7 +266,7 @@ def is_within(covariances: FloatArray, sigma_m: float) -> BoolArray:
     # The longest lies between the largest of the three and their sum: few need eigenvalues.
     within: BoolArray = variances.sum(axis=1) * (1 + _ROUNDING) < limit
     near = np.flatnonzero(~within & ~(variances.max(axis=1) * (1 - _ROUNDING) > limit))
-    within[near] = is_certain(longest_sigma(covariances[near]), sigma_m)
+    within[near] = is_sigma_within(major_axis_sigma(covariances[near]), sigma_m)
     return within
 
 
@@ -311,18 +313,18 @@ class MeanCovariance:
         """
         facts = self._facts
         with self._lock, np.errstate(invalid="ignore"):
-            self._update(valid, groups, points)
+            self._update_slopes(valid, groups, points)
             wanted = np.zeros(facts.groups, bool)
             wanted[groups] = True
             views = np.flatnonzero(self._used & wanted[facts.view_group])
             slopes, pixels = self._slope[views], self._carried[views]
-            pixels = click_covariances(facts, views, policy) + pixels
+            pixels = click_pixel_covariances(facts, views, policy) + pixels
             parts = (slopes.transpose(0, 2, 1) @ pixels @ slopes).reshape(-1, 9)
         owner = np.searchsorted(groups, facts.view_group[views])
         total = [np.bincount(owner, part, minlength=len(groups)) for part in parts.T]
         return np.array(total, float).T.reshape(-1, 3, 3)
 
-    def _update(self, valid: BoolArray, groups: IntArray, points: FloatArray) -> None:
+    def _update_slopes(self, valid: BoolArray, groups: IntArray, points: FloatArray) -> None:
         """Compute slopes and carried covariances anew where the valid pairs are others."""
         facts = self._facts
         pairs = np.zeros(facts.groups, np.int64)
@@ -334,15 +336,19 @@ class MeanCovariance:
         fresh[groups[new]] = True
         place = np.zeros((facts.groups, 3))
         place[groups] = points
-        views, slopes = _mean_slopes(facts, np.flatnonzero(valid & fresh[facts.pair_group]))
+        views, slopes = _mean_point_derivatives(
+            facts, np.flatnonzero(valid & fresh[facts.pair_group])
+        )
         self._pairs[fresh] = pairs[fresh]
         self._used[fresh[facts.view_group]] = False
         self._used[views], self._slope[views] = True, slopes
         known = views[facts.view_known[views]]
-        self._carried[known] = known_covariances(facts, known, place[facts.view_group[known]])
+        self._carried[known] = calibration_pixel_covariances(
+            facts, known, place[facts.view_group[known]]
+        )
 
 
-def _mean_slopes(facts: Facts, pairs: IntArray) -> tuple[IntArray, FloatArray]:
+def _mean_point_derivatives(facts: Facts, pairs: IntArray) -> tuple[IntArray, FloatArray]:
     """How far the mean of pairs moves with the pixel of each of their views.
 
     Args:

@@ -26,11 +26,11 @@ from app.solving.noise_grid import (
     NORMAL_95,
     SPREAD,
     STUDENT,
-    expected_cost,
-    held_log,
+    calibrated_log_sigma,
     jackknife_variance,
+    lowest_cost_vertex,
     posterior_variance,
-    vertex,
+    sigma_prior_cost,
 )
 from app.solving.triangulate import BallObservation
 
@@ -69,8 +69,8 @@ _SHARE_STEP = float(SHARES[1] - SHARES[0])
 
 
 @dataclass(frozen=True)
-class Miss:
-    """One number that rays leave unexplained: ``miss`` has a variance linear in the squared noise.
+class RayResidual:
+    """One residual of the rays to a ball; the variance of ``miss`` is linear in the squared noise.
 
     Attributes:
         miss: Pixels, along a direction in the images together that no 3D point moves in.
@@ -127,7 +127,7 @@ class BallNoise:
     share_interval: tuple[float, float] | None = None
 
 
-def misses_of(ball: Ball3D, observations: Sequence[BallObservation]) -> tuple[Miss, ...]:
+def ray_residuals(ball: Ball3D, observations: Sequence[BallObservation]) -> tuple[RayResidual, ...]:
     """What the rays to the ball of one group leave unexplained: 2 V - 3 numbers of V views.
 
     Given cameras with a covariance are left aside: those of one rig err together, and a
@@ -141,7 +141,7 @@ def misses_of(ball: Ball3D, observations: Sequence[BallObservation]) -> tuple[Mi
         observation
         for observation in observations
         if observation.view in ball.views
-        and (observation.calibration.source != "given" or observation.is_bare)
+        and (observation.calibration.source != "given" or observation.is_given_without_uncertainty)
     ]
     if len(seen) < 2:
         return ()
@@ -163,7 +163,7 @@ def misses_of(ball: Ball3D, observations: Sequence[BallObservation]) -> tuple[Mi
     squared = (normals**2).reshape(len(seen), 2, -1).sum(axis=1).T
     units = np.array([(observation.size.diagonal / CLICK_DIAGONAL) ** 2 for observation in seen])
     diameters = np.array([observation.diameter_px**2 for observation in seen])
-    bare = np.array([observation.is_bare for observation in seen])
+    bare = np.array([observation.is_given_without_uncertainty for observation in seen])
     columns = (
         offsets @ normals,
         squared @ units,
@@ -176,12 +176,12 @@ def misses_of(ball: Ball3D, observations: Sequence[BallObservation]) -> tuple[Mi
     found = []
     for row, parts in zip(np.transpose(columns).tolist(), own.tolist(), strict=True):
         by_view = tuple((name, *part) for name, part in zip(names, parts, strict=True))
-        found.append(Miss(row[0], row[1], row[2], row[3], row[4], by_view))
+        found.append(RayResidual(row[0], row[1], row[2], row[3], row[4], by_view))
     return tuple(found)
 
 
 @dataclass(frozen=True)
-class _Expected:
+class _NoisePrior:
     """What is known of a sigma before its misses: its median and spread, and the diameter's share."""
 
     sigma: float
@@ -191,10 +191,10 @@ class _Expected:
     @property
     def costs(self) -> FloatArray:
         """Of each of ``SIGMAS``."""
-        return expected_cost(_LOGS, self.sigma, self.spread)
+        return sigma_prior_cost(_LOGS, self.sigma, self.spread)
 
 
-def estimate_ball_noise(misses: Sequence[Miss], policy: Policy = PAPER) -> BallNoise:
+def estimate_ball_noise(misses: Sequence[RayResidual], policy: Policy = PAPER) -> BallNoise:
     """The noise that explains the misses of a dataset best, mistakes left aside.
 
     What is expected of it is what the policy ``paper`` assumes, whatever judges the dataset: so a
@@ -212,8 +212,8 @@ def estimate_ball_noise(misses: Sequence[Miss], policy: Policy = PAPER) -> BallN
     clicked, rest = rows[free], rows[~free]
     click = share = given = interval = None
     if len(clicked):
-        known = _Expected(PAPER.click_sigma_px, SPREAD, PAPER.box_sigma_share)
-        found = _jackknifed(clicked, known)
+        known = _NoisePrior(PAPER.click_sigma_px, SPREAD, PAPER.box_sigma_share)
+        found = _jackknife_sigma(clicked, known)
         if found is not None:
             click, share, interval = found
     if len(rest):
@@ -223,54 +223,56 @@ def estimate_ball_noise(misses: Sequence[Miss], policy: Policy = PAPER) -> BallN
         variance = rest[:, 4] + noise**2 * rest[:, 1] + thought**2 * rest[:, 2]
         nothing = np.zeros(len(rest))
         columns = np.column_stack([rest[:, 0], rest[:, 3], nothing, nothing, variance])
-        found = _jackknifed(columns, _Expected(GIVEN_PX, GIVEN_SPREAD, 0.0))
+        found = _jackknife_sigma(columns, _NoisePrior(GIVEN_PX, GIVEN_SPREAD, 0.0))
         given = None if found is None else found[0]
     return BallNoise(click, share, given, interval if clicked[:, 2].any() else None)
 
 
-def _jackknifed(
-    rows: FloatArray, known: _Expected
+def _jackknife_sigma(
+    rows: FloatArray, known: _NoisePrior
 ) -> tuple[Sigma, float, tuple[float, float]] | None:
     """Sigma and share and its interval; intervals are from leaving out one block after the other.
 
     None where no sigma that is tried explains the rows better than the first or the last one.
 
     Args:
-        rows: Of ``Miss``, the click's slope in the second column, shape (N, 5).
+        rows: Of ``RayResidual``, the click's slope in the second column, shape (N, 5).
         known: Before them.
     """
-    whole, found, wide = _fit(rows, known)
+    whole, found, wide = _fit_sigma(rows, known)
     if not ENDS[0] < whole < ENDS[1]:
         return None
     block = np.arange(len(rows)) * BLOCKS // len(rows)
     # One number alone has nothing to be left out of.
     rests = [rest for at in np.unique(block) if len(rest := rows[block != at])] or [rows]
-    parts = np.array([_fit(rest, known)[:2] for rest in rests])
+    parts = np.array([_fit_sigma(rest, known)[:2] for rest in rests])
     scatter, of_share = jackknife_variance(parts).tolist()
-    kept = _kept(rows, known)
+    kept = _without_outliers(rows, known)
     numbers = int(kept.sum())
     variance = posterior_variance(scatter, numbers, known.spread)
     half = STUDENT * math.sqrt(variance)
     # Where neighbours err alike, there are fewer independent numbers than there seem to be.
     weight = posterior_variance(0.0, numbers, known.spread) / variance
-    sigma = math.exp(held_log(_LOGS, weight * _costs(rows[kept], found) + known.costs))
+    sigma = math.exp(
+        calibrated_log_sigma(_LOGS, weight * _sigma_costs(rows[kept], found) + known.costs)
+    )
     wide = max(STUDENT * math.sqrt(of_share), wide)
     low, high = math.exp(whole - half), math.exp(whole + half)
     interval = max(found - wide, 0.0), found + wide
     return Sigma(sigma, low, high, len(rows), len(rows) - numbers), found, interval
 
 
-def _fit(rows: FloatArray, known: _Expected) -> tuple[float, float, float]:
+def _fit_sigma(rows: FloatArray, known: _NoisePrior) -> tuple[float, float, float]:
     """Logarithm of the most likely sigma, the share of the diameter, and half of the interval of the
     share by the likelihood."""
-    kept = rows[_kept(rows, known)]
+    kept = rows[_without_outliers(rows, known)]
     if not kept[:, 2].any():
-        return _lowest(_costs(kept, known.share) + known.costs)[1], known.share, 0.0
-    fits = [_lowest(_costs(kept, share) + known.costs) for share in SHARES]
+        return _lowest_cost(_sigma_costs(kept, known.share) + known.costs)[1], known.share, 0.0
+    fits = [_lowest_cost(_sigma_costs(kept, share) + known.costs) for share in SHARES]
     prior = ((SHARES - known.share) / SHARE_SIGMA) ** 2 / 2
     costs = prior + [least for least, _ in fits]
     at = int(np.argmin(costs))
-    off = vertex(costs, at)[0]
+    off = lowest_cost_vertex(costs, at)[0]
     share = float(SHARES[at]) + _SHARE_STEP * off
     log = float(np.interp(share, SHARES, [log for _, log in fits]))
     inside = np.clip(at, 1, len(SHARES) - 2)
@@ -278,20 +280,20 @@ def _fit(rows: FloatArray, known: _Expected) -> tuple[float, float, float]:
     return log, share, NORMAL_95 / math.sqrt(max(bend, SHARE_SIGMA**-2))
 
 
-def _lowest(costs: FloatArray) -> tuple[float, float]:
+def _lowest_cost(costs: FloatArray) -> tuple[float, float]:
     """The lowest cost and the logarithm of its sigma, between the points of the grid."""
     place = int(np.argmin(costs))
-    off, least = vertex(costs, place)
+    off, least = lowest_cost_vertex(costs, place)
     return least, float(_LOGS[place]) + off * _STEP
 
 
-def _kept(rows: FloatArray, known: _Expected) -> BoolArray:
+def _without_outliers(rows: FloatArray, known: _NoisePrior) -> BoolArray:
     """Numbers that are no mistakes, from the median outwards until no other one joins."""
     squared = rows[:, 0] ** 2
     kept: BoolArray = squared <= np.median(squared)
     trimmed = HALF
     for _ in range(_ROUNDS):
-        place = int(np.argmin(_costs(rows[kept], known.share, trimmed) + known.costs))
+        place = int(np.argmin(_sigma_costs(rows[kept], known.share, trimmed) + known.costs))
         variance = SIGMAS[place] ** 2 * rows[:, 1] + known.share**2 * rows[:, 2] + rows[:, 4]
         wider = squared <= LIMIT * variance
         trimmed = TRIMMED
@@ -301,7 +303,7 @@ def _kept(rows: FloatArray, known: _Expected) -> BoolArray:
     return kept
 
 
-def _costs(rows: FloatArray, share: float, trimmed: float = TRIMMED) -> FloatArray:
+def _sigma_costs(rows: FloatArray, share: float, trimmed: float = TRIMMED) -> FloatArray:
     """Negative log-likelihood for each of ``SIGMAS``; ``trimmed`` makes up for missing tails."""
     explained = rows[:, 4] + share**2 * rows[:, 2]
     variance = SIGMAS[:, None] ** 2 * rows[:, 1] + explained

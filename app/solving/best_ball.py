@@ -14,7 +14,7 @@ from app.geometry.likely_point import CameraTable, likely_points
 from app.soccer.policy import Policy
 from app.soccer.solution import BestBall, ChiSquare, Pair
 from app.solving.ball_covariance import ray_covariances
-from app.solving.chi_square import widening
+from app.solving.chi_square import group_sigma_widening
 from app.solving.triangulate import BallObservation
 
 MAX_MAHALANOBIS = 13.8
@@ -22,7 +22,7 @@ MAX_MAHALANOBIS = 13.8
 
 
 @dataclass(frozen=True)
-class _Estimate:
+class _BallEstimate:
     """A point from some views, its covariance, and each view's squared Mahalanobis distance."""
 
     numbers: tuple[int, ...]
@@ -55,17 +55,17 @@ def best_ball(
     starts = {
         frozenset((pair.a, pair.b)): np.array(pair.point)
         for pair in pairs
-        if pair.failed in (None, "reprojection") and not _is_behind(pair, usable)
+        if pair.failed in (None, "reprojection") and not _is_behind_a_camera(pair, usable)
     }
     if not starts:
         return None
-    views = _Views(usable, policy)
+    views = _ViewSubsets(usable, policy)
     estimate = _most_consistent(views, starts)
     if estimate is None:
         return None
     freedom, total = 2 * len(estimate.numbers) - 3, float(estimate.distances.sum())
     test = ChiSquare(total, freedom, float(chdtrc(freedom, total)), ())
-    covariance = widening(test) ** 2 * estimate.covariance
+    covariance = group_sigma_widening(test) ** 2 * estimate.covariance
     used = tuple(views.observations[number].view for number in estimate.numbers)
     x, y, z = estimate.point.tolist()
     return BestBall(
@@ -76,13 +76,15 @@ def best_ball(
         contradicting=tuple(
             observation.view for observation in usable if observation.view not in used
         ),
-        influence_m=_influence(views, estimate),
+        influence_m=_leave_one_out_shifts(views, estimate),
     )
 
 
-def _most_consistent(views: _Views, starts: dict[frozenset[str], FloatArray]) -> _Estimate | None:
+def _most_consistent(
+    views: _ViewSubsets, starts: dict[frozenset[str], FloatArray]
+) -> _BallEstimate | None:
     """The estimate from the largest set of views that agree, else from the best pair."""
-    fallback: list[_Estimate] = []
+    fallback: list[_BallEstimate] = []
     for count in range(len(views.observations), 1, -1):
         chosen, origins = [], []
         for numbers in combinations(range(len(views.observations)), count):
@@ -91,7 +93,7 @@ def _most_consistent(views: _Views, starts: dict[frozenset[str], FloatArray]) ->
             if inside:
                 chosen.append(numbers)
                 origins.append(np.mean(inside, axis=0))
-        found = [item for item in views.estimates(chosen, origins) if item is not None]
+        found = [item for item in views.estimate_subsets(chosen, origins) if item is not None]
         agreeing = [estimate for estimate in found if estimate.is_consistent]
         if agreeing:
             return min(agreeing, key=lambda item: float(item.distances.sum()))
@@ -99,13 +101,15 @@ def _most_consistent(views: _Views, starts: dict[frozenset[str], FloatArray]) ->
     return min(fallback, key=lambda item: float(item.distances.sum()), default=None)
 
 
-def _influence(views: _Views, estimate: _Estimate) -> tuple[tuple[str, float], ...]:
+def _leave_one_out_shifts(
+    views: _ViewSubsets, estimate: _BallEstimate
+) -> tuple[tuple[str, float], ...]:
     """How far the point moves when one view is left out, metres; with three views or more."""
     if len(estimate.numbers) < 3:
         return ()
     numbers = estimate.numbers
     rest = [[other for other in numbers if other != left] for left in numbers]
-    without = views.estimates(rest, [estimate.point] * len(rest))
+    without = views.estimate_subsets(rest, [estimate.point] * len(rest))
     return tuple(
         (views.observations[left].view, float(np.linalg.norm(found.point - estimate.point)))
         for left, found in zip(numbers, without, strict=True)
@@ -113,7 +117,7 @@ def _influence(views: _Views, estimate: _Estimate) -> tuple[tuple[str, float], .
     )
 
 
-class _Views:
+class _ViewSubsets:
     """The views of a group, and the most likely point of any of their subsets."""
 
     def __init__(self, observations: Sequence[BallObservation], policy: Policy):
@@ -122,9 +126,9 @@ class _Views:
         self._centers = np.array([observation.center for observation in observations])
         self._cameras = CameraTable.of([observation.camera for observation in observations])
 
-    def estimates(
+    def estimate_subsets(
         self, chosen: Sequence[Sequence[int]], starts: Sequence[FloatArray]
-    ) -> list[_Estimate | None]:
+    ) -> list[_BallEstimate | None]:
         """Gauss-Newton from a start each; None where it does not settle in front of all.
 
         Args:
@@ -136,23 +140,25 @@ class _Views:
         views, points = np.array(chosen), np.array(starts)
         # The uncertainties hardly change on the way.
         made = likely_points(
-            self._cameras, self._centers, views, points, self._covariances(views, points)
+            self._cameras, self._centers, views, points, self._click_covariances(views, points)
         )
         return [
-            _Estimate(tuple(numbers), made.points[row], made.covariances[row], made.distances[row])
+            _BallEstimate(
+                tuple(numbers), made.points[row], made.covariances[row], made.distances[row]
+            )
             if made.found[row]
             else None
             for row, numbers in enumerate(chosen)
         ]
 
-    def _covariances(self, chosen: IntArray, points: FloatArray) -> FloatArray:
+    def _click_covariances(self, chosen: IntArray, points: FloatArray) -> FloatArray:
         """Covariance of each click at its start, square pixels, shape (E, V, 2, 2)."""
         observations = [self.observations[view] for view in chosen.ravel().tolist()]
         places = np.repeat(points, chosen.shape[1], axis=0)
         return ray_covariances(observations, places, self._policy).reshape(*chosen.shape, 2, 2)
 
 
-def _is_behind(pair: Pair, observations: Sequence[BallObservation]) -> bool:
+def _is_behind_a_camera(pair: Pair, observations: Sequence[BallObservation]) -> bool:
     point = np.array([pair.point])
     return any(
         observation.camera.pitch_to_camera(point)[0, 2] <= 0

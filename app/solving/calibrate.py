@@ -30,17 +30,17 @@ from app.soccer.solution import (
     Suspect,
 )
 from app.solving.jaccard import (
-    evaluated,
+    as_evaluator_markings,
     jaccard,
+    marking_outcomes,
     measure_markings,
-    not_missing,
-    outcomes,
     project_markings,
+    unannotated_not_missing,
 )
 from app.solving.labels import find_suspects
 from app.solving.lone_frame import LoneFrame, lone_frame
-from app.solving.main_position import PositionPrior, match_prior
-from app.solving.observations import Observations, observe
+from app.solving.main_position import PositionPrior, position_prior_of_match
+from app.solving.observations import Observations, observations_of_lines
 from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture_camera import WIDTH, PictureProblem, estimate_picture, warp_of
 from app.solving.picture_findings import find_picture
@@ -79,7 +79,7 @@ def calibrate(
         policy: Robust scale, prior of the distortion, whether labels are checked.
     """
     pitch = policy.fitted(pitch)
-    observations = observe(lines, pitch, size)
+    observations = observations_of_lines(lines, pitch, size)
     measurements = measurement_count(observations)
     if measurements < MIN_MEASUREMENTS:
         count = len(observations.markings)
@@ -95,8 +95,12 @@ def calibrate(
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_main(fit, observations)
     picture = find_picture(problem, fit.parameters, observations)
-    found = replace(_calibration_of(problem, fit, observations), suspects=suspects, picture=picture)
-    return measure(found, lines, pitch, size, shortest_px=shortest_px(policy, size))
+    found = replace(
+        _calibration_of_fit(problem, fit, observations), suspects=suspects, picture=picture
+    )
+    return measure_calibration(
+        found, lines, pitch, size, shortest_px=shortest_counted_marking_px(policy, size)
+    )
 
 
 def calibrate_near(
@@ -117,15 +121,17 @@ def calibrate_near(
         return alone
     problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
     left_out = [suspect.marking for suspect in alone.suspects]
-    observations = observe(lines, pitch, size).without(*left_out)
+    observations = observations_of_lines(lines, pitch, size).without(*left_out)
     fit = Resection(problem.parameters(alone.camera), 0.0)
     shared = problem.refine_near(fit, observations, near)
     if shared is fit:
         return alone
-    found = _calibration_of(problem, shared, observations)
+    found = _calibration_of_fit(problem, shared, observations)
     # Whether the picture was stretched or cropped its own lines say, to the camera that fits them.
     found = replace(found, suspects=alone.suspects, picture=alone.picture)
-    return measure(found, lines, pitch, size, shortest_px=shortest_px(policy, size))
+    return measure_calibration(
+        found, lines, pitch, size, shortest_px=shortest_counted_marking_px(policy, size)
+    )
 
 
 def calibrate_picture(
@@ -141,39 +147,39 @@ def calibrate_picture(
         picture: What was done to it.
     """
     problem, pitch = ResectionProblem.of(size, policy), policy.fitted(pitch)
-    observations = observe(lines, pitch, size)
+    observations = observations_of_lines(lines, pitch, size)
     if measurement_count(observations) < MIN_MEASUREMENTS:
         return calibrate(lines, pitch, size, policy)
     try:
         found = estimate_picture(problem, observations, picture)
-        alone = calibrate(found.undone(lines, size), pitch, size, policy)
+        alone = calibrate(found.lines_as_taken(lines, size), pitch, size, policy)
         left_out = [suspect.marking for suspect in alone.suspects]
         if left_out:
             observations = observations.without(*left_out)
             found = estimate_picture(problem, observations, picture)
-            alone = calibrate(found.undone(lines, size), pitch, size, policy)
+            alone = calibrate(found.lines_as_taken(lines, size), pitch, size, policy)
     except DegenerateGeometryError as error:
         return Calibration("lines", None, reason=error.message)
     if alone.camera is None:
         return alone
     covariance, whole = _picture_covariance(problem, observations, picture, found, alone.camera)
-    return measure(
+    return measure_calibration(
         replace(
             alone,
-            camera=found.done(alone.camera, size),
+            camera=found.camera_of_shown_picture(alone.camera, size),
             covariance=row_by_row(covariance) if np.isfinite(covariance).all() else None,
-            unobservable=_unobservable(covariance),
+            unobservable=_unobservable_parameters(covariance),
             picture=None,
             picture_covariance=row_by_row(whole) if np.isfinite(whole).all() else None,
         ),
         lines,
         pitch,
         size,
-        shortest_px=shortest_px(policy, size),
+        shortest_px=shortest_counted_marking_px(policy, size),
     )
 
 
-def look_alone(
+def lone_frame_of(
     found: Calibration, lines: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> LoneFrame | None:
     """What nobody says of the pitch and the picture of a frame that was calibrated from its lines.
@@ -190,12 +196,12 @@ def look_alone(
     problem = ResectionProblem.of(size, policy)
     left_out = [suspect.marking for suspect in found.suspects]
     pitch = policy.fitted(pitch)
-    observations = observe(lines, pitch, size)
+    observations = observations_of_lines(lines, pitch, size)
     parameters = problem.parameters(found.camera)
     return lone_frame(problem, parameters, observations, pitch, policy, left_out)
 
 
-def as_lone(found: Calibration, alone: LoneFrame | None) -> Calibration:
+def with_lone_covariance(found: Calibration, alone: LoneFrame | None) -> Calibration:
     """The calibration with that in its covariance; what the lines determine they still do."""
     return found if alone is None else replace(found, covariance=row_by_row(alone.covariance))
 
@@ -218,7 +224,7 @@ def _picture_covariance(
     return search.carried(unknowns, whole), whole
 
 
-def _calibration_of(
+def _calibration_of_fit(
     problem: ResectionProblem, fit: Resection, observations: Observations
 ) -> Calibration:
     """The camera and how well the lines determine it; the priors count for nothing there."""
@@ -230,7 +236,7 @@ def _calibration_of(
         "lines",
         problem.camera(fit.parameters),
         covariance=row_by_row(covariance) if np.isfinite(covariance).all() else None,
-        unobservable=_unobservable(covariance),
+        unobservable=_unobservable_parameters(covariance),
     )
 
 
@@ -244,35 +250,35 @@ def calibrate_station(
 
     ``shared`` is what other pictures of the match say of its position.
     """
-    found = _calibrated(station, pitch, policy, shared)
+    found = _calibrate_all_markings(station, pitch, policy, shared)
     if not station.not_visible:
         return found
-    return _measured(found, station, pitch, policy)
+    return _measure_on_station(found, station, pitch, policy)
 
 
-def _calibrated(
+def _calibrate_all_markings(
     station: Station, pitch: Pitch, policy: CalibrationPolicy, shared: SharedPosition | None
 ) -> Calibration:
     """``calibrate_station`` as if every visible marking was one that people draw."""
     if station.given is not None and station.calibration == "given":
         given = Calibration("given", station.given, covariance=station.given_covariance)
-        return _measured(given, station, pitch, policy)
+        return _measure_on_station(given, station, pitch, policy)
     if station.picture is not None:
         return calibrate_picture(station.lines, pitch, station.size, policy, station.picture)
     alone = calibrate(station.lines, pitch, station.size, policy)
     if shared is None:
         return alone
-    near = match_prior(np.array(shared.mean), np.array(shared.sigma))
+    near = position_prior_of_match(np.array(shared.mean), np.array(shared.sigma))
     return calibrate_near(alone, near, station.lines, pitch, station.size, policy)
 
 
-def _measured(
+def _measure_on_station(
     found: Calibration, station: Station, pitch: Pitch, policy: CalibrationPolicy
 ) -> Calibration:
     """A calibration measured against the lines of its station, and what is said not to be visible."""
-    size, shortest = station.size, shortest_px(policy, station.size)
+    size, shortest = station.size, shortest_counted_marking_px(policy, station.size)
     fitted = policy.fitted(pitch)
-    return measure(found, station.lines, fitted, size, station.not_visible, shortest)
+    return measure_calibration(found, station.lines, fitted, size, station.not_visible, shortest)
 
 
 def calibrate_paint(
@@ -310,10 +316,10 @@ def calibrate_paint(
         camera=resection.camera(found.parameters),
         covariance=row_by_row(found.covariance),
         pitch_covariance=row_by_row(found.pitch),
-        unobservable=_unobservable(found.covariance),
+        unobservable=_unobservable_parameters(found.covariance),
         paint=replace(fit, error_px=found.error_px),
     )
-    return _measured(painted, station, pitch, policy)
+    return _measure_on_station(painted, station, pitch, policy)
 
 
 def calibrate_view(
@@ -331,21 +337,23 @@ def calibrate_view(
         policy: What a calibration depends on.
         known: Calibrations by key; that of the clicks is not computed again where it is there.
     """
-    key = clicks_key(group, view, policy)
-    clicked = known.get(key) or calibrate_clicks(group, view, policy)
-    reading = wanted_paint(group, view, policy)
+    key = click_calibration_key(group, view, policy)
+    clicked = known.get(key) or calibrate_from_clicks(group, view, policy)
+    reading = usable_paint_reading(group, view, policy)
     if reading is None or reading.sought_for != paint_search_key(group, view, policy):
         if not is_lone(group, view, policy):
             return clicked
         station = view.station
-        alone = look_alone(clicked, station.lines, group.pitch, station.size, policy)
-        return as_lone(clicked, alone)
+        alone = lone_frame_of(clicked, station.lines, group.pitch, station.size, policy)
+        return with_lone_covariance(clicked, alone)
     return calibrate_paint(clicked, reading, view.station, group.pitch, policy)
 
 
-def calibrate_clicks(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
+def calibrate_from_clicks(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
     """``calibrate_view`` without paint."""
-    return calibrate_station(view.station, group.pitch, policy, _shared(group, view, policy))
+    return calibrate_station(
+        view.station, group.pitch, policy, _usable_shared_position(group, view, policy)
+    )
 
 
 def view_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
@@ -355,8 +363,8 @@ def view_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
 
 def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str, ...]:
     """The same, and after it the key of the clicks that it starts from where it is another."""
-    key = clicks_key(group, view, policy)
-    reading = wanted_paint(group, view, policy)
+    key = click_calibration_key(group, view, policy)
+    reading = usable_paint_reading(group, view, policy)
     if reading is None or reading.sought_for != paint_search_key(group, view, policy):
         if not is_lone(group, view, policy):
             return (key,)
@@ -365,9 +373,11 @@ def view_keys(group: Group, view: View, policy: CalibrationPolicy) -> tuple[str,
     return painted, key
 
 
-def clicks_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
-    """``calibration_key`` of what ``calibrate_clicks`` makes."""
-    return calibration_key(view.station, group.pitch, policy, _shared(group, view, policy))
+def click_calibration_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
+    """``calibration_key`` of what ``calibrate_from_clicks`` makes."""
+    return calibration_key(
+        view.station, group.pitch, policy, _usable_shared_position(group, view, policy)
+    )
 
 
 def paint_search_key(group: Group, view: View, policy: CalibrationPolicy) -> str:
@@ -376,9 +386,11 @@ def paint_search_key(group: Group, view: View, policy: CalibrationPolicy) -> str
     How that camera is measured has no part in it, nor how noisy its clicks are: neither what counts
     as missing nor the estimated noise of a dataset moves a camera.
     """
-    shared = _shared(group, view, policy)
+    shared = _usable_shared_position(group, view, policy)
     quiet = replace(policy, line_sigma_px=None, line_share=None)
-    return _key(_camera_parts(START_VERSION, view.station, group.pitch, quiet, shared))
+    return _digest_of_parts(
+        _camera_key_parts(START_VERSION, view.station, group.pitch, quiet, shared)
+    )
 
 
 def is_lone(group: Group, view: View, policy: CalibrationPolicy) -> bool:
@@ -393,26 +405,30 @@ def is_lone(group: Group, view: View, policy: CalibrationPolicy) -> bool:
     return not (is_exact or is_said or is_given) and len(group.views) == 1
 
 
-def wanted_paint(group: Group, view: View, policy: CalibrationPolicy) -> PaintReading | None:
+def usable_paint_reading(
+    group: Group, view: View, policy: CalibrationPolicy
+) -> PaintReading | None:
     """What was read for a view, as far as the policy wants it; perhaps for other clicks."""
-    if policy.source != "paint" or not view.takes_paint:
+    if policy.source != "paint" or not view.can_use_paint:
         return None
     return group.paint.get(view.key)
 
 
-def _shared(group: Group, view: View, policy: CalibrationPolicy) -> SharedPosition | None:
+def _usable_shared_position(
+    group: Group, view: View, policy: CalibrationPolicy
+) -> SharedPosition | None:
     """The position of a view's match as far as the policy wants it and the camera moves."""
     if not policy.share_position or view.station.shared:
         return None
     return group.positions.get(view.key)
 
 
-def shortest_px(policy: CalibrationPolicy, size: ImageSize) -> float:
+def shortest_counted_marking_px(policy: CalibrationPolicy, size: ImageSize) -> float:
     """Length below which an undrawn marking does not count as missing, pixels; 0: none is."""
     return policy.shortest_marking_px * size.diagonal / REFERENCE_DIAGONAL
 
 
-def measure(
+def measure_calibration(
     calibration: Calibration,
     lines: Lines,
     pitch: Pitch,
@@ -423,16 +439,18 @@ def measure(
     """The calibration with JaC and the distances of the annotated points filled in.
 
     Without lines there is no JaC; the projected markings are there all the same, but for those that
-    nobody drew and that are ``not_missing``. Distances are those to the goals and lines of ``pitch``,
+    nobody drew and that are ``unannotated_not_missing``. Distances are those to the goals and lines of ``pitch``,
     JaC and the outcomes that it counts are told by the evaluator's.
     """
     if calibration.camera is None:
         return calibration
     measured = measure_markings(project_markings(calibration.camera, pitch, size), lines)
-    judged = evaluated(calibration.camera, pitch, size, lines, measured)
-    for marking in not_missing(judged, lines, not_visible, shortest_px):
+    judged = as_evaluator_markings(calibration.camera, pitch, size, lines, measured)
+    for marking in unannotated_not_missing(judged, lines, not_visible, shortest_px):
         del judged[marking]
-    by_gamma = [outcomes(judged, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT]
+    by_gamma = [
+        marking_outcomes(judged, lines, gamma / 100 * size.diagonal) for gamma in GAMMAS_PERCENT
+    ]
     left_out = {suspect.marking for suspect in calibration.suspects}
     markings = []
     for marking, outcome in by_gamma[0].items():
@@ -465,15 +483,15 @@ def calibration_key(
     shared: SharedPosition | None = None,
 ) -> str:
     """Digest of all that ``calibrate_station`` reads: the same key, the same calibration."""
-    parts = _camera_parts(SOLVER_VERSION, station, pitch, policy, shared)
+    parts = _camera_key_parts(SOLVER_VERSION, station, pitch, policy, shared)
     if station.not_visible:
         parts.append(repr(("not visible", station.not_visible)))
     if policy.shortest_marking_px:
         parts.append(repr(("shortest", policy.shortest_marking_px)))
-    return _key(parts)
+    return _digest_of_parts(parts)
 
 
-def _camera_parts(
+def _camera_key_parts(
     version: str,
     station: Station,
     pitch: Pitch,
@@ -502,11 +520,11 @@ def _camera_parts(
     return parts
 
 
-def _key(parts: list[str]) -> str:
+def _digest_of_parts(parts: list[str]) -> str:
     return digest_of(f"[{', '.join(parts)}]".encode())
 
 
-def _unobservable(covariance: FloatArray) -> tuple[str, ...]:
+def _unobservable_parameters(covariance: FloatArray) -> tuple[str, ...]:
     """Names of what the lines leave open, from the covariance of the parameters."""
     deviations = np.sqrt(np.diag(covariance))
     words = []

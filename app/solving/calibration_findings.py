@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from app.soccer.camera_size import other_size
+from app.soccer.camera_size import size_centred_on_principal_point
 from app.soccer.finding import PITCH_SIZE, Finding, Fix
 from app.soccer.frames import ImageSize, height_above_grass
 from app.soccer.pitch import Pitch
 from app.soccer.solution import Calibration
 from app.solving.calibrate import MAX_POSITION_SIGMA_M
 from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrame
-from app.solving.numbers import metres, pixels
+from app.solving.numbers import format_metres, format_pixels
 from app.solving.picture_findings import BELIEVED, MIN_SHIFT, MIN_STRETCH
 
 MAX_CAMERA_HEIGHT_M = 100.0
@@ -40,17 +40,17 @@ def calibration_findings(
         size: Annotated size.
         view: Key of the view, for findings of a group.
     """
-    slips = _slips(calibration, size)
-    yield from _wrong_labels(calibration, slips, view)
-    yield from _bad_points(slips, size, view)
-    yield from _not_annotated(calibration, size, view)
-    yield from _under_constrained(calibration, view)
-    yield from _picture_geometry(calibration, size, view)
-    yield from _camera_size(calibration, size, view)
-    yield from _implausible_camera(calibration, view)
+    slips = _misplaced_points(calibration, size)
+    yield from _wrong_label_findings(calibration, slips, view)
+    yield from _bad_point_findings(slips, size, view)
+    yield from _not_annotated_findings(calibration, size, view)
+    yield from _under_constrained_findings(calibration, view)
+    yield from _picture_geometry_findings(calibration, size, view)
+    yield from _camera_size_findings(calibration, size, view)
+    yield from _implausible_camera_findings(calibration, view)
 
 
-def _wrong_labels(
+def _wrong_label_findings(
     calibration: Calibration, slips: Mapping[str, tuple[int, float]], view: str | None
 ) -> Iterator[Finding]:
     for suspect in calibration.suspects:
@@ -81,7 +81,7 @@ def _wrong_labels(
         )
 
 
-def _slips(calibration: Calibration, size: ImageSize) -> dict[str, tuple[int, float]]:
+def _misplaced_points(calibration: Calibration, size: ImageSize) -> dict[str, tuple[int, float]]:
     """Single points off their line while all others of the line fit: a slip of the hand.
 
     Returns:
@@ -102,13 +102,13 @@ def _slips(calibration: Calibration, size: ImageSize) -> dict[str, tuple[int, fl
     return found
 
 
-def _bad_points(
+def _bad_point_findings(
     slips: Mapping[str, tuple[int, float]], size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
     for marking, (index, worst) in sorted(slips.items(), key=lambda slip: -slip[1][1]):
         yield Finding(
             "bad_point",
-            f"Point {index + 1} of “{marking}” lies {pixels(worst)} off the line on which its other "
+            f"Point {index + 1} of “{marking}” lies {format_pixels(worst)} off the line on which its other "
             "points lie. Delete it, or move it onto the paint.",
             view,
             marking,
@@ -118,7 +118,7 @@ def _bad_points(
         )
 
 
-def _not_annotated(
+def _not_annotated_findings(
     calibration: Calibration, size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
     if calibration.jac is None or calibration.unobservable:
@@ -132,7 +132,7 @@ def _not_annotated(
         if length > shortest:
             yield Finding(
                 "visible_not_annotated",
-                f"“{fit.marking}” should be visible over {pixels(length)} and is not drawn. "
+                f"“{fit.marking}” should be visible over {format_pixels(length)} and is not drawn. "
                 "Draw it if you see it, or mark it as not visible under Lines.",
                 view,
                 fit.marking,
@@ -141,7 +141,7 @@ def _not_annotated(
             )
 
 
-def _under_constrained(calibration: Calibration, view: str | None) -> Iterator[Finding]:
+def _under_constrained_findings(calibration: Calibration, view: str | None) -> Iterator[Finding]:
     if calibration.camera is None:
         yield Finding(
             "under_constrained",
@@ -161,7 +161,7 @@ def _under_constrained(calibration: Calibration, view: str | None) -> Iterator[F
         )
 
 
-def _picture_geometry(
+def _picture_geometry_findings(
     calibration: Calibration, size: ImageSize, view: str | None
 ) -> Iterator[Finding]:
     """A stretched picture, or one with a middle that is not the camera's, by what is larger."""
@@ -218,11 +218,13 @@ def lone_findings(alone: LoneFrame | None, pitch: Pitch) -> Iterator[Finding]:
     )
 
 
-def _camera_size(calibration: Calibration, size: ImageSize, view: str | None) -> Iterator[Finding]:
+def _camera_size_findings(
+    calibration: Calibration, size: ImageSize, view: str | None
+) -> Iterator[Finding]:
     """A given camera whose principal point is the middle of another size."""
     if calibration.camera is None or calibration.source != "given":
         return
-    other = other_size(calibration.camera, size)
+    other = size_centred_on_principal_point(calibration.camera, size)
     if other is None:
         return
     x, y = calibration.camera.principal_point
@@ -238,7 +240,7 @@ def _camera_size(calibration: Calibration, size: ImageSize, view: str | None) ->
     )
 
 
-def _implausible_camera(calibration: Calibration, view: str | None) -> Iterator[Finding]:
+def _implausible_camera_findings(calibration: Calibration, view: str | None) -> Iterator[Finding]:
     """One finding, with the number of what is wrong first."""
     if calibration.camera is None:
         return
@@ -247,12 +249,12 @@ def _implausible_camera(calibration: Calibration, view: str | None) -> Iterator[
     wrong = [
         (number, threshold, words)
         for number, threshold, is_wrong, words in (
-            (height, 0.0, height <= 0, f"stands {metres(-height)} below the grass"),
+            (height, 0.0, height <= 0, f"stands {format_metres(-height)} below the grass"),
             (
                 height,
                 MAX_CAMERA_HEIGHT_M,
                 height > MAX_CAMERA_HEIGHT_M,
-                f"hangs {metres(height)} above the grass",
+                f"hangs {format_metres(height)} above the grass",
             ),
             (
                 distance,

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.resection import PARAMETERS, parameters_from_camera
-from app.soccer.picture import taken_camera
+from app.soccer.picture import camera_as_taken
 from app.soccer.solution import Calibration
 
 WHOLE = PARAMETERS + 3
@@ -45,5 +45,5 @@ class CameraNumbers:
             covariance = np.reshape(calibration.covariance, (PARAMETERS, PARAMETERS))
             return CameraNumbers(parameters_from_camera(camera, diagonal / 2), covariance)
         whole = np.reshape(calibration.picture_covariance, (WHOLE, WHOLE))
-        parameters = parameters_from_camera(taken_camera(camera), diagonal / 2)
+        parameters = parameters_from_camera(camera_as_taken(camera), diagonal / 2)
         return CameraNumbers(parameters, whole[:PARAMETERS, :PARAMETERS], whole[PARAMETERS:])

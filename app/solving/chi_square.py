@@ -19,7 +19,7 @@ _STEPS = 6
 
 
 @dataclass(frozen=True)
-class Residuals:
+class ChiSquareResiduals:
     """What is left of the clicks once the most likely ball is found, group by group (G).
 
     Attributes:
@@ -37,11 +37,11 @@ class Residuals:
 
     @property
     def widening(self) -> FloatArray:
-        """``widening_of`` each group, shape (G,)."""
-        return widening_of(self.chi_square, self.freedom, self.p_value)
+        """``sigma_widening`` each group, shape (G,)."""
+        return sigma_widening(self.chi_square, self.freedom, self.p_value)
 
 
-def widening_of(chi_square: FloatArray, freedom: IntArray, p_value: FloatArray) -> FloatArray:
+def sigma_widening(chi_square: FloatArray, freedom: IntArray, p_value: FloatArray) -> FloatArray:
     """By what the sigma of a ball is multiplied whose views contradict each other, shape (N,).
 
     The Birge ratio, sqrt(chi-square / degrees of freedom), where the p-value is below
@@ -65,15 +65,17 @@ def widening_of(chi_square: FloatArray, freedom: IntArray, p_value: FloatArray) 
     return widened
 
 
-def widening(found: ChiSquare | None) -> float:
-    """``widening_of`` one group; 1 where its views were not tested."""
+def group_sigma_widening(found: ChiSquare | None) -> float:
+    """``sigma_widening`` one group; 1 where its views were not tested."""
     if found is None:
         return 1.0
     numbers = (np.array([number]) for number in (found.value, found.freedom, found.p_value))
-    return float(widening_of(*numbers)[0])
+    return float(sigma_widening(*numbers)[0])
 
 
-def residuals_of(facts: Facts, used: BoolArray, start: FloatArray, policy: Policy) -> Residuals:
+def chi_square_residuals(
+    facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
+) -> ChiSquareResiduals:
     """Fit one ball to all clicks of each group, and test what is left.
 
     A click's uncertainty is that of the hand and of its camera, as for every sigma. Lenses
@@ -88,49 +90,51 @@ def residuals_of(facts: Facts, used: BoolArray, start: FloatArray, policy: Polic
     Source: Hartley & Zisserman, sec. 12.5 and 5.3 (minimum of the residuals, and its expectation).
     """
     views = np.flatnonzero(used & np.isfinite(facts.view_axis[:, 0]))
-    return _tested(facts, views, facts.view_group[views], start, policy)
+    return _test_residuals(facts, views, facts.view_group[views], start, policy)
 
 
-def residuals_without(
+def chi_square_residuals_without_each_view(
     facts: Facts, used: BoolArray, start: FloatArray, policy: Policy
-) -> Residuals:
-    """``residuals_of`` one group without one of its views, a row for each that counts, in order.
+) -> ChiSquareResiduals:
+    """``chi_square_residuals`` one group without one of its views, a row for each that counts, in order.
 
     Args:
-        facts: Of the one group; the rest as for ``residuals_of``.
+        facts: Of the one group; the rest as for ``chi_square_residuals``.
     """
     places = np.flatnonzero(used)
     rest = ~np.eye(len(places), dtype=bool) & np.isfinite(facts.view_axis[places, 0])
     without, views = np.nonzero(rest)
-    return _tested(facts, places[views], without, np.repeat(start, len(places), axis=0), policy)
+    return _test_residuals(
+        facts, places[views], without, np.repeat(start, len(places), axis=0), policy
+    )
 
 
-def _tested(
+def _test_residuals(
     facts: Facts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
-) -> Residuals:
+) -> ChiSquareResiduals:
     """Residuals of sets of views, whose numbers are their owners, increasing, shape (N,)."""
     sets, begun = len(start), np.isfinite(start[owner, 0])
     views, owner = views[begun], owner[begun]
     freedom = 2 * np.bincount(owner, minlength=sets) - 3
     with np.errstate(all="ignore"):
-        point, squares = _fitted(facts, views, owner, start, policy)
+        point, squares = _fit_points(facts, views, owner, start, policy)
     total = np.bincount(owner, squares, sets).astype(float)
     total[(freedom < 1) | ~np.isfinite(point[:, 0])] = np.nan
     p_value = np.full(sets, np.nan)
     there = np.isfinite(total)
     p_value[there] = chdtrc(freedom[there], total[there])
     point[~there] = np.nan
-    return Residuals(point, total, np.maximum(freedom, 0), p_value)
+    return ChiSquareResiduals(point, total, np.maximum(freedom, 0), p_value)
 
 
 def p_values(facts: Facts, used: BoolArray, start: FloatArray, policy: Policy) -> FloatArray:
-    """p-value of each group as of ``residuals_of``, infinite where it is ``untestable``, (G,)."""
-    found = residuals_of(facts, used, start, policy).p_value
-    found[untestable(facts, used, policy)] = np.inf
+    """p-value of each group as of ``chi_square_residuals``, infinite where it is ``untestable_groups``, (G,)."""
+    found = chi_square_residuals(facts, used, start, policy).p_value
+    found[untestable_groups(facts, used, policy)] = np.inf
     return found
 
 
-def untestable(facts: Facts, used: BoolArray, policy: Policy) -> BoolArray:
+def untestable_groups(facts: Facts, used: BoolArray, policy: Policy) -> BoolArray:
     """Groups whose residuals say nothing: nobody says how exact one of their cameras is, (G,).
 
     Args:
@@ -146,7 +150,7 @@ def untestable(facts: Facts, used: BoolArray, policy: Policy) -> BoolArray:
     return found
 
 
-def _fitted(
+def _fit_points(
     facts: Facts, views: IntArray, owner: IntArray, start: FloatArray, policy: Policy
 ) -> tuple[FloatArray, FloatArray]:
     """The most likely points, (G, 3), and each view's squared residual in units of sigma, (N,)."""
@@ -156,27 +160,29 @@ def _fitted(
         facts.view_position[views],
     )
     point = start.copy()
-    weight = _weights(facts, views, point[owner], policy)
-    nine, three = _cells(owner, 9), _cells(owner, 3)
+    weight = _inverse_covariances(facts, views, point[owner], policy)
+    nine, three = _flat_sum_indices(owner, 9), _flat_sum_indices(owner, 3)
     for step in range(_STEPS + 1):
         reach = point[owner] - position
-        depth = _dot(axis, reach)
-        offset = -_times(slope, reach) / depth[:, None]
+        depth = _row_dot(axis, reach)
+        offset = -_matrix_times_vector(slope, reach) / depth[:, None]
         if step == _STEPS:
             break
         # The first step holds the depths, so that a start far off does no harm.
         lean = offset[:, :, None] * axis[:, None] if step else 0.0
         jacobian = (slope + lean) / depth[:, None, None]
         pulled = jacobian.transpose(0, 2, 1) @ weight
-        matrix = _summed(nine, pulled @ jacobian, (len(point), 3, 3))
-        pull = _summed(three, _times(pulled, offset), point.shape)
-        point = point + _solved(matrix, pull)
-    squares = _dot(offset, _times(weight, offset))
+        matrix = _sum_by_owner(nine, pulled @ jacobian, (len(point), 3, 3))
+        pull = _sum_by_owner(three, _matrix_times_vector(pulled, offset), point.shape)
+        point = point + _solve_3x3(matrix, pull)
+    squares = _row_dot(offset, _matrix_times_vector(weight, offset))
     squares[depth <= 0] = np.nan
     return point, squares
 
 
-def _weights(facts: Facts, views: IntArray, points: FloatArray, policy: Policy) -> FloatArray:
+def _inverse_covariances(
+    facts: Facts, views: IntArray, points: FloatArray, policy: Policy
+) -> FloatArray:
     """Inverse covariance of each view's click and calibration, at a point each, (N, 2, 2)."""
     covariances = pixel_covariances(facts, views, points, policy)
     (a, b), (c, d) = covariances.transpose(1, 2, 0)
@@ -187,34 +193,34 @@ def _weights(facts: Facts, views: IntArray, points: FloatArray, policy: Policy) 
     return weights
 
 
-def _solved(matrix: FloatArray, pull: FloatArray) -> FloatArray:
+def _solve_3x3(matrix: FloatArray, pull: FloatArray) -> FloatArray:
     """Solutions of 3 x 3 systems by cofactors, NaN where one has none, shape (G, 3)."""
     a, b, c = matrix.transpose(1, 0, 2)
     columns = np.empty(matrix.shape)
     columns[..., 0] = first = cross(b, c)
     columns[..., 1] = cross(c, a)
     columns[..., 2] = cross(a, b)
-    solution: FloatArray = _times(columns, pull) / _dot(a, first)[:, None]
+    solution: FloatArray = _matrix_times_vector(columns, pull) / _row_dot(a, first)[:, None]
     return solution
 
 
-def _cells(owner: IntArray, width: int) -> IntArray:
+def _flat_sum_indices(owner: IntArray, width: int) -> IntArray:
     """Where each number of rows of a width is added for its owner."""
     cells: IntArray = (width * owner[:, None] + np.arange(width)).ravel()
     return cells
 
 
-def _summed(cells: IntArray, parts: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+def _sum_by_owner(cells: IntArray, parts: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """Sums of rows by their owners, one after the other: alone as among others the same bits."""
     total: FloatArray = np.bincount(cells, parts.ravel(), int(np.prod(shape))).astype(float)
     return total.reshape(shape)
 
 
-def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+def _matrix_times_vector(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
     product: FloatArray = (matrices @ vectors[..., None])[..., 0]
     return product
 
 
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+def _row_dot(a: FloatArray, b: FloatArray) -> FloatArray:
     product: FloatArray = (a * b).sum(axis=-1)
     return product

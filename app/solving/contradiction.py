@@ -13,13 +13,13 @@ from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
 from app.solving.chi_square import (
     LOW_P_VALUE,
-    residuals_of,
-    residuals_without,
-    untestable,
-    widening,
+    chi_square_residuals,
+    chi_square_residuals_without_each_view,
+    group_sigma_widening,
+    untestable_groups,
 )
 from app.solving.facts import Facts
-from app.solving.judgement import Judgement, views_of
+from app.solving.judgement import Judgement, views_in_pairs
 from app.solving.triangulate import BallObservation
 
 SURE = 0.9
@@ -60,7 +60,7 @@ class Contradiction:
     @property
     def widening(self) -> float:
         """By what the sigma of the ball is multiplied for it."""
-        return widening(self.chi_square)
+        return group_sigma_widening(self.chi_square)
 
     @property
     def is_motion(self) -> bool:
@@ -80,8 +80,8 @@ def chi_square_of(
         judgement: What the policy makes of them.
         policy: How noisy a click is.
     """
-    used = views_of(facts, judgement.valid)
-    found = residuals_of(facts, used, judgement.point, policy)
+    used = views_in_pairs(facts, judgement.valid)
+    found = chi_square_residuals(facts, used, judgement.point, policy)
     if not np.isfinite(found.p_value[0]):
         return None
     return ChiSquare(
@@ -92,7 +92,7 @@ def chi_square_of(
     )
 
 
-def contradiction(
+def find_contradiction(
     chi_square: ChiSquare | None,
     keys: Sequence[str],
     facts: Facts,
@@ -115,19 +115,21 @@ def contradiction(
     if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
         return None
     used = np.array([key in chi_square.views for key in keys])
-    known = not untestable(facts, used, policy)[0]
+    known = not untestable_groups(facts, used, policy)[0]
     chosen = [observation for observation in observations if observation.view in chi_square.views]
     if len(chosen) == 2:
         one, other = chosen
-        gap, moved = _ray_distance(one, other, judgement.point[0], policy)
+        gap, moved = _distance_between_rays_or_balls(one, other, judgement.point[0], policy)
         return Contradiction(chi_square, None, None, gap, moved, known)
     view, confidence, point = _outlier_view(keys, facts, used, judgement.point, policy)
     if view is None:
         return Contradiction(chi_square, None, None, is_known=known)
     observation = next(observation for observation in chosen if observation.view == view)
-    place = _to_level(observation, float(point[2]))
+    place = _ray_at_height(observation, float(point[2]))
     level = None if place is None else float(np.linalg.norm(place - point))
-    return Contradiction(chi_square, view, confidence, _off_ray(observation, point), level, known)
+    return Contradiction(
+        chi_square, view, confidence, _distance_from_ray(observation, point), level, known
+    )
 
 
 def _outlier_view(
@@ -135,7 +137,7 @@ def _outlier_view(
 ) -> tuple[str | None, float, FloatArray]:
     """The view without which the others agree, how sure that is, and their ball, shape (3,)."""
     places = np.flatnonzero(used)
-    left = residuals_without(facts, used, start, policy)
+    left = chi_square_residuals_without_each_view(facts, used, start, policy)
     squares = np.where(np.isnan(left.chi_square), np.inf, left.chi_square)
     best = int(squares.argmin())
     confidence = 1.0 / float(np.exp((squares[best] - squares) / 2).sum())
@@ -143,45 +145,45 @@ def _outlier_view(
     return keys[places[best]] if agree else None, confidence, left.point[best]
 
 
-def _ray_distance(
+def _distance_between_rays_or_balls(
     a: BallObservation, b: BallObservation, point: FloatArray, policy: Policy
 ) -> tuple[float, float | None]:
     """How far two rays miss each other, and their balls if both lie on the grass, metres."""
-    gap = _rays_apart(a, b)
+    gap = _smallest_ray_distance(a, b)
     grass = -policy.ball_diameter_m / 2
-    ends = _to_level(a, grass), _to_level(b, grass)
+    ends = _ray_at_height(a, grass), _ray_at_height(b, grass)
     if height_above_grass(float(point[2])) > LOW_BALL_M or ends[0] is None or ends[1] is None:
         return gap, None
     return gap, float(np.linalg.norm(ends[0] - ends[1]))
 
 
-def _to_level(observation: BallObservation, z: float) -> FloatArray | None:
+def _ray_at_height(observation: BallObservation, z: float) -> FloatArray | None:
     """Where a ray meets a level of the pitch frame, shape (3,); None where it is nearly level."""
-    direction, position = _direction(observation), observation.camera.position
+    direction, position = _ray_direction(observation), observation.camera.position
     if direction[2] < STEEP or z < position[2]:
         return None
     place: FloatArray = position + (z - position[2]) / direction[2] * direction
     return place
 
 
-def _rays_apart(a: BallObservation, b: BallObservation) -> float:
+def _smallest_ray_distance(a: BallObservation, b: BallObservation) -> float:
     """Smallest distance of the rays of two observations, metres."""
-    across = np.cross(_direction(a), _direction(b))
+    across = np.cross(_ray_direction(a), _ray_direction(b))
     length = float(np.linalg.norm(across))
     between = b.camera.position - a.camera.position
     if length < 1e-9:
-        return float(np.linalg.norm(np.cross(between, _direction(a))))
+        return float(np.linalg.norm(np.cross(between, _ray_direction(a))))
     return abs(float(between @ across)) / length
 
 
-def _off_ray(observation: BallObservation, point: FloatArray) -> float:
+def _distance_from_ray(observation: BallObservation, point: FloatArray) -> float:
     """Distance of a point from the ray of an observation, metres."""
     return float(
-        np.linalg.norm(np.cross(point - observation.camera.position, _direction(observation)))
+        np.linalg.norm(np.cross(point - observation.camera.position, _ray_direction(observation)))
     )
 
 
-def _direction(observation: BallObservation) -> FloatArray:
+def _ray_direction(observation: BallObservation) -> FloatArray:
     ray = observation.camera.rays(np.array([observation.center]))[0]
     direction: FloatArray = ray / np.linalg.norm(ray)
     return direction

@@ -22,7 +22,7 @@ from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.solution import Ball3D, Calibration, Solution
-from app.solving.ball_noise import BallNoise, Miss, estimate_ball_noise, misses_of
+from app.solving.ball_noise import BallNoise, RayResidual, estimate_ball_noise, ray_residuals
 from app.solving.line_noise import (
     LineEstimate,
     LineEvidence,
@@ -30,7 +30,7 @@ from app.solving.line_noise import (
     estimate_line_noise,
     line_evidence,
 )
-from app.solving.observations import observe
+from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
 from app.solving.triangulate import BallObservation, ball_observations
 
@@ -43,8 +43,8 @@ def view_line_noise(
     Raises:
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
-    problem, parameters = _problem_at(calibration, size, policy)
-    return problem.line_noise(parameters, observe(lines, policy.fitted(pitch), size))
+    problem, parameters = _resection_at_calibration(calibration, size, policy)
+    return problem.line_noise(parameters, observations_of_lines(lines, policy.fitted(pitch), size))
 
 
 def view_line_evidence(
@@ -55,9 +55,9 @@ def view_line_evidence(
     Raises:
         DegenerateGeometryError: It has no camera, or its lines leave that open.
     """
-    problem, parameters = _problem_at(calibration, size, policy)
-    rows = problem.noise_rows(parameters, observe(lines, policy.fitted(pitch), size))
-    return line_evidence(*rows).in_units(problem.unit)
+    problem, parameters = _resection_at_calibration(calibration, size, policy)
+    rows = problem.noise_rows(parameters, observations_of_lines(lines, policy.fitted(pitch), size))
+    return line_evidence(*rows).rescaled_to_pixels(problem.unit)
 
 
 def view_line_covariance(
@@ -71,7 +71,7 @@ def view_line_covariance(
     return row_by_row(noise.parameters)
 
 
-def _problem_at(
+def _resection_at_calibration(
     calibration: Calibration, size: ImageSize, policy: CalibrationPolicy
 ) -> tuple[ResectionProblem, FloatArray]:
     if calibration.camera is None:
@@ -81,7 +81,7 @@ def _problem_at(
 
 
 @dataclass(frozen=True)
-class SeenView:
+class NoiseView:
     """A view of a solved group as far as noise asks.
 
     Attributes:
@@ -98,31 +98,31 @@ class SeenView:
 
 
 @dataclass(frozen=True)
-class SeenGroup:
+class NoiseGroup:
     """A solved group as far as noise asks."""
 
     group: Group
     ball: Ball3D | None
-    views: tuple[SeenView, ...]
+    views: tuple[NoiseView, ...]
 
     @staticmethod
-    def of(group: Group, solution: Solution, policy: Policy) -> SeenGroup:
+    def of(group: Group, solution: Solution, policy: Policy) -> NoiseGroup:
         """What a group and its solution under a policy say."""
         views = (
-            _seen_view(group, view, solved.calibration_key, solved.calibration, policy)
+            _noise_view(group, view, solved.calibration_key, solved.calibration, policy)
             for view, solved in zip(group.views, solution.views, strict=True)
         )
-        return SeenGroup(group, solution.ball, tuple(views))
+        return NoiseGroup(group, solution.ball, tuple(views))
 
-    def misses(self, policy: Policy) -> tuple[Miss, ...]:
+    def misses(self, policy: Policy) -> tuple[RayResidual, ...]:
         """What the rays leave unexplained, with cameras as certain as a policy's lines make them."""
-        return () if self.ball is None else misses_of(self.ball, self._observations(policy))
+        return () if self.ball is None else ray_residuals(self.ball, self._observations(policy))
 
     def _observations(self, policy: Policy) -> list[BallObservation]:
         found = [self._calibration(view, policy) for view in self.views]
         return ball_observations(self.group.views, found)
 
-    def _calibration(self, seen: SeenView, policy: Policy) -> Calibration:
+    def _calibration(self, seen: NoiseView, policy: Policy) -> Calibration:
         # What paint says of a camera, and what is not known of a picture, hardly depends on clicks.
         if seen.evidence is None or seen.calibration.source != "lines":
             return seen.calibration
@@ -144,10 +144,10 @@ class DatasetNoise:
 
     lines: LineEstimate | None
     ball: BallNoise
-    misses: tuple[tuple[Miss, ...], ...]
+    misses: tuple[tuple[RayResidual, ...], ...]
 
 
-def estimate_noise(groups: Sequence[SeenGroup], policy: Policy) -> DatasetNoise:
+def estimate_noise(groups: Sequence[NoiseGroup], policy: Policy) -> DatasetNoise:
     """The noise that many groups show.
 
     Args:
@@ -162,21 +162,21 @@ def estimate_noise(groups: Sequence[SeenGroup], policy: Policy) -> DatasetNoise:
     }
     lines = estimate_line_noise([*evidence.values()])
     if lines is not None:
-        policy = _with_lines(policy, lines)
+        policy = _policy_with_line_noise(policy, lines)
     misses = tuple(group.misses(policy) for group in groups)
     ball = estimate_ball_noise([miss for some in misses for miss in some], policy)
     return DatasetNoise(lines, ball, misses)
 
 
-def _with_lines(policy: Policy, lines: LineEstimate) -> Policy:
+def _policy_with_line_noise(policy: Policy, lines: LineEstimate) -> Policy:
     sigma, share = lines.sigma.value, lines.share.value
     known = replace(policy.calibration, line_sigma_px=sigma, line_share=share)
     return replace(policy, calibration=known)
 
 
-def _seen_view(
+def _noise_view(
     group: Group, view: View, key: str, calibration: Calibration, policy: Policy
-) -> SeenView:
+) -> NoiseView:
     left_out = {suspect.marking for suspect in calibration.suspects}
     lines = make_lines({k: at for k, at in view.station.lines.items() if k not in left_out})
     evidence = None
@@ -186,4 +186,4 @@ def _seen_view(
         # Lines that leave the camera open say nothing of their noise.
         with suppress(DegenerateGeometryError, np.linalg.LinAlgError):
             evidence = view_line_evidence(*arguments)
-    return SeenView(key, view, replace(calibration, markings=()), lines, evidence)
+    return NoiseView(key, view, replace(calibration, markings=()), lines, evidence)

@@ -17,12 +17,17 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.resection import PARAMETERS
-from app.geometry.triangulation import moved_points
+from app.geometry.triangulation import triangulation_shifts
 from app.soccer.group import View
 from app.soccer.picture import camera_aspect
 from app.soccer.solution import Calibration
 from app.solving.camera_numbers import WHOLE, CameraNumbers
-from app.solving.triangulate import PairPoint, ball_observations, meet, observation_pairs
+from app.solving.triangulate import (
+    PairPoint,
+    arrays_of_pairs,
+    ball_observations,
+    triangulate_observation_pairs,
+)
 
 STEP_PX = 0.5
 """How far a pixel is moved to see how its pair's point moves."""
@@ -129,10 +134,10 @@ class Facts:
 
         The gates read a tenth of what is known of a group.
         """
-        return cast(Facts, _Part(self, kept))
+        return cast(Facts, _FactsSubset(self, kept))
 
 
-class _Part:
+class _FactsSubset:
     """Some of the groups of facts, a column of which is made when somebody reads it."""
 
     def __init__(self, whole: Facts, kept: BoolArray):
@@ -150,9 +155,9 @@ class _Part:
         """``Facts.rows``; of a column that holds no rows of something else."""
         if name in self.__dict__:
             return self.__dict__[name][rows]
-        return getattr(self._whole, name)[self._of(name)[rows]]
+        return getattr(self._whole, name)[self._own_rows(name)[rows]]
 
-    def _of(self, name: str) -> IntArray:
+    def _own_rows(self, name: str) -> IntArray:
         """Rows of a column that are its own."""
         per = name.partition("_")[0]
         if per not in self._rows:
@@ -160,7 +165,7 @@ class _Part:
         return self._rows[per]
 
     def __getattr__(self, name: str) -> Any:
-        array = getattr(self._whole, name)[self._of(name)]
+        array = getattr(self._whole, name)[self._own_rows(name)]
         if name in _POINTS_TO:
             array = self._places[_POINTS_TO[name]][array]
         self.__dict__[name] = array
@@ -210,18 +215,18 @@ NOTHING = Facts(0, **{name: np.empty((0, *shape), kind) for name, (kind, shape) 
 """The facts of no group."""
 
 
-def join(parts: Sequence[Facts]) -> Facts:
+def join_facts(parts: Sequence[Facts]) -> Facts:
     """The groups of several facts, one after the other."""
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
     groups = [part.groups for part in parts]
     views = [len(part.view_group) for part in parts]
     for name, sizes in (("view_group", groups), ("pair_group", groups), ("mark_view", views)):
-        arrays[name] += _offsets(parts, name, sizes)
-    arrays["pair_view"] += _offsets(parts, "pair_view", views)[:, None]
+        arrays[name] += _row_offsets(parts, name, sizes)
+    arrays["pair_view"] += _row_offsets(parts, "pair_view", views)[:, None]
     return Facts(sum(groups), **arrays)
 
 
-def _offsets(parts: Sequence[Facts], name: str, sizes: Sequence[int]) -> IntArray:
+def _row_offsets(parts: Sequence[Facts], name: str, sizes: Sequence[int]) -> IntArray:
     """For each row of ``name``: how many rows the parts before its own have."""
     starts = np.cumsum([0, *sizes[:-1]])
     return np.repeat(starts, [len(getattr(part, name)) for part in parts])
@@ -229,7 +234,9 @@ def _offsets(parts: Sequence[Facts], name: str, sizes: Sequence[int]) -> IntArra
 
 def group_facts(views: Sequence[View], calibrations: Sequence[Calibration]) -> Facts:
     """The facts of one group, from what was said of its views and the calibration of each."""
-    pair_points = meet(combinations(ball_observations(views, calibrations), 2))
+    pair_points = triangulate_observation_pairs(
+        combinations(ball_observations(views, calibrations), 2)
+    )
     return facts_of(views, calibrations, pair_points)
 
 
@@ -261,7 +268,7 @@ def facts_of(
             parameters[place], covariances[place] = known.parameters, known.covariance
             pictures[place] = 0.0 if known.picture is None else known.picture
     places = {view.key: place for place, view in enumerate(views)}
-    slopes, axes = _rays(pair_points, places)
+    slopes, axes = _view_rays(pair_points, places)
     return Facts(
         groups=1,
         view_group=np.zeros(len(views), np.int64),
@@ -271,7 +278,7 @@ def facts_of(
         view_measured=np.array([item.jac is not None for item in calibrations], bool),
         view_ball=np.array([ball is not None for ball in balls], bool),
         view_diagonal=np.array(diagonals, float),
-        view_position=_rows([_position(item) for item in calibrations], 3),
+        view_position=_to_table([_camera_position(item) for item in calibrations], 3),
         view_parameters=parameters,
         view_covariance=covariances,
         view_ball_px=np.array([box.diameter if box is not None else 0.0 for box in boxes], float),
@@ -286,19 +293,19 @@ def facts_of(
         pair_view=np.array(
             [(places[item.a.view], places[item.b.view]) for item in pair_points], np.int64
         ).reshape(-1, 2),
-        pair_errors=_rows([item.errors_px for item in pair_points], 2),
+        pair_errors=_to_table([item.errors_px for item in pair_points], 2),
         pair_front=np.array([item.in_front for item in pair_points], bool),
         pair_baseline=np.array([item.baseline_m for item in pair_points], float),
         pair_parallax=np.array([item.parallax_degrees for item in pair_points], float),
-        pair_point=_rows([item.point for item in pair_points], 3),
-        pair_moved=_moved(pair_points),
+        pair_point=_to_table([item.point for item in pair_points], 3),
+        pair_moved=_moved_pair_points(pair_points),
         view_picture=pictures,
-        view_stretch=_stretches(views, calibrations, numbers),
+        view_stretch=_view_stretches(views, calibrations, numbers),
         view_noise=np.array([view.noise for view in views], float),
     )
 
 
-def _stretches(
+def _view_stretches(
     views: Sequence[View],
     calibrations: Sequence[Calibration],
     numbers: Sequence[CameraNumbers | None],
@@ -314,7 +321,7 @@ def _stretches(
     return stretches
 
 
-def _rays(
+def _view_rays(
     pair_points: Sequence[PairPoint], places: Mapping[str, int]
 ) -> tuple[FloatArray, FloatArray]:
     """Slope and axis of the views that meet others, NaN for those that do not."""
@@ -329,19 +336,19 @@ def _rays(
     return slopes, axes
 
 
-def _position(calibration: Calibration) -> Sequence[float] | FloatArray:
+def _camera_position(calibration: Calibration) -> Sequence[float] | FloatArray:
     return (np.nan,) * 3 if calibration.camera is None else calibration.camera.position
 
 
-def _moved(pair_points: Sequence[PairPoint]) -> FloatArray:
+def _moved_pair_points(pair_points: Sequence[PairPoint]) -> FloatArray:
     if not pair_points:
         return NOTHING.pair_moved
     a, b = [item.a for item in pair_points], [item.b for item in pair_points]
     slopes = None
     if any(observation.camera.is_wide for observation in (*a, *b)):
         slopes = np.array([s.ideal_slope for s in a]), np.array([s.ideal_slope for s in b])
-    return moved_points(*observation_pairs(a, b), STEP_PX, slopes)
+    return triangulation_shifts(*arrays_of_pairs(a, b), STEP_PX, slopes)
 
 
-def _rows(values: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:
+def _to_table(values: Sequence[Sequence[float] | FloatArray], width: int) -> FloatArray:
     return np.array(values, float).reshape(-1, width)

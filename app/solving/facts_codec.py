@@ -32,7 +32,7 @@ def facts_to_bytes(facts: Facts) -> bytes:
     """
     counts = [len(facts.view_group), len(facts.mark_view), len(facts.pair_group)]
     names = list(COLUMNS)
-    while names[-1] in LATER and _is_silent(facts, names[-1]):
+    while names[-1] in LATER and _is_default_column(facts, names[-1]):
         names.pop()
     columns = [getattr(facts, name).ravel() for name in names]
     return zlib_ng.compress(np.concatenate([counts, *columns]).astype(_NUMBERS).tobytes())
@@ -49,13 +49,15 @@ def facts_from_bytes(contents: Sequence[bytes]) -> Facts:
     if not contents:
         return NOTHING
     try:
-        return _facts([np.frombuffer(zlib.decompress(part), _NUMBERS) for part in contents])
+        return _facts_from_numbers(
+            [np.frombuffer(zlib.decompress(part), _NUMBERS) for part in contents]
+        )
     except (ValueError, zlib.error) as error:
         sentence = "the facts beside a solution are not what was written"
         raise DamagedError(sentence, hint=EXAMINE) from error
 
 
-def _facts(groups: Sequence[FloatArray]) -> Facts:
+def _facts_from_numbers(groups: Sequence[FloatArray]) -> Facts:
     """The facts of groups from the numbers of each."""
     heads = np.array([[len(numbers), *numbers[: len(_ROWS)]] for numbers in groups]).astype(int)
     ends = np.cumsum(heads[:, 1:], axis=0)
@@ -74,7 +76,7 @@ def _facts(groups: Sequence[FloatArray]) -> Facts:
             name: (starts[name][alike, None] + np.arange(count)).ravel()
             for name, count in rows.items()
         }
-        _scatter(numbers, length, rows, targets, arrays)
+        _scatter_columns(numbers, length, rows, targets, arrays)
     owner = np.arange(len(groups))
     arrays["view_group"] += np.repeat(owner, heads[:, 1])
     arrays["pair_group"] += np.repeat(owner, heads[:, 3])
@@ -83,7 +85,7 @@ def _facts(groups: Sequence[FloatArray]) -> Facts:
     return Facts(len(groups), **arrays)
 
 
-def _scatter(
+def _scatter_columns(
     numbers: FloatArray,
     length: int,
     rows: Mapping[str, int],
@@ -109,7 +111,7 @@ def _column_owner(name: str) -> str:
     return name.partition("_")[0]
 
 
-def _is_silent(facts: Facts, name: str) -> bool:
+def _is_default_column(facts: Facts, name: str) -> bool:
     """Whether the column says nothing that its absence would not."""
     if name == "view_stretch":
         return not facts.view_picture.any()

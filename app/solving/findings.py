@@ -13,11 +13,11 @@ from app.soccer.solution import Ball3D, Pair, ViewSolution
 from app.solving.calibration_findings import calibration_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
-from app.solving.gates import chance
-from app.solving.numbers import degrees, metres, pixels
+from app.solving.gates import odds_text
+from app.solving.numbers import format_degrees, format_metres, format_pixels
 from app.solving.paint_findings import paint_findings
-from app.solving.plausible import implausible
-from app.solving.sides import Swap, find_swaps
+from app.solving.plausible import implausible_reasons
+from app.solving.sides import SwappedView, find_swaps
 from app.solving.triangulate import BallObservation
 
 MAX_SIZE_RATIO = 2.0
@@ -48,7 +48,7 @@ _BY_WEIGHT = (
 """What makes the ball unusable comes first, then what explains the most."""
 
 
-def find(
+def find_group_findings(
     group: Group,
     views: Sequence[ViewSolution],
     observations: Sequence[BallObservation],
@@ -58,7 +58,7 @@ def find(
     contradicted: Contradiction | None = None,
 ) -> tuple[Finding, ...]:
     """All findings of a group: what makes its ball unusable first, then what explains most."""
-    swaps = {swap.view: swap for swap in _swaps(group, views, observations, policy)}
+    swaps = {swap.view: swap for swap in _swapped_views(group, views, observations, policy)}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
         noticed = calibration_findings(solved.calibration, view.size, view.key)
@@ -69,36 +69,36 @@ def find(
             if not (view.station.shared and item.kind == "visible_not_annotated")
         )
         found.extend(paint_findings(group, view, solved, policy.calibration))
-        found.extend(_several_balls(view))
+        found.extend(_several_balls_findings(view))
         if view.key in swaps:
-            found.append(_sides_swapped(swaps[view.key]))
+            found.append(_sides_swapped_finding(swaps[view.key]))
         else:
-            found.extend(_view_disagrees(group, view, solved, pairs, policy))
-            found.extend(_misses_ball(solved, policy.tau_px(view.size.diagonal)))
-        found.extend(_ball_size(solved))
+            found.extend(_view_disagrees_findings(group, view, solved, pairs, policy))
+            found.extend(_misses_ball_findings(solved, policy.tau_px(view.size.diagonal)))
+        found.extend(_ball_size_findings(solved))
     if ball is None and not swaps:
-        found.extend(_not_synchronous(pairs, policy, group))
+        found.extend(_not_synchronous_findings(pairs, policy, group))
     if contradicted is not None and not swaps:
-        found.append(_views_contradict(contradicted, group, ball))
+        found.append(_views_contradict_finding(contradicted, group, ball))
     if ball is not None:
-        found.extend(_low_parallax(ball, policy))
-        found.extend(_high_uncertainty(ball, contradicted))
-        found.extend(_implausible_ball(ball, group.pitch, policy))
-    return tuple(sorted(found, key=_weight))
+        found.extend(_low_parallax_findings(ball, policy))
+        found.extend(_high_uncertainty_findings(ball, contradicted))
+        found.extend(_implausible_ball_findings(ball, group.pitch, policy))
+    return tuple(sorted(found, key=_finding_order))
 
 
-def _weight(finding: Finding) -> tuple[bool, int, float]:
+def _finding_order(finding: Finding) -> tuple[bool, int, float]:
     """What comes first; of views that disagree the one that is farther off."""
     far = (finding.number or 0.0) if finding.kind == "view_disagrees" else 0.0
     return not finding.is_unusable_ball, _BY_WEIGHT.index(finding.kind), -far
 
 
-def _swaps(
+def _swapped_views(
     group: Group,
     views: Sequence[ViewSolution],
     observations: Sequence[BallObservation],
     policy: Policy,
-) -> tuple[Swap, ...]:
+) -> tuple[SwappedView, ...]:
     left = {solved.view for solved in views if solved.failed is None}
     first = next(
         (observation for observation in observations if observation.view == group.views[0].key),
@@ -110,7 +110,7 @@ def _swaps(
     return find_swaps(first, usable, group.pitch, policy, doubtful)
 
 
-def _several_balls(view: View) -> Iterator[Finding]:
+def _several_balls_findings(view: View) -> Iterator[Finding]:
     count = sum(not ball.out_of_view for ball in view.balls)
     if count > 1:
         yield Finding(
@@ -124,7 +124,7 @@ def _several_balls(view: View) -> Iterator[Finding]:
         )
 
 
-def _sides_swapped(swap: Swap) -> Finding:
+def _sides_swapped_finding(swap: SwappedView) -> Finding:
     if swap.turned_error_px is None:
         sentence = (
             "The lines put the main camera on the far side of the pitch, where no main camera "
@@ -133,7 +133,7 @@ def _sides_swapped(swap: Swap) -> Finding:
     else:
         sentence = (
             "The lines are labelled from the other end of the pitch: with left and right swapped "
-            f"this view agrees with the rest about the ball, within {pixels(swap.turned_error_px)}."
+            f"this view agrees with the rest about the ball, within {format_pixels(swap.turned_error_px)}."
         )
     return Finding(
         "sides_swapped",
@@ -146,7 +146,7 @@ def _sides_swapped(swap: Swap) -> Finding:
     )
 
 
-def _view_disagrees(
+def _view_disagrees_findings(
     group: Group, view: View, solved: ViewSolution, pairs: Sequence[Pair], policy: Policy
 ) -> Iterator[Finding]:
     """A view in no valid pair, though it was judged and others agree."""
@@ -156,10 +156,14 @@ def _view_disagrees(
     if solved.included or not judged or not any(pair.valid for pair in pairs):
         return
     letters = {other.key: view_letter(place) for place, other in enumerate(group.views)}
-    yield view_disagrees(view.key, closest(judged), letters, policy.tau_px(view.size.diagonal))
+    yield view_disagrees_finding(
+        view.key, closest_pair(judged), letters, policy.tau_px(view.size.diagonal)
+    )
 
 
-def view_disagrees(view: str, best: Pair, letters: Mapping[str, str], tau_px: float) -> Finding:
+def view_disagrees_finding(
+    view: str, best: Pair, letters: Mapping[str, str], tau_px: float
+) -> Finding:
     """What is said of a view that misses the others' ball in its closest pair.
 
     Rays may also meet behind a camera, and the pixels there be as near as is allowed.
@@ -184,8 +188,8 @@ def view_disagrees(view: str, best: Pair, letters: Mapping[str, str], tau_px: fl
     here, there = best.errors_px if best.a == view else best.errors_px[::-1]
     return Finding(
         "view_disagrees",
-        f"This view does not see the ball where another view sees it: at best {pixels(here)} apart "
-        f"here and {pixels(there)} in {letters[other]}, {pixels(tau_px)} are allowed. Correct its "
+        f"This view does not see the ball where another view sees it: at best {format_pixels(here)} apart "
+        f"here and {format_pixels(there)} in {letters[other]}, {format_pixels(tau_px)} are allowed. Correct its "
         "ball, or leave the view out.",
         view,
         number=apart_px,
@@ -194,18 +198,18 @@ def view_disagrees(view: str, best: Pair, letters: Mapping[str, str], tau_px: fl
     )
 
 
-def _misses_ball(solved: ViewSolution, tau_px: float) -> Iterator[Finding]:
+def _misses_ball_findings(solved: ViewSolution, tau_px: float) -> Iterator[Finding]:
     """A view in a valid pair that the 3D ball does not fit: it is the mean of several pairs."""
     error_px = solved.ball.error_px if solved.ball is not None and solved.included else None
     if error_px is not None and error_px > tau_px:
-        yield misses_ball(solved.view, error_px, tau_px)
+        yield misses_ball_finding(solved.view, error_px, tau_px)
 
 
-def misses_ball(view: str, error_px: float, tau_px: float) -> Finding:
+def misses_ball_finding(view: str, error_px: float, tau_px: float) -> Finding:
     """What is said of a view that counts and that the 3D ball misses by so many pixels."""
     return Finding(
         "view_disagrees",
-        f"The 3D ball is {pixels(error_px)} from the ball of this view, {pixels(tau_px)} are "
+        f"The 3D ball is {format_pixels(error_px)} from the ball of this view, {format_pixels(tau_px)} are "
         "allowed, although each pair that counts fits: the pairs contradict each other. Correct "
         "the ball of a view, or leave a view out.",
         view,
@@ -215,7 +219,7 @@ def misses_ball(view: str, error_px: float, tau_px: float) -> Finding:
     )
 
 
-def _ball_size(solved: ViewSolution) -> Iterator[Finding]:
+def _ball_size_findings(solved: ViewSolution) -> Iterator[Finding]:
     ratio = solved.ball.size_ratio if solved.ball is not None and solved.included else None
     if ratio is None or 1 / MAX_SIZE_RATIO <= ratio <= MAX_SIZE_RATIO:
         return
@@ -229,7 +233,9 @@ def _ball_size(solved: ViewSolution) -> Iterator[Finding]:
     )
 
 
-def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Iterator[Finding]:
+def _not_synchronous_findings(
+    pairs: Sequence[Pair], policy: Policy, group: Group
+) -> Iterator[Finding]:
     """Well calibrated views whose balls do not meet, from either side: another instant.
 
     Static cameras run on one clock; there the failed gate says enough.
@@ -237,10 +243,10 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
     judged = [pair for pair in pairs if pair.failed == "reprojection"]
     if not judged or all(view.station.shared for view in group.views):
         return
-    best = closest(judged)
+    best = closest_pair(judged)
     sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
     error_px, tau_px = max(best.errors_px), policy.tau_px(max(sizes))
-    apart = f"{pixels(best.errors_px[0])} and {pixels(best.errors_px[1])} apart"
+    apart = f"{format_pixels(best.errors_px[0])} and {format_pixels(best.errors_px[1])} apart"
     sentence = (
         f"The two views do not see the ball in the same place ({apart})"
         if len(group.views) == 2
@@ -257,23 +263,23 @@ def _not_synchronous(pairs: Sequence[Pair], policy: Policy, group: Group) -> Ite
     )
 
 
-def closest(pairs: Sequence[Pair]) -> Pair:
+def closest_pair(pairs: Sequence[Pair]) -> Pair:
     """The pair whose larger error is the smallest."""
     return min(pairs, key=lambda pair: max(pair.errors_px))
 
 
-def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) -> Finding:
+def _views_contradict_finding(item: Contradiction, group: Group, ball: Ball3D | None) -> Finding:
     """Views that pass tau and are still farther apart than their uncertainty lets them be."""
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
     sentences = [
         f"{one} not show one ball: consistent views have residuals as large as these "
         f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in only "
-        f"{chance(found.p_value)}."
+        f"{odds_text(found.p_value)}."
     ]
     if ball is not None and item.widening > 1:
         sentences.append(
-            f"Sigma is widened {item.widening:.1f} times for it, to {metres(ball.sigma_m)}."
+            f"Sigma is widened {item.widening:.1f} times for it, to {format_metres(ball.sigma_m)}."
         )
     if not item.is_known:
         sentences.append(
@@ -282,8 +288,8 @@ def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) ->
         )
     if item.view is not None:
         sentences.append("Without this view the others agree.")
-    if item.gap_m is not None and item.is_motion and not _one_clock(group):
-        sentences.append(_another_instant(item.gap_m, item.moved_m))
+    if item.gap_m is not None and item.is_motion and not _have_one_clock(group):
+        sentences.append(_describe_time_gap(item.gap_m, item.moved_m))
     if item.view is not None:
         sentences.append("If its ball is drawn on the ball, leave the view out.")
     elif item.is_known:
@@ -301,80 +307,82 @@ def _views_contradict(item: Contradiction, group: Group, ball: Ball3D | None) ->
     )
 
 
-def _another_instant(gap_m: float, moved_m: float | None) -> str:
+def _describe_time_gap(gap_m: float, moved_m: float | None) -> str:
     """How far apart in time the pictures would be, if the ball moved in between."""
     slow, fast = SPEEDS
-    least = _milliseconds(gap_m / fast)
+    least = _round_milliseconds(gap_m / fast)
     if moved_m is None:
         return (
             f"The rays miss each other by {gap_m:.2f} m: perhaps another instant, by at least "
             f"{least} ms."
         )
-    most = _milliseconds(moved_m / slow)
+    most = _round_milliseconds(moved_m / slow)
     return (
         f"The rays miss each other by {gap_m:.2f} m: perhaps another instant, about "
-        f"{_milliseconds(moved_m / TYPICAL_SPEED)} ms ({least} to {most}) for a ball at "
+        f"{_round_milliseconds(moved_m / TYPICAL_SPEED)} ms ({least} to {most}) for a ball at "
         f"{TYPICAL_SPEED:.0f} m/s ({slow:.0f} to {fast:.0f})."
     )
 
 
-def _milliseconds(seconds: float) -> int:
+def _round_milliseconds(seconds: float) -> int:
     """To two digits: nobody knows the speed of the ball."""
     return int(float(f"{1000 * seconds:.2g}"))
 
 
-def _one_clock(group: Group) -> bool:
+def _have_one_clock(group: Group) -> bool:
     """Static cameras run on one clock."""
     return all(view.station.shared for view in group.views)
 
 
-def _low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
+def _low_parallax_findings(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
         yield Finding(
             "low_parallax",
-            f"The rays meet at {degrees(ball.parallax_degrees)} only, so the distance of the ball is "
-            f"uncertain: about ± {metres(ball.sigma_m)}. A view from another side would settle it.",
+            f"The rays meet at {format_degrees(ball.parallax_degrees)} only, so the distance of the ball is "
+            f"uncertain: about ± {format_metres(ball.sigma_m)}. A view from another side would settle it.",
             number=ball.parallax_degrees,
             threshold=policy.low_parallax_degrees,
         )
 
 
-def _high_uncertainty(ball: Ball3D, contradicted: Contradiction | None) -> Iterator[Finding]:
+def _high_uncertainty_findings(
+    ball: Ball3D, contradicted: Contradiction | None
+) -> Iterator[Finding]:
     """Above ``UNUSABLE_SIGMA_M`` with that as the threshold: nobody can use such a ball."""
     if not ball.sigma_m > HIGH_SIGMA_M:
         return
     why = "although the views agree" if contradicted is None else "as the views contradict it"
     limit, sentence = (
         HIGH_SIGMA_M,
-        f"The position of the ball is uncertain, about ± {metres(ball.sigma_m)}, {why}. Decide "
+        f"The position of the ball is uncertain, about ± {format_metres(ball.sigma_m)}, {why}. Decide "
         "whether that is good enough.",
     )
     if ball.sigma_m > UNUSABLE_SIGMA_M:
         limit, sentence = (
             UNUSABLE_SIGMA_M,
-            f"The ball is known to ± {metres(ball.sigma_m)} only, {why}; its rays meet at "
-            f"{degrees(ball.parallax_degrees)}. Beyond ± {UNUSABLE_SIGMA_M:.0f} m a ball is of no use.",
+            f"The ball is known to ± {format_metres(ball.sigma_m)} only, {why}; its rays meet at "
+            f"{format_degrees(ball.parallax_degrees)}. Beyond ± {UNUSABLE_SIGMA_M:.0f} m a ball is of no use.",
         )
     yield Finding("high_uncertainty", sentence, number=ball.sigma_m, threshold=limit)
 
 
-def _known_to(ball: Ball3D) -> str:
+def _describe_sigma(ball: Ball3D) -> str:
     """Words for a place of which nothing is known."""
     if not ball.sigma_m > UNUSABLE_SIGMA_M:
         return ""
     return (
-        f", known to ± {metres(ball.sigma_m)} only, with rays that meet at "
-        f"{degrees(ball.parallax_degrees)}"
+        f", known to ± {format_metres(ball.sigma_m)} only, with rays that meet at "
+        f"{format_degrees(ball.parallax_degrees)}"
     )
 
 
-def _implausible_ball(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Finding]:
+def _implausible_ball_findings(ball: Ball3D, pitch: Pitch, policy: Policy) -> Iterator[Finding]:
     """One finding, with the number of what is wrong first."""
-    wrong = implausible(ball.point, pitch, policy)
+    wrong = implausible_reasons(ball.point, pitch, policy)
     if wrong:
         number, threshold, _ = wrong[0]
         sentence = (
-            f"The 3D ball {' and '.join(words for _, _, words in wrong)}{_known_to(ball)}. Check the "
+            f"The 3D ball {' and '.join(words for _, _, words in wrong)}{_describe_sigma(ball)}. Check the "
             "sides of the views and the ball in each."
         )
         yield Finding("implausible_ball", sentence, number=number, threshold=threshold)

@@ -11,10 +11,18 @@ from math import floor, isnan, log10
 
 from app.plural import plural
 from app.soccer.policy import Policy
-from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, Pair, margin_of
+from app.soccer.solution import (
+    GATES,
+    Ball3D,
+    Calibration,
+    ChiSquare,
+    Gate,
+    Pair,
+    margin_to_threshold,
+)
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.judgement import MIN_VIEWS, Judgement
-from app.solving.numbers import degrees, metres, percent, pixels
+from app.solving.numbers import format_degrees, format_metres, format_percent, format_pixels
 
 UNLIKELY_P_VALUE = 0.05
 """Below: consistent views have residuals as large as these in fewer than one of twenty groups."""
@@ -46,7 +54,7 @@ class JudgedView:
 
 
 @dataclass(frozen=True)
-class _Group:
+class _JudgedGroup:
     """What the sentences are written from.
 
     Attributes:
@@ -60,16 +68,16 @@ class _Group:
     failed: frozenset[str]
 
     @property
-    def left(self) -> list[JudgedView]:
+    def remaining_views(self) -> list[JudgedView]:
         """The views that no gate drops."""
         return [view for view in self.views if view.failed is None]
 
-    def fallen(self, gate: str) -> list[JudgedView]:
+    def views_failing(self, gate: str) -> list[JudgedView]:
         """The views that a gate drops."""
         return [view for view in self.views if view.failed == gate]
 
 
-def describe(
+def describe_gates(
     views: Sequence[JudgedView],
     left_out: Sequence[str],
     pairs: Sequence[Pair],
@@ -92,31 +100,31 @@ def describe(
         chi_square: The test of the ball's residuals, or None.
     """
     failed = zip(GATES, judgement.failed[:, 0].tolist(), strict=True)
-    group = _Group(views, left_out, frozenset(name for name, fails in failed if fails))
+    group = _JudgedGroup(views, left_out, frozenset(name for name, fails in failed if fails))
     return (
-        _calibratable(group),
-        _jac(group, policy),
-        *_agreement(group, policy),
-        _two_views(group),
-        _ball(group),
-        _baseline(group, pairs, float(judgement.baseline[0]), policy),
-        _reprojection(group, pairs, policy),
-        _parallax(group, ball, policy),
-        _sigma(group, ball, policy),
-        _chi_square(group, chi_square, policy),
+        _calibratable_gate(group),
+        _jac_gate(group, policy),
+        *_agreement_gates(group, policy),
+        _two_views_gate(group),
+        _ball_gate(group),
+        _baseline_gate(group, pairs, float(judgement.baseline[0]), policy),
+        _reprojection_gate(group, pairs, policy),
+        _parallax_gate(group, ball, policy),
+        _sigma_gate(group, ball, policy),
+        _chi_square_gate(group, chi_square, policy),
     )
 
 
-def _calibratable(group: _Group) -> Gate:
-    fallen, views = group.fallen("calibratable"), group.views
+def _calibratable_gate(group: _JudgedGroup) -> Gate:
+    fallen, views = group.views_failing("calibratable"), group.views
     count = len(views) - len(fallen)
     blamed = "calibratable" in group.failed
     sentence = f"in {count} of {len(views)} views"
-    if guessed := [view for view in views if _is_guess(view.calibration)]:
-        sentence += f", {_letters(guessed)} uncertain"
+    if guessed := [view for view in views if _is_partly_guessed(view.calibration)]:
+        sentence += f", {_list_letters(guessed)} uncertain"
     if blamed:
         sentence = f"{fallen[0].letter} has no camera: {fallen[0].calibration.reason}"
-    return _gate(
+    return _make_gate(
         "calibratable",
         not blamed,
         count,
@@ -126,21 +134,21 @@ def _calibratable(group: _Group) -> Gate:
     )
 
 
-def _is_guess(calibration: Calibration) -> bool:
+def _is_partly_guessed(calibration: Calibration) -> bool:
     """Whether the lines leave open a part of the camera that was found."""
     return calibration.camera is not None and bool(calibration.unobservable)
 
 
-def _jac(group: _Group, policy: Policy) -> Gate:
+def _jac_gate(group: _JudgedGroup, policy: Policy) -> Gate:
     measured = [(view.jac, view) for view in group.views if view.jac is not None]
     if not measured:
         given = any(view.calibration.source == "given" for view in group.views)
         sentence = "not measured, the cameras were given" if given else "nothing to measure"
         return Gate("jac", True, None, policy.min_jac, None, sentence)
-    return _worst("jac", group, measured, policy.min_jac)
+    return _gate_of_worst_view("jac", group, measured, policy.min_jac)
 
 
-def _agreement(group: _Group, policy: Policy) -> Iterator[Gate]:
+def _agreement_gates(group: _JudgedGroup, policy: Policy) -> Iterator[Gate]:
     threshold = policy.min_agreement
     if threshold is None:
         return
@@ -149,11 +157,11 @@ def _agreement(group: _Group, policy: Policy) -> Iterator[Gate]:
     if not measured:
         yield Gate("agreement", True, None, threshold, None, "no paint was read")
         return
-    yield _worst("agreement", group, measured, threshold)
+    yield _gate_of_worst_view("agreement", group, measured, threshold)
 
 
-def _worst(
-    name: str, group: _Group, measured: Sequence[tuple[float, JudgedView]], threshold: float
+def _gate_of_worst_view(
+    name: str, group: _JudgedGroup, measured: Sequence[tuple[float, JudgedView]], threshold: float
 ) -> Gate:
     """A gate of views, by the smallest number of those that it judges."""
     blamed = name in group.failed
@@ -162,21 +170,21 @@ def _worst(
     if not blamed and not left:
         # The views that are left have nothing to measure: no tick stands beside those that fell.
         value, view = min(measured, key=lambda item: item[0])
-        sentence = f"{view.letter}: {_beside(value, threshold)}, not used"
+        sentence = f"{view.letter}: {_format_beside_limit(value, threshold)}, not used"
         if len(measured) < len(group.views):
             sentence += "; the rest not measured"
         return Gate(name, True, None, threshold, None, sentence)
     shown = fallen if blamed else [item for item in left if item[1].failed is None] or left
     value, view = min(shown, key=lambda item: item[0])
-    sentence = f"{view.letter}: {_beside(value, threshold)}"
+    sentence = f"{view.letter}: {_format_beside_limit(value, threshold)}"
     if value == threshold and view.failed == name:
         sentence += f", must be above {threshold:.2f}"
     elif len(shown) > 1:
         sentence += " (lowest)"
     if fallen and not blamed:
-        sentence += f"; {_letters([view for _, view in fallen])} too low, not used"
+        sentence += f"; {_list_letters([view for _, view in fallen])} too low, not used"
     key = view.key if blamed else None
-    return _gate(name, not blamed, value, threshold, sentence, view=key)
+    return _make_gate(name, not blamed, value, threshold, sentence, view=key)
 
 
 _FALLEN_AT = {
@@ -187,73 +195,78 @@ _FALLEN_AT = {
 """Why a view does not count."""
 
 
-def _beside(value: float, limit: float) -> str:
+def _format_beside_limit(value: float, limit: float) -> str:
     """A value in as many digits as it takes to tell it from its limit."""
     same = value != limit and f"{value:.2f}" == f"{limit:.2f}"
     return f"{value:.4f}" if same else f"{value:.2f}"
 
 
-def _two_views(group: _Group) -> Gate:
-    count, passed = len(group.left), "two_views" not in group.failed
+def _two_views_gate(group: _JudgedGroup) -> Gate:
+    count, passed = len(group.remaining_views), "two_views" not in group.failed
     sentence = f"{count} of {len(group.views) + len(group.left_out)}"
     if not passed:
-        why = _fallen(group.views)
+        why = _describe_failed_views(group.views)
         if group.left_out:
             why.append(f"{', '.join(group.left_out)} left out by a person")
         sentence = ", ".join([sentence, *why])
-    return _gate("two_views", passed, count, MIN_VIEWS, sentence)
+    return _make_gate("two_views", passed, count, MIN_VIEWS, sentence)
 
 
-def _ball(group: _Group) -> Gate:
-    without = [view for view in group.left if not view.has_ball]
-    count = len(group.left) - len(without)
+def _ball_gate(group: _JudgedGroup) -> Gate:
+    without = [view for view in group.remaining_views if not view.has_ball]
+    count = len(group.remaining_views) - len(without)
     passed = "ball" not in group.failed
     sentence = f"in {plural(count, 'view')}"
     for why in dict.fromkeys(view.no_ball for view in without):
-        alike = _letters([view for view in without if view.no_ball == why])
+        alike = _list_letters([view for view in without if view.no_ball == why])
         sentence += f", {why.format(alike)}"
     if not passed:
-        idle = _fallen([view for view in group.views if view.has_ball])
+        idle = _describe_failed_views([view for view in group.views if view.has_ball])
         sentence = ", ".join([sentence, *idle])
     view = without[0].key if without and not passed else None
-    return _gate("ball", passed, count, MIN_VIEWS, sentence, view=view)
+    return _make_gate("ball", passed, count, MIN_VIEWS, sentence, view=view)
 
 
-def _fallen(views: Sequence[JudgedView]) -> list[str]:
+def _describe_failed_views(views: Sequence[JudgedView]) -> list[str]:
     """Which views do not count, and why: one text for each reason."""
     reasons = {
         name: [view for view in views if view.failed == name]
         for name in dict.fromkeys(view.failed for view in views if view.failed is not None)
     }
     return [
-        f"{_letters(fallen)} not counted ({_FALLEN_AT[name]})" for name, fallen in reasons.items()
+        f"{_list_letters(fallen)} not counted ({_FALLEN_AT[name]})"
+        for name, fallen in reasons.items()
     ]
 
 
-def _baseline(group: _Group, pairs: Sequence[Pair], widest: float, policy: Policy) -> Gate:
+def _baseline_gate(
+    group: _JudgedGroup, pairs: Sequence[Pair], widest: float, policy: Policy
+) -> Gate:
     if isnan(widest):
-        return _unjudged("baseline", policy.min_baseline_m)
+        return _unjudged_gate("baseline", policy.min_baseline_m)
     passed = "baseline" not in group.failed
-    letters = "–".join(view.letter for view in group.left if view.has_ball)
+    letters = "–".join(view.letter for view in group.remaining_views if view.has_ball)
     sentence = f"{widest:.1f} m" if passed else f"{letters} {widest:.1f} m apart"
-    named = _letters_of(group)
+    named = _letters_by_view(group)
     close = [pair for pair in pairs if pair.failed == "baseline"]
     if passed and close:
-        unused = ", ".join(f"{_name(pair, named)} {pair.baseline_m:.1f} m" for pair in close)
+        unused = ", ".join(
+            f"{_pair_letters(pair, named)} {pair.baseline_m:.1f} m" for pair in close
+        )
         sentence += f"; {unused} not used"
-    return _gate("baseline", passed, widest, policy.min_baseline_m, sentence)
+    return _make_gate("baseline", passed, widest, policy.min_baseline_m, sentence)
 
 
-def _letters_of(group: _Group) -> dict[str, str]:
+def _letters_by_view(group: _JudgedGroup) -> dict[str, str]:
     return {view.key: view.letter for view in group.views}
 
 
-def _reprojection(group: _Group, pairs: Sequence[Pair], policy: Policy) -> Gate:
-    tau_px = {view.key: view.tau_px for view in group.left}
-    return reprojection(pairs, _letters_of(group), tau_px, policy.tau_percent)
+def _reprojection_gate(group: _JudgedGroup, pairs: Sequence[Pair], policy: Policy) -> Gate:
+    tau_px = {view.key: view.tau_px for view in group.remaining_views}
+    return reprojection_gate_of_pairs(pairs, _letters_by_view(group), tau_px, policy.tau_percent)
 
 
-def reprojection(
+def reprojection_gate_of_pairs(
     pairs: Sequence[Pair],
     letters: Mapping[str, str],
     tau_px: Mapping[str, float],
@@ -268,27 +281,27 @@ def reprojection(
         tau_percent: The same, of the image diagonal of each view.
     """
     judged = [
-        (max(_shares(pair, tau_px), key=lambda share: share[0]), pair)
+        (max(_errors_in_tau(pair, tau_px), key=lambda share: share[0]), pair)
         for pair in pairs
         if pair.failed in (None, "reprojection")
     ]
     if not judged:
-        return _unjudged("reprojection", None)
+        return _unjudged_gate("reprojection", None)
     (_, error, tau), best = min(judged, key=lambda item: (not item[1].valid, item[0][0]))
-    sentence = f"{_name(best, letters)} {pixels(error)}, {_percent(error / tau, tau_percent)}"
+    sentence = f"{_pair_letters(best, letters)} {format_pixels(error)}, {_percent_of_limit(error / tau, tau_percent)}"
     if len(judged) > 1:
         sentence += " (best pair)"
-    margin = margin_of(error, tau, at_most=True)
+    margin = margin_to_threshold(error, tau, at_most=True)
     if not best.valid and error <= tau:
         # Its pixels are near enough, and there is no ball: no share of tau says how far it is off.
-        sentence, margin = f"the rays of {_name(best, letters)} meet behind a camera", None
+        sentence, margin = f"the rays of {_pair_letters(best, letters)} meet behind a camera", None
     left_out = [pair for _, pair in judged if not pair.valid]
     if best.valid and left_out:
-        sentence += f"; {', '.join(_name(pair, letters) for pair in left_out)} not used"
+        sentence += f"; {', '.join(_pair_letters(pair, letters) for pair in left_out)} not used"
     return Gate("reprojection", best.valid, error, tau, margin, sentence)
 
 
-def _percent(share: float, limit: float) -> str:
+def _percent_of_limit(share: float, limit: float) -> str:
     """A share of a limit as per cent, in as many digits as it takes to tell it from the limit.
 
     Example:
@@ -296,10 +309,10 @@ def _percent(share: float, limit: float) -> str:
         ('0.14 %', '1.0002 %')
     """
     value = share * limit
-    return f"{_beside(value, limit) if round(value, 2) == round(limit, 2) else percent(value)} %"
+    return f"{_format_beside_limit(value, limit) if round(value, 2) == round(limit, 2) else format_percent(value)} %"
 
 
-def _shares(
+def _errors_in_tau(
     pair: Pair, tau_px: Mapping[str, float]
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """For both views: error in units of tau, error, tau."""
@@ -310,40 +323,41 @@ def _shares(
     )
 
 
-def _name(pair: Pair, letters: Mapping[str, str]) -> str:
+def _pair_letters(pair: Pair, letters: Mapping[str, str]) -> str:
     return f"{letters[pair.a]}–{letters[pair.b]}"
 
 
-def _parallax(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
+def _parallax_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -> Gate:
     threshold, active = policy.min_parallax_degrees, policy.min_parallax_degrees is not None
     if ball is None:
-        return _unjudged("parallax", threshold, active=active)
+        return _unjudged_gate("parallax", threshold, active=active)
     value, passed = ball.parallax_degrees, "parallax" not in group.failed
-    return _gate("parallax", passed, value, threshold, degrees(value), active=active)
+    return _make_gate("parallax", passed, value, threshold, format_degrees(value), active=active)
 
 
-def _sigma(group: _Group, ball: Ball3D | None, policy: Policy) -> Gate:
+def _sigma_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -> Gate:
     threshold, active = policy.max_sigma_m, policy.max_sigma_m is not None
     if ball is None:
-        return _unjudged("sigma", threshold, active=active)
+        return _unjudged_gate("sigma", threshold, active=active)
     value, passed = ball.sigma_m, "sigma" not in group.failed
-    margin = margin_of(value, threshold, at_most=True)
-    return Gate("sigma", passed, value, threshold, margin, metres(value), active=active)
+    margin = margin_to_threshold(value, threshold, at_most=True)
+    return Gate("sigma", passed, value, threshold, margin, format_metres(value), active=active)
 
 
-def _chi_square(group: _Group, found: ChiSquare | None, policy: Policy) -> Gate:
+def _chi_square_gate(group: _JudgedGroup, found: ChiSquare | None, policy: Policy) -> Gate:
     threshold, active = policy.min_p_value, policy.min_p_value is not None
     if found is None:
-        return _unjudged("chi_square", threshold, active=active)
+        return _unjudged_gate("chi_square", threshold, active=active)
     passed = "chi_square" not in group.failed
     cameras = [view.calibration for view in group.views if view.key in found.views]
     if active and not all(
-        item.is_known or (item.is_bare and policy.given_sigma_px) for item in cameras
+        item.is_known or (item.is_given_without_uncertainty and policy.given_sigma_px)
+        for item in cameras
     ):
         sentence = "not judged: a camera has no known uncertainty"
         return Gate("chi_square", passed, None, threshold, None, sentence, active=active)
-    sentence = f"{consistency_word(found.p_value)} ({_probability(found.p_value)})"
-    return _gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
+    sentence = f"{consistency_word(found.p_value)} ({_format_p_value(found.p_value)})"
+    return _make_gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
 
 
 def consistency_word(p_value: float) -> str:
@@ -361,7 +375,7 @@ def consistency_word(p_value: float) -> str:
     return "unlikely" if p_value < UNLIKELY_P_VALUE else "normal"
 
 
-def _probability(p_value: float) -> str:
+def _format_p_value(p_value: float) -> str:
     """A p-value in two digits.
 
     Example:
@@ -374,7 +388,7 @@ def _probability(p_value: float) -> str:
     return f"p = {p_value:.{digits}f}"
 
 
-def chance(p_value: float) -> str:
+def odds_text(p_value: float) -> str:
     """How often something happens, for people.
 
     Example:
@@ -388,7 +402,7 @@ def chance(p_value: float) -> str:
     return f"1 of {float(f'{1 / p_value:.2g}'):,.0f} groups"
 
 
-def _gate(
+def _make_gate(
     name: str,
     passed: bool,
     value: float,
@@ -398,13 +412,13 @@ def _gate(
     view: str | None = None,
     active: bool = True,
 ) -> Gate:
-    margin = margin_of(value, threshold)
+    margin = margin_to_threshold(value, threshold)
     return Gate(name, passed, float(value), threshold, margin, sentence, view, active)
 
 
-def _unjudged(name: str, threshold: float | None, *, active: bool = True) -> Gate:
+def _unjudged_gate(name: str, threshold: float | None, *, active: bool = True) -> Gate:
     return Gate(name, False, None, threshold, None, "not judged", active=active)
 
 
-def _letters(views: Sequence[JudgedView]) -> str:
+def _list_letters(views: Sequence[JudgedView]) -> str:
     return ", ".join(view.letter for view in views)

@@ -20,7 +20,7 @@ from app.geometry.camera import Camera
 from app.geometry.polyline import clip_polyline, distance_to_polyline, inside_image
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import GOAL_PARTS, MARKINGS, Pitch, twin_marking
+from app.soccer.pitch import GOAL_PARTS, MARKINGS, Pitch, opposite_marking
 
 SPACING_M = 0.9
 CIRCLE_SPACING_M = 0.2
@@ -62,7 +62,7 @@ def project_markings(
     Returns:
         Of each marking that is seen its places in the picture, pixels, shape (N, 2).
     """
-    samples, limits = _samples(pitch, names)
+    samples, limits = _sample_markings(pitch, names)
     pixels = camera.project(samples, folded=True)
     seen = inside_image(pixels, size.width, size.height)
     return {
@@ -88,7 +88,7 @@ def measure_markings(projected: dict[str, FloatArray], lines: Lines) -> dict[str
     return measured
 
 
-def evaluated(
+def as_evaluator_markings(
     camera: Camera,
     pitch: Pitch,
     size: ImageSize,
@@ -114,7 +114,7 @@ def evaluated(
     return {name: both[name] for name in MARKINGS if name in both}
 
 
-def outcomes(
+def marking_outcomes(
     measured: dict[str, ProjectedMarking], lines: Lines, gamma_px: float
 ) -> dict[str, str]:
     """What each marking counts as at a threshold: ``tp``, ``fp`` or ``fn``."""
@@ -129,7 +129,7 @@ def outcomes(
     return result
 
 
-def not_missing(
+def unannotated_not_missing(
     measured: dict[str, ProjectedMarking],
     lines: Lines,
     not_visible: Collection[str],
@@ -181,17 +181,17 @@ def camera_jaccard(
     """
     projected = project_markings(camera, pitch.with_goal("inner"), size)
     measured = measure_markings(projected, lines)
-    values = tuple(jaccard(outcomes(measured, lines, gamma)) for gamma in gammas_px)
+    values = tuple(jaccard(marking_outcomes(measured, lines, gamma)) for gamma in gammas_px)
     if not symmetric:
         return values
-    turned: Lines = {twin_marking(marking): points for marking, points in lines.items()}
+    turned: Lines = {opposite_marking(marking): points for marking, points in lines.items()}
     measured = measure_markings(projected, turned)
-    twins = (jaccard(outcomes(measured, turned, gamma)) for gamma in gammas_px)
+    twins = (jaccard(marking_outcomes(measured, turned, gamma)) for gamma in gammas_px)
     return tuple(max(pair) for pair in zip(values, twins, strict=True))
 
 
 @lru_cache(maxsize=8)
-def _samples(
+def _sample_markings(
     pitch: Pitch, names: tuple[str, ...] = MARKINGS
 ) -> tuple[FloatArray, tuple[tuple[str, int, int], ...]]:
     parts, limits, count = [], [], 0

@@ -12,8 +12,8 @@ from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
-from app.solving.ball_covariance import MeanCovariance, is_certain, is_within
-from app.solving.chi_square import p_values, residuals_of
+from app.solving.ball_covariance import MeanCovariance, is_covariance_within, is_sigma_within
+from app.solving.chi_square import chi_square_residuals, p_values
 from app.solving.facts import Facts
 
 MIN_VIEWS = 2
@@ -79,7 +79,7 @@ class Judgement:
         return passing
 
 
-def judge(
+def judge_groups(
     facts: Facts, policy: Policy, uncertainty: MeanCovariance, jac: FloatArray | None = None
 ) -> Judgement:
     """Judge every group by the thresholds of a policy.
@@ -92,10 +92,12 @@ def judge(
     """
     if jac is None:
         jac = view_jac(facts, policy.jac_gamma_percent)
-    return judge_standing(facts, policy, uncertainty, jac, failures(facts, jac, policy))
+    return judge_known_failures(
+        facts, policy, uncertainty, jac, first_failed_gates(facts, jac, policy)
+    )
 
 
-def judge_standing(
+def judge_known_failures(
     facts: Facts,
     policy: Policy,
     uncertainty: MeanCovariance,
@@ -104,53 +106,53 @@ def judge_standing(
     *,
     first_alone: bool = False,
 ) -> Judgement:
-    """``judge`` where it is known which views and pairs stand.
+    """``judge_groups`` where it is known which views and pairs stand.
 
     Args:
         facts: The groups.
         policy: The thresholds.
         uncertainty: Of the same facts.
         jac: ``view_jac`` at the policy's gamma, shape (V,).
-        standing: ``failures`` of them.
+        standing: ``first_failed_gates`` of them.
         first_alone: Only the first gate that a group fails matters: what is dear is not judged
             where one before it fails.
     """
     view_failed, pair_failed = standing
     left = facts.view_included & (view_failed == PASSES)
     valid = pair_failed == PASSES
-    point, parallax, distance = _mean(facts, valid)
-    baseline = _baseline(facts, left)
+    point, parallax, distance = _mean_pair_points(facts, valid)
+    baseline = _widest_baselines(facts, left)
     failed = np.zeros((PASSES, facts.groups), bool)
-    failed[_CALIBRATABLE : _BALL + 1] = _view_gates(facts, view_failed, left)
+    failed[_CALIBRATABLE : _BALL + 1] = _groups_failing_view_gates(facts, view_failed, left)
     failed[_REPROJECTION] = np.isnan(point[:, 0])
 
-    def before() -> BoolArray:
+    def fails_earlier_gate() -> BoolArray:
         """Groups whose sigma and p-value are not asked for."""
         fallen: BoolArray = failed[_REPROJECTION]
         return np.any(failed[:_SIGMA], axis=0) if first_alone else fallen
 
-    def certain(limit_m: float) -> BoolArray:
-        candidates = np.flatnonzero(~before())
+    def is_sigma_small_enough(limit_m: float) -> BoolArray:
+        candidates = np.flatnonzero(~fails_earlier_gate())
         covariances = uncertainty.covariances(valid, candidates, point[candidates], policy)
         # Contradictions only widen: whoever is uncertain without them is so with them.
-        within = is_within(covariances, limit_m)
+        within = is_covariance_within(covariances, limit_m)
         candidates, covariances = candidates[within], covariances[within]
         found = np.zeros(facts.groups, bool)
         widened = widened_covariances(facts, valid, candidates, covariances, point, policy)
-        found[candidates] = is_within(widened, limit_m)
+        found[candidates] = is_covariance_within(widened, limit_m)
         return found
 
     def p_value() -> FloatArray:
-        used = views_of(facts, valid)
+        used = views_in_pairs(facts, valid)
         if first_alone:
-            used &= ~before()[facts.view_group]
+            used &= ~fails_earlier_gate()[facts.view_group]
         return p_values(facts, used, point, policy)
 
-    _compare(failed, policy, baseline, parallax, certain, p_value)
+    _apply_group_gates(failed, policy, baseline, parallax, is_sigma_small_enough, p_value)
     return Judgement(jac, view_failed, pair_failed, failed, baseline, point, parallax, distance)
 
 
-def compare_again(
+def recompare_thresholds(
     known: Judgement, policy: Policy, sigma: FloatArray | None, p_value: FloatArray | None
 ) -> BoolArray:
     """``Judgement.failed`` under other thresholds, of groups whose views and pairs stand as before.
@@ -164,19 +166,21 @@ def compare_again(
     """
     failed = known.failed.copy()
 
-    def certain(limit_m: float) -> BoolArray:
+    def is_sigma_small_enough(limit_m: float) -> BoolArray:
         assert sigma is not None
-        return is_certain(sigma, limit_m)
+        return is_sigma_within(sigma, limit_m)
 
     def known_p_value() -> FloatArray:
         assert p_value is not None
         return p_value
 
-    _compare(failed, policy, known.baseline, known.parallax, certain, known_p_value)
+    _apply_group_gates(
+        failed, policy, known.baseline, known.parallax, is_sigma_small_enough, known_p_value
+    )
     return failed
 
 
-def _compare(
+def _apply_group_gates(
     failed: BoolArray,
     policy: Policy,
     baseline: FloatArray,
@@ -224,19 +228,19 @@ def widened_covariances(
     """
     wanted = np.zeros(facts.groups, bool)
     wanted[groups] = True
-    used = views_of(facts, valid) & wanted[facts.view_group]
-    widening = residuals_of(facts, used, point, policy).widening[groups]
+    used = views_in_pairs(facts, valid) & wanted[facts.view_group]
+    widening = chi_square_residuals(facts, used, point, policy).widening[groups]
     widened: FloatArray = covariances * (widening**2)[:, None, None]
     return widened
 
 
-def failures(facts: Facts, jac: FloatArray, policy: Policy) -> tuple[IntArray, IntArray]:
+def first_failed_gates(facts: Facts, jac: FloatArray, policy: Policy) -> tuple[IntArray, IntArray]:
     """First gate that drops each view, shape (V,), and each pair, (P,), or ``PASSES``."""
-    view_failed = _view_failed(facts, jac, policy)
-    return view_failed, _pair_failed(facts, view_failed, policy)
+    view_failed = _first_failed_view_gates(facts, jac, policy)
+    return view_failed, _first_failed_pair_gates(facts, view_failed, policy)
 
 
-def views_of(facts: Facts, pairs: BoolArray) -> BoolArray:
+def views_in_pairs(facts: Facts, pairs: BoolArray) -> BoolArray:
     """Views in any of the pairs, shape (V,)."""
     found = np.zeros(len(facts.view_group), bool)
     found[facts.pair_view[pairs]] = True
@@ -253,7 +257,7 @@ def view_jac(facts: Facts, gamma_percent: float) -> FloatArray:
     return np.where(facts.view_measured, hits / np.maximum(marks, 1), np.nan)
 
 
-def _view_failed(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
+def _first_failed_view_gates(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
     failed: IntArray = np.full(len(facts.view_group), PASSES).astype(np.int8)
     # NaN where there is nothing to measure, and then nothing falls.
     if policy.min_agreement is not None:
@@ -264,7 +268,7 @@ def _view_failed(facts: Facts, jac: FloatArray, policy: Policy) -> IntArray:
     return failed
 
 
-def _pair_failed(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArray:
+def _first_failed_pair_gates(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArray:
     tau_px = policy.tau_px(facts.view_diagonal)
     a, b = (facts.pair_errors <= tau_px[facts.pair_view]).T
     failed = np.where(a & b & facts.pair_front, np.int8(PASSES), np.int8(_REPROJECTION))
@@ -274,7 +278,7 @@ def _pair_failed(facts: Facts, view_failed: IntArray, policy: Policy) -> IntArra
     return first
 
 
-def _view_gates(facts: Facts, view_failed: IntArray, left: BoolArray) -> BoolArray:
+def _groups_failing_view_gates(facts: Facts, view_failed: IntArray, left: BoolArray) -> BoolArray:
     """The gates that are judged from views: which groups fail them, shape (5, G)."""
     included, bare, fallen, apart, remaining, shown = (
         np.bincount(facts.view_group[chosen], minlength=facts.groups)
@@ -300,7 +304,7 @@ def _view_gates(facts: Facts, view_failed: IntArray, left: BoolArray) -> BoolArr
     )
 
 
-def _baseline(facts: Facts, left: BoolArray) -> FloatArray:
+def _widest_baselines(facts: Facts, left: BoolArray) -> FloatArray:
     shown = np.bincount(facts.view_group[left & facts.view_ball], minlength=facts.groups)
     widest = np.where(shown >= MIN_VIEWS, 0.0, np.nan)
     a, b = left[facts.pair_view].T
@@ -310,7 +314,7 @@ def _baseline(facts: Facts, left: BoolArray) -> FloatArray:
     return widest
 
 
-def _mean(facts: Facts, valid: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _mean_pair_points(facts: Facts, valid: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mean point of the valid pairs, its largest parallax in degrees, and its distance."""
     pairs = np.flatnonzero(valid)
     owner = facts.pair_group[pairs]

@@ -41,7 +41,7 @@ MIN_MEASUREMENTS_LEFT = 8
 
 
 @dataclass(frozen=True)
-class _Suspicion:
+class _SuspectMarking:
     """A marking left out: how far off it is, and the class that its points fit best, if any."""
 
     marking: str
@@ -60,10 +60,10 @@ class _Suspicion:
 
 
 @dataclass(frozen=True)
-class _Trial:
+class _RemovalTrial:
     """What happens without some markings: the camera, and the largest distance of the others."""
 
-    doubts: tuple[_Suspicion, ...]
+    doubts: tuple[_SuspectMarking, ...]
     rest: Observations
     fit: Resection
     worst: float
@@ -92,26 +92,29 @@ def find_suspects(
     Returns:
         The arguments themselves and no suspect where every marking fits.
     """
-    search = _Search(problem, GAMMA_SHARE * problem.size.diagonal)
+    search = _LabelSearch(problem, GAMMA_SHARE * problem.size.diagonal)
     if search.all_fit(observations, fit):
         return fit, observations, ()
-    found = search.explanation(observations, fit)
+    found = search.find_explanation(observations, fit)
     if found is None:
         return fit, observations, ()
     trial, names = found
     # Only now is it known which classes are free (two posts may have been swapped), and whether
     # what was left out on the way there is off at all.
-    final = [search.doubt(observations, trial.rest, trial.fit, name) for name in names]
+    final = [
+        search.compare_with_other_labels(observations, trial.rest, trial.fit, name)
+        for name in names
+    ]
     suspects = [doubt for doubt in final if doubt.is_off]
     fit, rest = trial.fit, trial.rest
     if len(suspects) < len(final):
         rest = observations.without(*(doubt.marking for doubt in suspects))
         fit = problem.refine(rest, fit.parameters[None])
-    return fit, rest, tuple(search.suspect(doubt) for doubt in suspects)
+    return fit, rest, tuple(search.to_suspect(doubt) for doubt in suspects)
 
 
 @dataclass(frozen=True)
-class _Search:
+class _LabelSearch:
     """Trials on one image; distances are in units of ``gamma`` (pixels)."""
 
     problem: ResectionProblem
@@ -119,43 +122,45 @@ class _Search:
 
     def all_fit(self, observations: Observations, fit: Resection) -> bool:
         """Whether no marking is off."""
-        return max(self.largest(observations, fit).values(), default=0.0) <= MISFIT
+        return max(self.largest_distances(observations, fit).values(), default=0.0) <= MISFIT
 
-    def explanation(
+    def find_explanation(
         self, observations: Observations, fit: Resection
-    ) -> tuple[_Trial, list[str]] | None:
+    ) -> tuple[_RemovalTrial, list[str]] | None:
         """The trial to believe with all that is left out on the way to it, or None."""
         trial = self.without_minority(observations)
-        if trial is not None and self.settled(trial, fit.cost):
+        if trial is not None and self.is_convincing(trial, fit.cost):
             return trial, [doubt.marking for doubt in trial.doubts]
         names: list[str] = []
         rest, now = observations, fit
         for _ in range(MAX_SUSPECTS):
-            trial = self.next_without(rest, now)
+            trial = self.best_single_removal(rest, now)
             if trial is None:
                 return None
             names += [doubt.marking for doubt in trial.doubts]
-            if self.settled(trial, fit.cost):
+            if self.is_convincing(trial, fit.cost):
                 return trial, names
             rest, now = trial.rest, trial.fit
         return None
 
-    def settled(self, trial: _Trial, cost: float) -> bool:
+    def is_convincing(self, trial: _RemovalTrial, cost: float) -> bool:
         """Whether a trial is good enough to believe, against the cost with all markings."""
         return trial.explains or (trial.fit.cost < DECISIVE * cost and trial.worst <= SETTLES)
 
-    def without_minority(self, observations: Observations) -> _Trial | None:
+    def without_minority(self, observations: Observations) -> _RemovalTrial | None:
         """The trial without the few markings of the other side, if that settles everything."""
-        minority = _minority(observations.markings)
+        minority = _markings_on_minority_half(observations.markings)
         if not 2 <= len(minority) <= MAX_SUSPECTS:
             return None
         trial = self.try_without(observations, minority)
         return trial if trial is not None and trial.is_sound and trial.worst <= FITS else None
 
-    def next_without(self, observations: Observations, fit: Resection) -> _Trial | None:
+    def best_single_removal(
+        self, observations: Observations, fit: Resection
+    ) -> _RemovalTrial | None:
         """The first marking whose removal explains everything, else the one that helps most."""
         trials = []
-        for marking in _by_suspicion(self.largest(observations, fit)):
+        for marking in _order_by_suspicion(self.largest_distances(observations, fit)):
             trial = self.try_without(observations, [marking])
             if trial is None or not trial.is_sound:
                 continue
@@ -164,34 +169,38 @@ class _Search:
             trials.append(trial)
         return min(trials, key=lambda item: item.fit.cost, default=None)
 
-    def try_without(self, observations: Observations, markings: Sequence[str]) -> _Trial | None:
+    def try_without(
+        self, observations: Observations, markings: Sequence[str]
+    ) -> _RemovalTrial | None:
         """The camera without some markings; None when too little would be left."""
         rest = observations.without(*markings)
         if measurement_count(rest) < MIN_MEASUREMENTS_LEFT:
             return None
         fit = self.problem.search(rest)
-        doubts = tuple(self.doubt(observations, rest, fit, marking) for marking in markings)
-        return _Trial(doubts, rest, fit, max(self.largest(rest, fit).values()))
+        doubts = tuple(
+            self.compare_with_other_labels(observations, rest, fit, marking) for marking in markings
+        )
+        return _RemovalTrial(doubts, rest, fit, max(self.largest_distances(rest, fit).values()))
 
-    def doubt(
+    def compare_with_other_labels(
         self, observations: Observations, rest: Observations, fit: Resection, marking: str
-    ) -> _Suspicion:
+    ) -> _SuspectMarking:
         """A marking against the camera from the rest, under its label and those not in use."""
-        error = self.distance(fit.parameters, observations.only(marking))
+        error = self.largest_distance(fit.parameters, observations.only(marking))
         taken = {*rest.markings, marking}
         ranked = sorted(
-            (self.distance(fit.parameters, observations.only(marking, other)), other)
+            (self.largest_distance(fit.parameters, observations.only(marking, other)), other)
             for other in MARKINGS
             if other not in taken and (other in CIRCLES) == (marking in CIRCLES)
         )
         if not ranked:
-            return _Suspicion(marking, error, None, np.inf)
+            return _SuspectMarking(marking, error, None, np.inf)
         nearest, best = ranked[0]
         rival = ranked[1][0] if len(ranked) > 1 else np.inf
         plausible = nearest <= RELABELLED or (nearest <= NEAREST and 2 * nearest < rival)
-        return _Suspicion(marking, error, best if plausible else None, nearest)
+        return _SuspectMarking(marking, error, best if plausible else None, nearest)
 
-    def largest(self, observations: Observations, fit: Resection) -> dict[str, float]:
+    def largest_distances(self, observations: Observations, fit: Resection) -> dict[str, float]:
         """Largest distance of each marking's points."""
         apart = self.problem.distances(fit.parameters, observations) / self.gamma
         return {
@@ -199,11 +208,11 @@ class _Search:
             for index in np.unique(observations.marking)
         }
 
-    def distance(self, parameters: FloatArray, observations: Observations) -> float:
+    def largest_distance(self, parameters: FloatArray, observations: Observations) -> float:
         """Largest distance of all points."""
         return float(self.problem.distances(parameters, observations).max()) / self.gamma
 
-    def suspect(self, doubt: _Suspicion) -> Suspect:
+    def to_suspect(self, doubt: _SuspectMarking) -> Suspect:
         """The doubt as people are told of it; a class that fits as badly is worth nothing."""
         named = doubt.suggested is not None
         return Suspect(
@@ -215,16 +224,16 @@ class _Search:
         )
 
 
-def _by_suspicion(largest: dict[str, float]) -> list[str]:
+def _order_by_suspicion(largest: dict[str, float]) -> list[str]:
     """Markings in the order in which they are tried.
 
     Those on the other side of the pitch than most come first, then what fits worst.
     """
-    minority = _minority(tuple(largest))
+    minority = _markings_on_minority_half(tuple(largest))
     return sorted(largest, key=lambda name: (name not in minority, -largest[name], name))
 
 
-def _minority(markings: Sequence[str]) -> list[str]:
+def _markings_on_minority_half(markings: Sequence[str]) -> list[str]:
     """The markings of that half of the pitch which fewer of them belong to."""
     halves = (
         [name for name in markings if _pitch_half(name) == half] for half in ("left", "right")

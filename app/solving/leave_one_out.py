@@ -10,7 +10,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.solving.match_position import NO_PLACES, Places, share_position
-from app.solving.observations import observe
+from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
 
 
@@ -52,5 +52,5 @@ def error_without(
     if camera is None:
         return None
     problem = ResectionProblem.of(size, policy)
-    seen = observe(make_lines({marking: lines[marking]}), policy.fitted(pitch), size)
+    seen = observations_of_lines(make_lines({marking: lines[marking]}), policy.fitted(pitch), size)
     return float(problem.distances(problem.parameters(camera), seen).max())

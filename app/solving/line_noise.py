@@ -25,11 +25,11 @@ from app.solving.noise_grid import (
     BLOCKS,
     NORMAL_95,
     STUDENT,
-    between,
-    expected_cost,
+    interpolate_cost,
     jackknife_variance,
+    lowest_cost_vertex,
     posterior_variance,
-    vertex,
+    sigma_prior_cost,
 )
 
 SHARES = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
@@ -105,13 +105,13 @@ class LineEvidence:
         ) / 2
         return inside + (gammaln(total / 2) - gammaln(freedom / 2))
 
-    def in_units(self, pixels: float) -> LineEvidence:
+    def rescaled_to_pixels(self, pixels: float) -> LineEvidence:
         """The same with so many pixels for one."""
         return LineEvidence(self.rest / pixels**2, self.log_determinant, self.freedom)
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _ScaledFit:
     """A least-squares fit with columns of one length; errors of a marking are correlated."""
 
     residuals: FloatArray
@@ -125,7 +125,7 @@ class _Fit:
     @staticmethod
     def of(
         residuals: FloatArray, jacobian: FloatArray, marking: IntArray, prior: FloatArray
-    ) -> _Fit:
+    ) -> _ScaledFit:
         # Angles and metres: columns of one length invert better.
         lengths = np.sqrt((jacobian**2).sum(axis=0) + prior)
         jacobian = jacobian / lengths
@@ -133,7 +133,7 @@ class _Fit:
         sums = np.zeros((len(size), jacobian.shape[1]))
         np.add.at(sums, place, jacobian)
         totals = np.asarray(np.bincount(place, residuals), float)
-        return _Fit(residuals, jacobian, prior / lengths**2, lengths, sums, totals, size)
+        return _ScaledFit(residuals, jacobian, prior / lengths**2, lengths, sums, totals, size)
 
     def evidence(self, shares: FloatArray) -> LineEvidence:
         """For each of the shares, shape (R,)."""
@@ -163,7 +163,7 @@ def line_evidence(
 
     The arguments are those of ``line_noise``.
     """
-    return _Fit.of(residuals, jacobian, marking, prior).evidence(SHARES)
+    return _ScaledFit.of(residuals, jacobian, marking, prior).evidence(SHARES)
 
 
 def line_noise(
@@ -185,7 +185,7 @@ def line_noise(
     Raises:
         LinAlgError: A combination of parameters is not determined.
     """
-    fit = _Fit.of(residuals, jacobian, marking, prior)
+    fit = _ScaledFit.of(residuals, jacobian, marking, prior)
     values = SHARES if known.share is None else np.array([known.share])
     found = fit.evidence(values)
     n, freedom = len(residuals), found.freedom
@@ -253,10 +253,10 @@ def estimate_line_noise(found: Sequence[LineEvidence]) -> LineEstimate | None:
     # How alike the images are decides little: the likeliest holds for all blocks.
     blocks = blocks[:, blocks.sum(axis=0).min(axis=(1, 2)).argmin()]
     whole = blocks.sum(axis=0)
-    log_sigma, share, known = _posterior(whole)
+    log_sigma, share, known = _sigma_and_share_posterior(whole)
     if not _LOGS[0] < log_sigma < _LOGS[-1]:
         return None
-    parts = np.array([_posterior(whole - part)[:2] for part in blocks])
+    parts = np.array([_sigma_and_share_posterior(whole - part)[:2] for part in blocks])
     scatter, of_share = jackknife_variance(parts).tolist()
     numbers = sum(item.freedom for item in found)
     half = STUDENT * np.sqrt(posterior_variance(scatter, numbers))
@@ -273,15 +273,15 @@ _SHARE_STEP = float(SHARES[1] - SHARES[0])
 _SIGMA_STEP = float(_LOGS[1] - _LOGS[0])
 
 
-def _posterior(cost: FloatArray) -> tuple[float, float, float]:
+def _sigma_and_share_posterior(cost: FloatArray) -> tuple[float, float, float]:
     """Logarithm of sigma, share and its standard deviation from costs, shape (S, R)."""
-    cost = cost + expected_cost(_LOGS, EXPECTED_PX)[:, None]
+    cost = cost + sigma_prior_cost(_LOGS, EXPECTED_PX)[:, None]
     places = cost.argmin(axis=0).tolist()
-    vertices = [vertex(cost[:, share], at) for share, at in enumerate(places)]
+    vertices = [lowest_cost_vertex(cost[:, share], at) for share, at in enumerate(places)]
     off, least = np.transpose(vertices)
     # Few images leave the share open: its mean, not the likeliest one, is at no end by chance.
     steps = np.linspace(0, len(SHARES) - 1, _FINE * (len(SHARES) - 1) + 1)
-    fine, smooth = SHARES[0] + _SHARE_STEP * steps, between(least, steps)
+    fine, smooth = SHARES[0] + _SHARE_STEP * steps, interpolate_cost(least, steps)
     weight = np.exp(smooth.min() - smooth)
     weight /= weight.sum()
     share = float(weight @ fine)

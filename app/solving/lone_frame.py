@@ -19,7 +19,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.geometry.arrays import FloatArray, IntArray
-from app.geometry.resection import KAPPA, LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Y, residuals
+from app.geometry.resection import (
+    KAPPA,
+    LOG_FOCAL,
+    PAN,
+    PARAMETERS,
+    ROLL,
+    TILT,
+    X,
+    Y,
+    curve_residuals,
+)
 from app.soccer.picture import ASPECTS, MAX_SHIFT
 from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -273,7 +283,7 @@ class _Frame:
 
         def at(pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
             moved = Observations(seen.curves, pixels, seen.marking)
-            return residuals(camera, moved.curves, moved.curve_points(), half)
+            return curve_residuals(camera, moved.curves, moved.curve_points(), half)
 
         offsets, by_camera = at(seen.pixels)
         slopes = np.stack(

@@ -41,7 +41,7 @@ STADIUM = PositionPrior(MAIN_MEAN[1:], MAIN_SIGMA[1:], MAIN_FREEDOM)
 """What is known of any main camera."""
 
 
-def match_prior(mean: FloatArray, sigma: FloatArray) -> PositionPrior:
+def position_prior_of_match(mean: FloatArray, sigma: FloatArray) -> PositionPrior:
     """What the other frames of a match say of a main camera's position, metres, shapes (3,)."""
     return PositionPrior(mean, sigma, MATCH_FREEDOM, MATCH_CLICKS)
 

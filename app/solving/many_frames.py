@@ -31,14 +31,14 @@ Share = tuple[FloatArray, FloatArray]
 """Pull, shape (K,), and information, shape (K, K), of one frame about the K shared numbers."""
 
 
-def by_measurements(seen: Iterable[Observations]) -> list[int]:
+def frames_with_enough_measurements(seen: Iterable[Observations]) -> list[int]:
     """Indices of the frames with enough independent measurements, those with the most first."""
     counts = [measurement_count(observations) for observations in seen]
     rich = sorted((-count, at) for at, count in enumerate(counts) if count >= MIN_MEASUREMENTS)
     return [at for _, at in rich]
 
 
-def without_camera(gradient: FloatArray, information: FloatArray, variance: float) -> Share:
+def eliminate_camera(gradient: FloatArray, information: FloatArray, variance: float) -> Share:
     """What a frame says of the shared numbers once its camera is eliminated.
 
     Args:
@@ -53,7 +53,7 @@ def without_camera(gradient: FloatArray, information: FloatArray, variance: floa
     return pull, reduced
 
 
-def with_own_numbers(share: Share, sigma: FloatArray) -> Share:
+def eliminate_own_numbers(share: Share, sigma: FloatArray) -> Share:
     """A frame's share where its numbers are its own, about those of the match (random effects).
 
     Args:
@@ -65,7 +65,7 @@ def with_own_numbers(share: Share, sigma: FloatArray) -> Share:
     return shrunk @ pull, shrunk @ information
 
 
-def shared_sigmas(pulls: FloatArray, information: FloatArray, spent: int) -> FloatArray:
+def sigmas_of_shared_numbers(pulls: FloatArray, information: FloatArray, spent: int) -> FloatArray:
     """Standard deviations of the shared numbers, shape (K,).
 
     The larger of two: from the clicks' variance, and from how much the frames disagree.

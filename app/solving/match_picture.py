@@ -25,12 +25,12 @@ from app.solving.many_frames import (
     CERTAIN_SIGMAS,
     MAX_FRAMES,
     Share,
-    by_measurements,
-    shared_sigmas,
-    with_own_numbers,
-    without_camera,
+    eliminate_camera,
+    eliminate_own_numbers,
+    frames_with_enough_measurements,
+    sigmas_of_shared_numbers,
 )
-from app.solving.observations import Observations, observe
+from app.solving.observations import Observations, observations_of_lines
 from app.solving.picture_camera import PictureProblem, picture_of, undo_warp
 from app.solving.resect import ResectionProblem
 
@@ -97,13 +97,15 @@ def estimate_match_picture(
         )
     warp, pull, informations = _adjust(seen)
     information = informations.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
-    aspect, right, down = shared_sigmas(pull, information, spent=1).tolist()
+    aspect, right, down = sigmas_of_shared_numbers(pull, information, spent=1).tolist()
     return PictureEstimate(picture_of(warp, (aspect, right, down)), len(seen))
 
 
 def choose_frames(frames: Sequence[PictureFrame]) -> list[int]:
     """Indices of the frames with the most independent measurements, ``MAX_FRAMES`` at most."""
-    order = by_measurements(observe(frame.lines, frame.pitch, frame.size) for frame in frames)
+    order = frames_with_enough_measurements(
+        observations_of_lines(frame.lines, frame.pitch, frame.size) for frame in frames
+    )
     return sorted(order[:MAX_FRAMES])
 
 
@@ -118,7 +120,7 @@ class _FittedFrame:
     @staticmethod
     def of(frame: PictureFrame, policy: CalibrationPolicy) -> _FittedFrame:
         problem = ResectionProblem.of(frame.size, policy)
-        observations = observe(frame.lines, policy.fitted(frame.pitch), frame.size)
+        observations = observations_of_lines(frame.lines, policy.fitted(frame.pitch), frame.size)
         return _FittedFrame(problem, observations, problem.resect(observations).parameters)
 
     def at(self, warp: FloatArray) -> _FittedFrame:
@@ -137,11 +139,11 @@ class _FittedFrame:
         prior = self.problem.prior()
         gradient[:PARAMETERS] += (self.camera - prior.mean) / prior.sigma**2
         information[range(PARAMETERS), range(PARAMETERS)] += prior.sigma**-2
-        pull, reduced = without_camera(gradient, information, search.click_variance(unknowns))
+        pull, reduced = eliminate_camera(gradient, information, search.click_variance(unknowns))
         # A frame that says nearly nothing may say a little less than nothing, by rounding.
         values, vectors = np.linalg.eigh((reduced + reduced.T) / 2)
         reduced = vectors * np.maximum(values, 0.0) @ vectors.T
-        return with_own_numbers((pull, reduced), FRAME_SIGMA)
+        return eliminate_own_numbers((pull, reduced), FRAME_SIGMA)
 
 
 def _adjust(seen: Sequence[_FittedFrame]) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -22,7 +22,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_near
-from app.solving.main_position import PositionPrior, is_main_position, match_prior
+from app.solving.main_position import PositionPrior, is_main_position, position_prior_of_match
 from app.solving.match_model import FramePlace, MatchModel, PlaceEquations
 
 WANDER_M = np.array([0.15, 0.15, 0.1])
@@ -79,7 +79,9 @@ class Places:
         if scatter > GIVE_UP:
             return None
         mean, variance = model.at(pan)
-        return match_prior(mean, np.sqrt((variance + WANDER_M**2) * max(1.0, scatter / SCATTER)))
+        return position_prior_of_match(
+            mean, np.sqrt((variance + WANDER_M**2) * max(1.0, scatter / SCATTER))
+        )
 
     @cached_property
     def _model(self) -> MatchModel | None:

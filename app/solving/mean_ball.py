@@ -10,8 +10,8 @@ import numpy as np
 from app.geometry.arrays import row_by_row
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES, Ball3D, BestBall, ChiSquare, Pair
-from app.solving.ball_covariance import MeanCovariance, longest_sigma
-from app.solving.chi_square import widening
+from app.solving.ball_covariance import MeanCovariance, major_axis_sigma
+from app.solving.chi_square import group_sigma_widening
 from app.solving.facts import Facts
 from app.solving.judgement import PASSES, Judgement
 from app.solving.triangulate import PairPoint
@@ -57,18 +57,18 @@ def mean_ball(
     if not judgement.valid.any():
         return None
     covariance = uncertainty.covariances(judgement.valid, np.array([0]), judgement.point, policy)
-    covariance = covariance * widening(chi_square) ** 2
+    covariance = covariance * group_sigma_widening(chi_square) ** 2
     x, y, z = judgement.point[0].tolist()
     return Ball3D(
         point=(x, y, z),
         covariance=row_by_row(covariance[0]),
-        sigma_m=float(longest_sigma(covariance)[0]),
+        sigma_m=float(major_axis_sigma(covariance)[0]),
         parallax_degrees=float(judgement.parallax[0]),
         views=tuple(keys[place] for place in np.unique(facts.pair_view[judgement.valid]).tolist()),
     )
 
 
-def leaving_ball(mean: Ball3D | None, best: BestBall | None, policy: Policy) -> Ball3D | None:
+def exported_ball(mean: Ball3D | None, best: BestBall | None, policy: Policy) -> Ball3D | None:
     """The ball that leaves: the mean of pairs, or the most likely point where the policy says so.
 
     Its views and its parallax are those of the valid pairs in either case: they are what the

@@ -28,7 +28,7 @@ AXES = 3
 """Of the ellipsoid that has to hold the truth."""
 
 
-def expected_cost(log_sigmas: FloatArray, expected: float, spread: float = SPREAD) -> FloatArray:
+def sigma_prior_cost(log_sigmas: FloatArray, expected: float, spread: float = SPREAD) -> FloatArray:
     """Negative logarithm of the prior of a sigma, at each of some logarithms, shape (N,)."""
     cost: FloatArray = 0.5 * ((log_sigmas - math.log(expected)) / spread) ** 2
     return cost
@@ -47,7 +47,7 @@ def posterior_variance(scatter: float, numbers: float, spread: float = SPREAD) -
     return max(scatter, 1 / (2 * numbers + spread**-2))
 
 
-def held_log(log_sigmas: FloatArray, cost: FloatArray) -> float:
+def calibrated_log_sigma(log_sigmas: FloatArray, cost: FloatArray) -> float:
     """Logarithm of the sigma whose 95 % ellipsoids hold the truth, though nobody knows sigma exactly.
 
     As Student's quantiles, of few numbers it is larger than the most likely sigma.
@@ -62,7 +62,7 @@ def held_log(log_sigmas: FloatArray, cost: FloatArray) -> float:
     return float(np.interp(0.95, inside, log_sigmas))
 
 
-def between(cost: FloatArray, places: FloatArray) -> FloatArray:
+def interpolate_cost(cost: FloatArray, places: FloatArray) -> FloatArray:
     """Costs between the points of a grid, by the parabola through the three nearest ones, shape (M,).
 
     Args:
@@ -77,7 +77,7 @@ def between(cost: FloatArray, places: FloatArray) -> FloatArray:
     return found
 
 
-def vertex(cost: FloatArray, at: int) -> tuple[float, float]:
+def lowest_cost_vertex(cost: FloatArray, at: int) -> tuple[float, float]:
     """How far the lowest point lies from the lowest one of the grid, in steps, and its cost.
 
     By the parabola through three costs; at an end of the grid, that end.

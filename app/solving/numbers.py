@@ -6,7 +6,7 @@ _BEYOND_PX = 20_000
 """No picture is as large."""
 
 
-def pixels(value: float) -> str:
+def format_pixels(value: float) -> str:
     """A distance in a picture.
 
     Example:
@@ -21,7 +21,7 @@ def pixels(value: float) -> str:
     return f"{value:.{0 if size >= 99.95 else 1}f} px"
 
 
-def percent(value: float) -> str:
+def format_percent(value: float) -> str:
     """Per cent, without its sign.
 
     Example:
@@ -32,7 +32,7 @@ def percent(value: float) -> str:
     return f"{value:.{0 if size >= 99.95 else 1 if size >= 9.995 else 2}f}"
 
 
-def metres(value: float) -> str:
+def format_metres(value: float) -> str:
     """A place or its uncertainty on the pitch.
 
     Example:
@@ -42,7 +42,7 @@ def metres(value: float) -> str:
     return f"{value:.2f} m"
 
 
-def degrees(value: float) -> str:
+def format_degrees(value: float) -> str:
     """An angle.
 
     Example:

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.geometry.point_kernels import keep_farthest
+from app.geometry.point_kernels import keep_farthest_points
 from app.geometry.resection import ARC, SEGMENT, CurvePoints, Curves, IntArray
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -56,11 +56,11 @@ class Observations:
         """
         limits = np.where(self.curves.kinds == ARC, circular, straight)
         keep = np.empty(len(self.pixels), dtype=np.bool_)
-        keep_farthest(self.pixels, self.marking, limits, keep)
+        keep_farthest_points(self.pixels, self.marking, limits, keep)
         return Observations(self.curves, self.pixels[keep], self.marking[keep])
 
 
-def observe(lines: Lines, pitch: Pitch, size: ImageSize) -> Observations:
+def observations_of_lines(lines: Lines, pitch: Pitch, size: ImageSize) -> Observations:
     """Observations of annotated lines; points far outside the image are kept.
 
     Args:
@@ -91,10 +91,12 @@ def pitch_curves(pitch: Pitch) -> Curves:
     """The markings as curves, in the order of ``MARKINGS``."""
     shapes = [pitch.shapes[marking] for marking in MARKINGS]
     kinds = [ARC if isinstance(shape, Arc) else SEGMENT for shape in shapes]
-    return Curves(np.array(kinds, dtype=np.int64), np.array([_numbers(item) for item in shapes]))
+    return Curves(
+        np.array(kinds, dtype=np.int64), np.array([_shape_numbers(item) for item in shapes])
+    )
 
 
-def _numbers(shape: Segment | Arc) -> tuple[float, ...]:
+def _shape_numbers(shape: Segment | Arc) -> tuple[float, ...]:
     if isinstance(shape, Arc):
         return (*shape.center, shape.radius, shape.first, shape.last, 0.0)
     return (*shape.start, *shape.end)

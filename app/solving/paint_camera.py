@@ -18,7 +18,7 @@ from app.geometry.resection import (
     Prior,
     X,
     Z,
-    residuals,
+    curve_residuals,
 )
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PaintEvidence
@@ -209,7 +209,7 @@ def offsets_of(
 ) -> PaintOffsets:
     """Stored paint as a camera sees it; what lies beyond the end of its marking, across it."""
     half = problem.resection.size.diagonal / 2
-    offsets, jacobians = residuals(parameters, pitch_curves(pitch), curve_points, half)
+    offsets, jacobians = curve_residuals(parameters, pitch_curves(pitch), curve_points, half)
     radii = np.hypot(*curve_points.pixels.T) / half
     return PaintOffsets(offsets[:, 0], sigmas, curve_points.curve, -jacobians[:, 0], radii)
 

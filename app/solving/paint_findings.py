@@ -9,7 +9,7 @@ from app.soccer.group import Group, View
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import ViewSolution
-from app.solving.calibrate import wanted_paint
+from app.solving.calibrate import usable_paint_reading
 
 READ_PAINT = "read_paint"
 """The fix that asks for a picture to be read."""
@@ -43,10 +43,10 @@ def paint_findings(
     A picture that is not there, or that nobody has read yet, is no fault of the group: how many
     there are is told of the dataset.
     """
-    if policy.source != "paint" or not view.takes_paint or solved.calibration.camera is None:
+    if policy.source != "paint" or not view.can_use_paint or solved.calibration.camera is None:
         return
     fit = solved.calibration.paint
-    if wanted_paint(group, view, policy) is None:
+    if usable_paint_reading(group, view, policy) is None:
         return
     if fit is None:
         yield Finding(NO_PAINT, READ_AGAIN, view.key, fix=Fix(READ_PAINT, view.key))

@@ -21,7 +21,7 @@ from app.geometry.resection import (
     PARAMETERS,
     ROLL,
     TILT,
-    residuals,
+    curve_residuals,
 )
 from app.soccer.picture import ASPECTS, MAX_SHIFT, PictureGeometry
 from app.solving.line_noise import line_noise
@@ -216,7 +216,7 @@ class PictureProblem:
     ) -> tuple[FloatArray, FloatArray]:
         """Distances of moved points across their markings, and derivatives by the camera."""
         points = Observations(seen.curves, seen.pixels + moved, seen.marking)
-        offsets, jacobians = residuals(
+        offsets, jacobians = curve_residuals(
             camera, points.curves, points.curve_points(), self.problem.size.diagonal / 2
         )
         return offsets[:, 0], jacobians[:, 0] if with_slopes else jacobians[:0, 0]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray
-from app.geometry.resection import KAPPA, PARAMETERS, residuals
+from app.geometry.resection import KAPPA, PARAMETERS, curve_residuals
 from app.soccer.solution import Picture
 from app.solving.observations import Observations
 from app.solving.picture_camera import undo_warp
@@ -130,7 +130,9 @@ def _linear(
 
     def at(place: FloatArray) -> tuple[FloatArray, FloatArray]:
         seen = undo_warp(problem, observations, place)
-        return residuals(parameters, seen.curves, seen.curve_points(), problem.size.diagonal / 2)
+        return curve_residuals(
+            parameters, seen.curves, seen.curve_points(), problem.size.diagonal / 2
+        )
 
     offsets, jacobians = at(warp)
     steps = _STEP * np.eye(3)

@@ -15,7 +15,7 @@ from scipy.special import chdtrc
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
-from app.geometry.resection import PARAMETERS, X, Y, residuals
+from app.geometry.resection import PARAMETERS, X, Y, curve_residuals
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
@@ -24,12 +24,17 @@ from app.solving.many_frames import (
     CERTAIN_SIGMAS,
     MAX_FRAMES,
     Share,
-    by_measurements,
-    shared_sigmas,
-    with_own_numbers,
-    without_camera,
+    eliminate_camera,
+    eliminate_own_numbers,
+    frames_with_enough_measurements,
+    sigmas_of_shared_numbers,
 )
-from app.solving.observations import Observations, observe, pitch_curves, principal_point
+from app.solving.observations import (
+    Observations,
+    observations_of_lines,
+    pitch_curves,
+    principal_point,
+)
 from app.solving.resect import Resection, ResectionProblem
 
 MIN_FRAMES = 5
@@ -163,7 +168,9 @@ def choose_frames(frames: Sequence[PitchFrame]) -> list[int]:
     A frame tells the length when it shows something of the middle and something of an end, and
     the width when it shows a touchline and something whose width is fixed.
     """
-    order = by_measurements(observe(frame.lines, Pitch(), frame.size) for frame in frames)
+    order = frames_with_enough_measurements(
+        observations_of_lines(frame.lines, Pitch(), frame.size) for frame in frames
+    )
     length = [index for index in order if _determines_length(frames[index].lines)]
     width = [index for index in order if _determines_width(frames[index].lines)]
     half = MAX_FRAMES // 2
@@ -195,7 +202,7 @@ class _FittedFrame:
     @staticmethod
     def of(frame: PitchFrame, pitch: Pitch, policy: CalibrationPolicy) -> _FittedFrame:
         problem = ResectionProblem.of(frame.size, policy)
-        observations = observe(frame.lines, pitch, frame.size)
+        observations = observations_of_lines(frame.lines, pitch, frame.size)
         return _FittedFrame(problem, observations, problem.resect(observations))
 
     def on(self, pitch: Pitch) -> _FittedFrame:
@@ -211,12 +218,12 @@ class _FittedFrame:
         """What the frame says of length and width, whatever its camera."""
         gradient, information = self._normal_equations()
         variance = self.problem.click_variance(self.fit.parameters, self.observations)
-        share = without_camera(gradient, information, variance)
-        return with_own_numbers(share, np.full(2, FRAME_SIGMA_M))
+        share = eliminate_camera(gradient, information, variance)
+        return eliminate_own_numbers(share, np.full(2, FRAME_SIGMA_M))
 
     def _normal_equations(self) -> tuple[FloatArray, FloatArray]:
         """Gradient and J^T W J of camera, length and width, shapes (10,) and (10, 10)."""
-        offsets, by_camera = residuals(
+        offsets, by_camera = curve_residuals(
             self.fit.parameters,
             self.observations.curves,
             self.observations.curve_points(),
@@ -283,7 +290,7 @@ def _sigmas(shares: Sequence[Share]) -> FloatArray:
     """Standard deviations of length and width, metres, shape (2,)."""
     pulls = np.array([pull for pull, _ in shares])
     information = np.sum([part for _, part in shares], axis=0)
-    return shared_sigmas(pulls, information + np.eye(2) / _LOOSE_M**2, spent=2)
+    return sigmas_of_shared_numbers(pulls, information + np.eye(2) / _LOOSE_M**2, spent=2)
 
 
 def _disagree(shares: Sequence[Share]) -> bool:

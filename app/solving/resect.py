@@ -23,10 +23,10 @@ from app.geometry.resection import (
     X,
     Z,
     camera_from_parameters,
-    distances,
+    curve_distances,
+    curve_residuals,
     fit_curves,
     parameters_from_camera,
-    residuals,
 )
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES
@@ -41,7 +41,7 @@ from app.solving.main_position import (
     is_main_position,
 )
 from app.solving.observations import Observations, principal_point
-from app.solving.starts import STANDS, stand_starts
+from app.solving.starts import STANDS, starts_from_stands
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
 """Scales in pixels hold for 960 x 540 and grow with the diagonal."""
@@ -71,7 +71,7 @@ FINAL = ResectionStage(starts=1, steps=25, scale_px=0.0, tolerance=1e-6)
 
 
 @dataclass(frozen=True)
-class Plan:
+class SearchPlan:
     """How a camera is sought: each stage goes on with the best of the one before.
 
     Attributes:
@@ -87,14 +87,14 @@ class Plan:
     final: ResectionStage
 
 
-QUICK = Plan(
+QUICK = SearchPlan(
     scout=ResectionStage(starts=len(STANDS), steps=1, scale_px=30.0, tolerance=1e-3),
     search=ResectionStage(starts=12, steps=8, scale_px=30.0, tolerance=1e-3),
     narrow=ResectionStage(starts=4, steps=10, scale_px=8.0, tolerance=1e-4),
     final=FINAL,
 )
 """For what its lines determine well: wherever it begins, it ends in one camera."""
-THOROUGH = Plan(
+THOROUGH = SearchPlan(
     scout=replace(QUICK.scout, steps=5),
     search=QUICK.search,
     narrow=replace(QUICK.narrow, starts=6),
@@ -183,8 +183,8 @@ class ResectionProblem:
         if self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit:
             return fit
         fits = [fit]
-        if not is_nearly_open(observations):
-            fits.append(self._search(observations, THOROUGH))
+        if not is_nearly_ambiguous(observations):
+            fits.append(self._search_all_stages(observations, THOROUGH))
         straight = observations.without(*CIRCLES)
         if (
             len(straight.pixels) < len(observations.pixels)
@@ -195,23 +195,23 @@ class ResectionProblem:
 
     def search(self, observations: Observations) -> Resection:
         """The best camera from the whole bank of stands."""
-        plan = THOROUGH if is_nearly_open(observations) else QUICK
-        return self._search(observations, plan)
+        plan = THOROUGH if is_nearly_ambiguous(observations) else QUICK
+        return self._search_all_stages(observations, plan)
 
-    def _search(self, observations: Observations, plan: Plan) -> Resection:
+    def _search_all_stages(self, observations: Observations, plan: SearchPlan) -> Resection:
         thinned = observations.thinned(POINTS_PER_LINE, POINTS_PER_CIRCLE)
-        starts = stand_starts(observations, self.size.diagonal)
-        scouted = self._run(thinned, starts, plan.scout, damping=1e-2)
-        searched = self._run(thinned, best(scouted, plan.search.starts), plan.search)
-        return self.refine(observations, best(searched, plan.narrow.starts), plan)
+        starts = starts_from_stands(observations, self.size.diagonal)
+        scouted = self._run_stage(thinned, starts, plan.scout, damping=1e-2)
+        searched = self._run_stage(thinned, best_starts(scouted, plan.search.starts), plan.search)
+        return self.refine(observations, best_starts(searched, plan.narrow.starts), plan)
 
     def refine(
-        self, observations: Observations, starts: FloatArray, plan: Plan = QUICK
+        self, observations: Observations, starts: FloatArray, plan: SearchPlan = QUICK
     ) -> Resection:
         """The best camera from some starts near a minimum, shape (B, 8)."""
-        narrowed = self._run(observations, starts, plan.narrow)
-        fit = self._run(observations, best(narrowed, plan.final.starts), plan.final)
-        return Resection(best(fit, 1)[0], float(fit.cost.min()))
+        narrowed = self._run_stage(observations, starts, plan.narrow)
+        fit = self._run_stage(observations, best_starts(narrowed, plan.final.starts), plan.final)
+        return Resection(best_starts(fit, 1)[0], float(fit.cost.min()))
 
     def refine_main(self, fit: Resection, observations: Observations) -> Resection:
         """The camera once more with what is known of main cameras, where it stands like one.
@@ -246,7 +246,7 @@ class ResectionProblem:
         offset = np.zeros(len(MAIN_MEAN))
         for _ in range(MAIN_ROUNDS):
             prior = self.main_prior(near, offset, variance)
-            found = self._run(observations, fit.parameters[None], FINAL, prior=prior)
+            found = self._run_stage(observations, fit.parameters[None], FINAL, prior=prior)
             fit = Resection(found.parameters[0], float(found.cost[0]))
             offset = fit.parameters[ROLL : Z + 1] - prior.mean[ROLL : Z + 1]
         return fit
@@ -259,7 +259,7 @@ class ResectionProblem:
 
     def distances(self, parameters: FloatArray, observations: Observations) -> FloatArray:
         """Distance of each observed point to its marking, pixels, shape (N,)."""
-        return distances(
+        return curve_distances(
             parameters, observations.curves, observations.curve_points(), self.size.diagonal / 2
         )
 
@@ -294,7 +294,7 @@ class ResectionProblem:
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
-        offsets, jacobians = residuals(
+        offsets, jacobians = curve_residuals(
             parameters, observations.curves, observations.curve_points(), self.size.diagonal / 2
         )
         # At a wider scale honest clicks weigh one, as the formula for the covariance has it.
@@ -329,7 +329,7 @@ class ResectionProblem:
         """Row of parameters of one camera, shape (8,)."""
         return parameters_from_camera(camera, self.size.diagonal / 2)
 
-    def _run(
+    def _run_stage(
         self,
         observations: Observations,
         starts: FloatArray,
@@ -378,12 +378,12 @@ class ResectionProblem:
         return prior
 
 
-def best(fit: Fit, count: int) -> FloatArray:
+def best_starts(fit: Fit, count: int) -> FloatArray:
     """Parameters of the ``count`` starts of lowest cost, lowest first."""
     return fit.parameters[np.argsort(fit.cost, kind="stable")[:count]]
 
 
-def is_nearly_open(observations: Observations) -> bool:
+def is_nearly_ambiguous(observations: Observations) -> bool:
     """Whether several cameras may fit nearly as well."""
     return measurement_count(observations) < FEW_MEASUREMENTS
 

@@ -19,9 +19,9 @@ from app.soccer.group import view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
 from app.solving.facts import Facts
-from app.solving.findings import closest, misses_ball, view_disagrees
-from app.solving.gates import reprojection
-from app.solving.judgement import failures, view_jac
+from app.solving.findings import closest_pair, misses_ball_finding, view_disagrees_finding
+from app.solving.gates import reprojection_gate_of_pairs
+from app.solving.judgement import first_failed_gates, view_jac
 
 
 def differs_in_smaller_tau(policy: Policy, before: Policy) -> bool:
@@ -30,7 +30,7 @@ def differs_in_smaller_tau(policy: Policy, before: Policy) -> bool:
     return alike == policy and policy.tau_percent < before.tau_percent
 
 
-def unchanged_under(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
+def has_unchanged_pairs(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
     """Groups in which no pair fails another gate than under the policy before, shape (G,).
 
     Args:
@@ -39,8 +39,8 @@ def unchanged_under(facts: Facts, before: Policy, policy: Policy) -> BoolArray:
         policy: The same with another tau.
     """
     jac = view_jac(facts, policy.jac_gamma_percent)
-    _, then = failures(facts, jac, before)
-    _, now = failures(facts, jac, policy)
+    _, then = first_failed_gates(facts, jac, before)
+    _, now = first_failed_gates(facts, jac, policy)
     same = np.ones(facts.groups, bool)
     same[facts.pair_group[then != now]] = False
     return same
@@ -51,7 +51,7 @@ def rethreshold(solution: Solution, diagonals: Sequence[float], policy: Policy) 
 
     Args:
         solution: Under a policy that this one ``differs_in_smaller_tau`` than, of a group that is
-            ``unchanged_under``; its calibrations are not read.
+            ``has_unchanged_pairs``; its calibrations are not read.
         diagonals: Of the pictures of its views, pixels.
         policy: The policy with that tau.
     """
@@ -68,11 +68,13 @@ def rethreshold(solution: Solution, diagonals: Sequence[float], policy: Policy) 
     if not missed <= reported:
         return None
     letters = {key: view_letter(place) for place, key in enumerate(keys)}
-    gate = reprojection(solution.pairs, letters, tau_px, policy.tau_percent)
+    gate = reprojection_gate_of_pairs(solution.pairs, letters, tau_px, policy.tau_percent)
     return replace(
         solution,
         gates=tuple(gate if item.name == gate.name else item for item in solution.gates),
-        findings=tuple(_finding(item, solution, letters, tau_px) for item in solution.findings),
+        findings=tuple(
+            _rethreshold_finding(item, solution, letters, tau_px) for item in solution.findings
+        ),
         policy_hash=policy.hash,
     )
 
@@ -82,17 +84,17 @@ def _is_behind(found: Finding) -> bool:
     return found.kind in ("view_disagrees", "not_synchronous") and found.number is None
 
 
-def _finding(
+def _rethreshold_finding(
     found: Finding, solution: Solution, letters: Mapping[str, str], tau_px: Mapping[str, float]
 ) -> Finding:
     judged = [pair for pair in solution.pairs if pair.failed == "reprojection"]
     if found.kind == "view_disagrees" and found.view is not None and found.number is not None:
         view = solution.view(found.view)
         if view is not None and view.included:
-            return misses_ball(found.view, found.number, tau_px[found.view])
-        own = closest([pair for pair in judged if found.view in (pair.a, pair.b)])
-        return view_disagrees(found.view, own, letters, tau_px[found.view])
+            return misses_ball_finding(found.view, found.number, tau_px[found.view])
+        own = closest_pair([pair for pair in judged if found.view in (pair.a, pair.b)])
+        return view_disagrees_finding(found.view, own, letters, tau_px[found.view])
     if found.kind == "not_synchronous":
-        best = closest(judged)
+        best = closest_pair(judged)
         return replace(found, threshold=max(tau_px[best.a], tau_px[best.b]))
     return found

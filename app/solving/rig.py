@@ -26,7 +26,7 @@ from app.geometry.resection import (
     X,
     Z,
     camera_from_parameters,
-    distances,
+    curve_distances,
     normal_equations,
     parameters_from_camera,
     projection_jacobians,
@@ -36,7 +36,7 @@ from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_covariance import CLICK_DIAGONAL
-from app.solving.observations import Observations, observe, principal_point
+from app.solving.observations import Observations, observations_of_lines, principal_point
 
 MIN_BALLS = 20
 """Instants that a camera must share with others to be adjusted."""
@@ -161,7 +161,7 @@ def make_rig(
     Raises:
         InputError: Too few cameras share balls, or one has a lens that cannot be adjusted.
     """
-    sharing = _sharing(cameras, frames)
+    sharing = _cameras_sharing_balls(cameras, frames)
     if len(sharing) < 2:
         raise InputError(
             f"no two static cameras with a calibration show the ball together {MIN_BALLS} times",
@@ -170,7 +170,7 @@ def make_rig(
     for camera in sharing:
         _require_adjustable(camera)
     fitted = policy.calibration.fitted(pitch)
-    rig = Rig(tuple(sharing), *_rays(sharing, frames, policy), fitted)
+    rig = Rig(tuple(sharing), *_rays_of_frames(sharing, frames, policy), fitted)
     points = best_points(rig.start, rig.rays, np.inf)
     at = linearize(rig.start, points, rig.rays)
     apart = np.hypot(*at.residuals.T) * rig.rays.sigma
@@ -182,26 +182,28 @@ def make_rig(
     return rig.only(~gross), int(gross.sum())
 
 
-def adjust(rig: Rig) -> RigFit:
+def adjust_rig(rig: Rig) -> RigFit:
     """The cameras that explain lines and balls best, and how well they are known."""
     anchors = [grass_in_view(camera) for camera in rig.cameras]
-    observed = [_observed(camera, rig.pitch) for camera in rig.cameras]
+    observed = [_observations_of_camera(camera, rig.pitch) for camera in rig.cameras]
     parameters, ball_sigma, line_sigma = rig.start, 1.0, LINE_SIGMA_PX
     for scale in (WIDE, TIGHT, TIGHT):
         rays = replace(rig.rays, sigma=rig.rays.sigma * ball_sigma)
-        problem = _Problem(rig.cameras, rays, observed, anchors, line_sigma, scale)
+        problem = _RigProblem(rig.cameras, rays, observed, anchors, line_sigma, scale)
         fit = levenberg_marquardt(problem.equations, parameters.reshape(1, -1), STEPS)
         parameters = fit.parameters[0].reshape(-1, PARAMETERS)
         # What clicks and lines are worth is known once the cameras fit.
-        ball_sigma = max(1.0, _ball_sigma(parameters, rig.rays))
+        ball_sigma = max(1.0, _click_noise_factor(parameters, rig.rays))
         line_sigma = max(LINE_SIGMA_PX, _line_sigma(parameters, rig.cameras, observed))
     return RigFit(parameters, covariance(fit.information[0]), ball_sigma, line_sigma)
 
 
 def line_distances(camera: RigCamera, parameters: FloatArray, pitch: Pitch) -> FloatArray:
     """Distance of each annotated point to its projected marking, pixels, shape (N,)."""
-    observed = _observed(camera, pitch)
-    return distances(parameters, observed.curves, observed.curve_points(), camera.half_diagonal)
+    observed = _observations_of_camera(camera, pitch)
+    return curve_distances(
+        parameters, observed.curves, observed.curve_points(), camera.half_diagonal
+    )
 
 
 def grass_in_view(camera: RigCamera) -> FloatArray:
@@ -215,7 +217,7 @@ def grass_in_view(camera: RigCamera) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _RigProblem:
     """The sum of squares of a rig, in sigmas."""
 
     cameras: tuple[RigCamera, ...]
@@ -231,14 +233,14 @@ class _Problem:
         cost, gradient, information = bundle_equations(parameters, self.rays, self.scale)
         for place, camera in enumerate(self.cameras):
             own = slice(place * PARAMETERS, (place + 1) * PARAMETERS)
-            for part in (self._lines, self._hold):
+            for part in (self._line_equations, self._prior_equations):
                 more, pull, curve = part(place, camera, parameters[place])
                 cost += more
                 gradient[own] += pull
                 information[own, own] += curve
         return np.array([cost]), gradient[None], information[None]
 
-    def _lines(
+    def _line_equations(
         self, place: int, camera: RigCamera, parameters: FloatArray
     ) -> tuple[float, FloatArray, FloatArray]:
         """What the annotated lines of a camera say."""
@@ -253,7 +255,7 @@ class _Problem:
         )
         return float(cost[0]) / sigma**2, gradient[0] / sigma**2, information[0] / sigma**2
 
-    def _hold(
+    def _prior_equations(
         self, place: int, camera: RigCamera, parameters: FloatArray
     ) -> tuple[float, FloatArray, FloatArray]:
         """The weak prior: the grass where the camera showed it, the camera where it stood."""
@@ -279,7 +281,9 @@ class _Problem:
 _NO_PRIOR = Prior(np.zeros(PARAMETERS), np.full(PARAMETERS, np.inf))
 
 
-def _sharing(cameras: Sequence[RigCamera], frames: Sequence[RigFrame]) -> list[RigCamera]:
+def _cameras_sharing_balls(
+    cameras: Sequence[RigCamera], frames: Sequence[RigFrame]
+) -> list[RigCamera]:
     """The cameras that share enough balls with each other."""
     left = {camera.key: camera for camera in cameras}
     while left:
@@ -296,7 +300,7 @@ def _sharing(cameras: Sequence[RigCamera], frames: Sequence[RigFrame]) -> list[R
     return list(left.values())
 
 
-def _rays(
+def _rays_of_frames(
     cameras: Sequence[RigCamera], frames: Sequence[RigFrame], policy: Policy
 ) -> tuple[Rays, FloatArray]:
     places = {camera.key: place for place, camera in enumerate(cameras)}
@@ -343,14 +347,14 @@ def _require_adjustable(camera: RigCamera) -> None:
         )
 
 
-def _observed(camera: RigCamera, pitch: Pitch) -> Observations:
+def _observations_of_camera(camera: RigCamera, pitch: Pitch) -> Observations:
     """The lines of a camera, relative to its own principal point."""
-    observed = observe(camera.lines, pitch, camera.size)
+    observed = observations_of_lines(camera.lines, pitch, camera.size)
     shift = np.subtract(principal_point(camera.size), camera.camera.principal_point)
     return replace(observed, pixels=observed.pixels + shift)
 
 
-def _ball_sigma(parameters: FloatArray, rays: Rays) -> float:
+def _click_noise_factor(parameters: FloatArray, rays: Rays) -> float:
     """Noise of the clicks, robustly, as a multiple of what the rays are said to have."""
     points = best_points(parameters, rays, np.inf)
     squares = (linearize(parameters, points, rays).residuals ** 2).sum(axis=1)
@@ -366,7 +370,7 @@ def _line_sigma(
 ) -> float:
     """Noise of the line points, robustly, pixels at 1920 x 1080; 0 without lines."""
     apart = [
-        distances(row, seen.curves, seen.curve_points(), camera.half_diagonal) / camera.unit
+        curve_distances(row, seen.curves, seen.curve_points(), camera.half_diagonal) / camera.unit
         for row, camera, seen in zip(parameters, cameras, observed, strict=True)
     ]
     every = np.concatenate(apart)

@@ -25,7 +25,7 @@ from app.solving.rig import (
     RigCamera,
     RigFit,
     RigFrame,
-    adjust,
+    adjust_rig,
     grass_in_view,
     line_distances,
     make_rig,
@@ -142,8 +142,8 @@ def propose_rig(
     """
     rig, gross = make_rig(cameras, frames, pitch, policy)
     odd = rig.times // BLOCK % 2 == 1
-    fit = adjust(rig)
-    halved = adjust(rig.only(~odd)) if odd.any() and not odd.all() else None
+    fit = adjust_rig(rig)
+    halved = adjust_rig(rig.only(~odd)) if odd.any() and not odd.all() else None
     balls = best_points(fit.parameters, rig.rays, np.inf)
     moved = np.linalg.norm(balls - best_points(rig.start, rig.rays, np.inf), axis=1)
     used = {camera.key for camera in rig.cameras}
@@ -180,20 +180,20 @@ def error_covariance(camera: RigCamera, parameters: FloatArray, balls: FloatArra
     moved = camera.camera.project(balls, folded=True) - after.project(balls, folded=True)
     shown = np.isfinite(moved).all(axis=1)
     grass = grass_in_view(camera)
-    slopes = _slopes(camera, parameters, grass)
+    slopes = _pixel_derivatives(camera, parameters, grass)
     information = np.einsum("nia,nib->ab", slopes, slopes) / max(len(grass), 1)
     square = float(step @ information @ step)
     if not (square > 0 and shown.any()):
         return np.outer(step, step)
     information *= ANCHOR_POINTS / square
     covariance = np.linalg.inv(information + np.diag(1 / PRIOR_SIGMA**2))
-    slopes = _slopes(camera, parameters, balls[shown])
+    slopes = _pixel_derivatives(camera, parameters, balls[shown])
     expected = np.einsum("nia,ab,nib->", slopes, covariance, slopes)
     scaled: FloatArray = covariance * float((moved[shown] ** 2).sum() / expected)
     return scaled
 
 
-def _slopes(camera: RigCamera, parameters: FloatArray, points: FloatArray) -> FloatArray:
+def _pixel_derivatives(camera: RigCamera, parameters: FloatArray, points: FloatArray) -> FloatArray:
     """Derivatives of points' pixels by the parameters of their camera, shape (N, 2, 8)."""
     rows = np.repeat(parameters[None], len(points), axis=0)
     return projection_jacobians(rows, points, np.full(len(points), camera.half_diagonal))
@@ -205,7 +205,7 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
     turn = after.rotation @ camera.camera.rotation.T
     grass = grass_in_view(camera)
     moved = after.project(grass) - camera.camera.project(grass)
-    slopes = _slopes(camera, parameters, grass)
+    slopes = _pixel_derivatives(camera, parameters, grass)
     variances = np.trace(slopes @ covariance @ slopes.transpose(0, 2, 1), axis1=1, axis2=2)
     lines = any(camera.lines.values())
     return CameraChange(
@@ -217,13 +217,15 @@ def _camera_change(rig: Rig, fit: RigFit, row: int, balls: FloatArray) -> Camera
         moved_m=float(np.linalg.norm(after.position - camera.camera.position)),
         turned_degrees=float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))),
         focal_percent=100 * (after.focal_length[0] / camera.camera.focal_length[0] - 1),
-        picture_px=_median(np.hypot(*moved.T)) or 0.0,
+        picture_px=_median_or_none(np.hypot(*moved.T)) or 0.0,
         position_sigma_m=float(np.sqrt(np.trace(covariance[X : Z + 1, X : Z + 1]))),
-        picture_sigma_px=_median(np.sqrt(variances)) or 0.0,
-        lines_before_px=_median(line_distances(camera, rig.start[row], rig.pitch))
+        picture_sigma_px=_median_or_none(np.sqrt(variances)) or 0.0,
+        lines_before_px=_median_or_none(line_distances(camera, rig.start[row], rig.pitch))
         if lines
         else None,
-        lines_after_px=_median(line_distances(camera, parameters, rig.pitch)) if lines else None,
+        lines_after_px=_median_or_none(line_distances(camera, parameters, rig.pitch))
+        if lines
+        else None,
     )
 
 
@@ -247,8 +249,8 @@ def _pair_changes(
                 before_px=float(np.median(before)),
                 after_px=float(np.median(after)),
                 held_out=int(out.sum()),
-                held_out_before_px=_median(before[out]),
-                held_out_after_px=None if unseen is None else _median(unseen[out]),
+                held_out_before_px=_median_or_none(before[out]),
+                held_out_after_px=None if unseen is None else _median_or_none(unseen[out]),
                 offset_frames=None if offset is None else offset[0],
                 offset_sigma_frames=None if offset is None else offset[1],
             )
@@ -299,5 +301,5 @@ def time_offset(rig: Rig, fit: RigFit, a: int, b: int) -> tuple[float, float] | 
     return offset, float(np.sqrt((pulls**2).sum())) / power
 
 
-def _median(values: FloatArray) -> float | None:
+def _median_or_none(values: FloatArray) -> float | None:
     return float(np.median(values)) if len(values) else None

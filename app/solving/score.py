@@ -15,8 +15,8 @@ from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.jaccard import (
     camera_jaccard,
     jaccard,
+    marking_outcomes,
     measure_markings,
-    outcomes,
     project_markings,
 )
 
@@ -63,7 +63,8 @@ def score_frame(camera: Camera, lines: Lines, pitch: Pitch, size: ImageSize) -> 
     pitch = pitch.with_goal("inner")
     measured = measure_markings(project_markings(camera, pitch, size), lines)
     jac = tuple(
-        jaccard(outcomes(measured, lines, gamma / 100 * size.diagonal)) for gamma in GAMMAS_PERCENT
+        jaccard(marking_outcomes(measured, lines, gamma / 100 * size.diagonal))
+        for gamma in GAMMAS_PERCENT
     )
     (challenge,) = camera_jaccard(camera, lines, pitch, size, (CHALLENGE_PX,), symmetric=True)
     distances = tuple(
@@ -72,7 +73,7 @@ def score_frame(camera: Camera, lines: Lines, pitch: Pitch, size: ImageSize) -> 
     return FrameScore(jac, challenge, distances)
 
 
-def score(frames: Iterable[FrameScore | None]) -> Score:
+def score_frames(frames: Iterable[FrameScore | None]) -> Score:
     """Many frames together; None stands for a frame without a camera."""
     every = list(frames)
     found = [frame for frame in every if frame is not None]

@@ -18,8 +18,8 @@ from app.geometry.sphere import apparent_scale
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_covariance import pixel_covariance
-from app.solving.plausible import is_plausible
-from app.solving.triangulate import BallObservation, PairPoint, meet
+from app.solving.plausible import is_plausible_position
+from app.solving.triangulate import BallObservation, PairPoint, triangulate_observation_pairs
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 LOOSE, SIZE_SIGMA = 0.15, 0.35
@@ -35,7 +35,7 @@ SURE = 0.99
 
 
 @dataclass(frozen=True)
-class Swap:
+class SwappedView:
     """A view that fits once turned.
 
     Attributes:
@@ -66,7 +66,7 @@ def find_swaps(
     pitch: Pitch,
     policy: Policy,
     doubtful: Sequence[BallObservation] = (),
-) -> tuple[Swap, ...]:
+) -> tuple[SwappedView, ...]:
     """Views whose ball meets that of the others only after a half turn.
 
     The main camera is believed; it stands on the near side by definition, so where it does not
@@ -81,49 +81,51 @@ def find_swaps(
         doubtful: Views whose lines fit too badly to be used: they take no part in what is said of
             others, but that they are labelled from the other end the others can still tell.
     """
-    if first is not None and first.camera.position[1] < 0 and _from_lines(first):
-        others = _others(first, usable)
-        swap = _swap(first, others, first, pitch, policy) if first in usable else None
-        return (swap or Swap(first.view, None, None, confidence=0.9),)
+    if first is not None and first.camera.position[1] < 0 and _is_calibrated_from_lines(first):
+        others = _other_observations(first, usable)
+        swap = _test_half_turn(first, others, first, pitch, policy) if first in usable else None
+        return (swap or SwappedView(first.view, None, None, confidence=0.9),)
     swaps = (
-        _swap(replay, others, first, pitch, policy)
+        _test_half_turn(replay, others, first, pitch, policy)
         for replay in (*usable, *doubtful)
-        if replay is not first and _from_lines(replay)
-        if (others := _others(replay, usable))
+        if replay is not first and _is_calibrated_from_lines(replay)
+        if (others := _other_observations(replay, usable))
     )
     return tuple(swap for swap in swaps if swap is not None)
 
 
-def _from_lines(observation: BallObservation) -> bool:
+def _is_calibrated_from_lines(observation: BallObservation) -> bool:
     return observation.calibration.source != "given"
 
 
-def _others(
+def _other_observations(
     observation: BallObservation, observations: Sequence[BallObservation]
 ) -> list[BallObservation]:
     return [other for other in observations if other is not observation]
 
 
-def _swap(
+def _test_half_turn(
     observation: BallObservation,
     others: Sequence[BallObservation],
     first: BallObservation | None,
     pitch: Pitch,
     policy: Policy,
-) -> Swap | None:
-    turned = _pair_points(_turned_observation(observation), others, policy)
-    after = _best_error(turned, pitch, policy)
+) -> SwappedView | None:
+    turned = _meeting_points(_turn_observation(observation), others, policy)
+    after = _smallest_pair_error(turned, pitch, policy)
     # So it is with nearly every view that is labelled as it should be: nothing more is asked.
     if after >= 1:
         return None
-    labelled = _pair_points(observation, others, policy)
-    costs = _costs(observation, turned, True, pitch, policy)
-    better = _weighted_cost(_costs(observation, labelled, False, pitch, policy), labelled, first)
-    better -= _weighted_cost(costs, turned, first)
+    labelled = _meeting_points(observation, others, policy)
+    costs = _pair_costs(observation, turned, True, pitch, policy)
+    better = _sum_of_weighted_costs(
+        _pair_costs(observation, labelled, False, pitch, policy), labelled, first
+    )
+    better -= _sum_of_weighted_costs(costs, turned, first)
     if min(costs) > MAX_COST or better < CLEARLY:
         return None
-    before, tau = _best_error(labelled, pitch, policy), observation.tau_px(policy)
-    return Swap(
+    before, tau = _smallest_pair_error(labelled, pitch, policy), observation.tau_px(policy)
+    return SwappedView(
         observation.view,
         None if np.isinf(before) else before * tau,
         after * tau,
@@ -131,35 +133,35 @@ def _swap(
     )
 
 
-def _turned_observation(observation: BallObservation) -> BallObservation:
+def _turn_observation(observation: BallObservation) -> BallObservation:
     calibration = replace(
         observation.calibration, camera=turned_camera(observation.camera), covariance=None
     )
     return replace(observation, calibration=calibration)
 
 
-def _pair_points(
+def _meeting_points(
     observation: BallObservation, others: Sequence[BallObservation], policy: Policy
 ) -> list[PairPoint]:
     """Where the observation meets the others, except from beside it."""
     return [
         item
-        for item in meet((observation, other) for other in others)
+        for item in triangulate_observation_pairs((observation, other) for other in others)
         if item.baseline_m >= policy.min_baseline_m
     ]
 
 
-def _best_error(pair_points: Sequence[PairPoint], pitch: Pitch, policy: Policy) -> float:
+def _smallest_pair_error(pair_points: Sequence[PairPoint], pitch: Pitch, policy: Policy) -> float:
     """Larger error of the best pair, in units of tau; infinite where none says anything."""
     errors = [
         max(item.errors_px[0] / item.a.tau_px(policy), item.errors_px[1] / item.b.tau_px(policy))
         for item in pair_points
-        if _says_something(item, pitch, policy)
+        if _is_informative_pair(item, pitch, policy)
     ]
     return min(errors, default=np.inf)
 
 
-def _weighted_cost(
+def _sum_of_weighted_costs(
     costs: Sequence[float], pair_points: Sequence[PairPoint], first: BallObservation | None
 ) -> float:
     """Sum of costs; the main camera counts more than a replay, which may be turned itself."""
@@ -169,7 +171,7 @@ def _weighted_cost(
     )
 
 
-def _costs(
+def _pair_costs(
     observation: BallObservation,
     pair_points: Sequence[PairPoint],
     turned: bool,
@@ -191,14 +193,16 @@ def _costs(
     costs = []
     for item in pair_points:
         cost = WORST
-        if _says_something(item, pitch, policy):
+        if _is_informative_pair(item, pitch, policy):
             back = _HALF_TURN @ item.point if turned else item.point
-            cost = _misfit(observation, back, policy) + _misfit(item.b, item.point, policy)
+            cost = _squared_residuals(observation, back, policy) + _squared_residuals(
+                item.b, item.point, policy
+            )
         costs.append(min(cost, WORST))
     return costs
 
 
-def _misfit(observation: BallObservation, point: FloatArray, policy: Policy) -> float:
+def _squared_residuals(observation: BallObservation, point: FloatArray, policy: Policy) -> float:
     """Squared residuals of a ball's place and size in a view, each in units of its sigma."""
     offset = np.array(observation.center) - observation.camera.project(point[None])[0]
     if np.isnan(offset).any():
@@ -206,12 +210,12 @@ def _misfit(observation: BallObservation, point: FloatArray, policy: Policy) -> 
     place = float(offset @ np.linalg.solve(pixel_covariance(observation, point, policy), offset))
     if not observation.diameter_px:
         return place
-    expected = _expected_px(observation.camera, point, policy.ball_diameter_m)
+    expected = _expected_ball_diameter_px(observation.camera, point, policy.ball_diameter_m)
     size = (np.log(observation.diameter_px / expected) - LOOSE) / SIZE_SIGMA
     return place + min(float(size) ** 2, WORST / 4)
 
 
-def _expected_px(camera: Camera, point: FloatArray, diameter_m: float) -> float:
+def _expected_ball_diameter_px(camera: Camera, point: FloatArray, diameter_m: float) -> float:
     """How large a ball at a point in front of a camera looks, pixels."""
     in_camera = camera.pitch_to_camera(point[None])[0]
     depth = float(in_camera[2])
@@ -221,12 +225,12 @@ def _expected_px(camera: Camera, point: FloatArray, diameter_m: float) -> float:
     return diameter_m * camera.focal_length[1] / depth
 
 
-def _says_something(item: PairPoint, pitch: Pitch, policy: Policy) -> bool:
+def _is_informative_pair(item: PairPoint, pitch: Pitch, policy: Policy) -> bool:
     """Two rays can meet by accident, far from any pitch: such a pair says nothing."""
-    return not _is_behind(item) and is_plausible(item.place, pitch, policy)
+    return not _is_behind_a_camera(item) and is_plausible_position(item.place, pitch, policy)
 
 
-def _is_behind(pair_point: PairPoint) -> bool:
+def _is_behind_a_camera(pair_point: PairPoint) -> bool:
     place = pair_point.point[None]
     return any(
         observation.camera.pitch_to_camera(place)[0, 2] <= 0

@@ -23,17 +23,17 @@ from app.soccer.solution import (
     Solution,
     ViewSolution,
 )
-from app.solving.ball_box import expect_ball, fit_ball
+from app.solving.ball_box import fit_ball, predict_ball_in_view
 from app.solving.ball_covariance import MeanCovariance
 from app.solving.best_ball import best_ball
 from app.solving.calibrate import calibrate_view, view_key
-from app.solving.contradiction import chi_square_of, contradiction
+from app.solving.contradiction import chi_square_of, find_contradiction
 from app.solving.facts import Facts, facts_of
-from app.solving.findings import find
-from app.solving.gates import JudgedView, describe
-from app.solving.judgement import PASSES, Judgement, judge
-from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
-from app.solving.triangulate import ball_observations, meet
+from app.solving.findings import find_group_findings
+from app.solving.gates import JudgedView, describe_gates
+from app.solving.judgement import PASSES, Judgement, judge_groups
+from app.solving.mean_ball import exported_ball, judged_pairs, mean_ball
+from app.solving.triangulate import ball_observations, triangulate_observation_pairs
 
 NO_CALIBRATIONS: Mapping[str, Calibration] = MappingProxyType({})
 LEFT_OUT = "excluded"
@@ -59,28 +59,31 @@ def solve_with_facts(
 ) -> tuple[Solution, Facts]:
     """``solve``, and the facts that its gates were judged by."""
     known = dict(calibrations)
-    keys = [_calibrated(view, group, policy, known) for view in group.views]
+    keys = [_calibration_key_of_view(view, group, policy, known) for view in group.views]
     found = [known[key] for key in keys]
     observations = ball_observations(group.views, found)
-    pair_points = meet(combinations(observations, 2))
+    pair_points = triangulate_observation_pairs(combinations(observations, 2))
     facts = facts_of(group.views, found, pair_points)
     uncertainty = MeanCovariance(facts)
-    judgement = judge(facts, policy, uncertainty)
+    judgement = judge_groups(facts, policy, uncertainty)
     pairs = judged_pairs(pair_points, judgement)
     names = [view.key for view in group.views]
-    failed = _failed(group, judgement)
+    failed = _failed_gate_names(group, judgement)
     left = {name for name, gate in zip(names, failed, strict=True) if gate is None}
     usable = [observation for observation in observations if observation.view in left]
     chi_square = chi_square_of(names, facts, judgement, policy)
     mean = mean_ball(names, facts, judgement, uncertainty, policy, chi_square)
     best = best_ball(pairs, usable, policy)
-    ball = leaving_ball(mean, best, policy)
-    contradicted = contradiction(chi_square, names, facts, judgement, observations, policy)
+    ball = exported_ball(mean, best, policy)
+    contradicted = find_contradiction(chi_square, names, facts, judgement, observations, policy)
     views = tuple(
-        _with_ball(view, ViewSolution(view.key, known[key], key, False, gate), ball, policy)
+        _add_ball_to_view(view, ViewSolution(view.key, known[key], key, False, gate), ball, policy)
         for view, key, gate in zip(group.views, keys, failed, strict=True)
     )
-    judged, left_out = _judged_views(group, views, judgement, policy), _left_out(group)
+    judged, left_out = (
+        _judged_views(group, views, judgement, policy),
+        _letters_of_left_out_views(group),
+    )
     solution = Solution(
         views=views,
         pairs=pairs,
@@ -88,15 +91,17 @@ def solve_with_facts(
         best_ball=best,
         mean_ball=None if ball is mean else mean,
         chi_square=chi_square,
-        gates=describe(judged, left_out, pairs, mean, judgement, policy, chi_square),
-        findings=find(group, views, observations, pairs, ball, policy, contradicted),
+        gates=describe_gates(judged, left_out, pairs, mean, judgement, policy, chi_square),
+        findings=find_group_findings(group, views, observations, pairs, ball, policy, contradicted),
         policy_hash=policy.hash,
         solver_version=SOLVER_VERSION,
     )
     return solution, facts
 
 
-def _calibrated(view: View, group: Group, policy: Policy, known: dict[str, Calibration]) -> str:
+def _calibration_key_of_view(
+    view: View, group: Group, policy: Policy, known: dict[str, Calibration]
+) -> str:
     """Key of a view's calibration, which is known then."""
     key = view_key(group, view, policy.calibration)
     if key not in known:
@@ -104,7 +109,7 @@ def _calibrated(view: View, group: Group, policy: Policy, known: dict[str, Calib
     return key
 
 
-def _failed(group: Group, judgement: Judgement) -> list[str | None]:
+def _failed_gate_names(group: Group, judgement: Judgement) -> list[str | None]:
     """What each view failed at, or None."""
     return [
         LEFT_OUT if not view.included else None if gate == PASSES else GATES[gate]
@@ -112,7 +117,7 @@ def _failed(group: Group, judgement: Judgement) -> list[str | None]:
     ]
 
 
-def _with_ball(
+def _add_ball_to_view(
     view: View, solved: ViewSolution, ball: Ball3D | None, policy: Policy
 ) -> ViewSolution:
     if ball is None:
@@ -120,7 +125,7 @@ def _with_ball(
     solved = replace(
         solved,
         included=view.key in ball.views,
-        expected=expect_ball(solved.calibration, view.size, ball, policy.ball_diameter_m),
+        expected=predict_ball_in_view(solved.calibration, view.size, ball, policy.ball_diameter_m),
     )
     if solved.calibration.camera is None or view.ball is None:
         return solved
@@ -135,7 +140,7 @@ def _with_ball(
     return replace(solved, ball=fit)
 
 
-def _no_ball(view: View) -> str:
+def _why_no_ball(view: View) -> str:
     """Why a view has no ball that counts, with a place for letters."""
     seen = [ball for ball in view.balls if not ball.out_of_view]
     if len(seen) > 1:
@@ -155,7 +160,7 @@ def _judged_views(
             tau_px=policy.tau_px(view.size.diagonal),
             has_ball=view.ball is not None and not view.ball.inferred,
             failed=solved.failed,
-            no_ball=_no_ball(view),
+            no_ball=_why_no_ball(view),
         )
         for index, (view, solved, jac) in enumerate(
             zip(group.views, views, judgement.jac.tolist(), strict=True)
@@ -164,6 +169,6 @@ def _judged_views(
     )
 
 
-def _left_out(group: Group) -> tuple[str, ...]:
+def _letters_of_left_out_views(group: Group) -> tuple[str, ...]:
     """Letters of the views that a person left out."""
     return tuple(view_letter(i) for i, view in enumerate(group.views) if not view.included)

@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.solving.ball_noise import LIMIT, MIN_NUMBERS, TRIMMED, Miss
+from app.solving.ball_noise import LIMIT, MIN_NUMBERS, TRIMMED, RayResidual
 from app.solving.noise_grid import NORMAL_95
 
 SPREAD = 0.5
@@ -110,7 +110,7 @@ NOBODY = SourceFactors(1.0, (), np.zeros(0), np.zeros((0, 0)), np.zeros(0))
 
 
 @dataclass(frozen=True)
-class _SourceShares:
+class _SourceVariances:
     """What views add to the variance of misses.
 
     Attributes:
@@ -127,36 +127,36 @@ class _SourceShares:
     row: IntArray
     of: FloatArray
 
-    def own(self, logs: FloatArray) -> FloatArray:
+    def view_variances(self, logs: FloatArray) -> FloatArray:
         """What the views add under some factors, shape (C,)."""
         own: FloatArray = self.added * np.exp(2 * self.of @ logs)
         return own
 
-    def variance(self, own: FloatArray) -> FloatArray:
+    def miss_variances(self, own: FloatArray) -> FloatArray:
         """Of the misses, shape (M,)."""
         variance: FloatArray = self.known + np.bincount(self.row, own, len(self.known))
         return variance
 
-    def by_source(self, own: FloatArray) -> FloatArray:
+    def variances_by_source(self, own: FloatArray) -> FloatArray:
         """What the views of each source add to each miss, shape (M, S)."""
         total = np.zeros((len(self.known), self.of.shape[1]))
         np.add.at(total, self.row, own[:, None] * self.of)
         return total
 
-    def kept(self, logs: FloatArray) -> BoolArray:
+    def without_outliers(self, logs: FloatArray) -> BoolArray:
         """Misses that are no mistakes, shape (M,)."""
-        kept: BoolArray = self.squares <= LIMIT * self.variance(self.own(logs))
+        kept: BoolArray = self.squares <= LIMIT * self.miss_variances(self.view_variances(logs))
         return kept
 
-    def slopes(self, logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def log_variance_derivatives(self, logs: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Of the variances' logarithms by those of the factors, (M, S), and the variances, (M,)."""
-        own = self.own(logs)
-        variance = self.variance(own)
-        return 2 * self.by_source(own) / variance[:, None], variance
+        own = self.view_variances(logs)
+        variance = self.miss_variances(own)
+        return 2 * self.variances_by_source(own) / variance[:, None], variance
 
 
 def estimate_sources(
-    misses: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]],
+    misses: Sequence[tuple[RayResidual, Mapping[str, Sequence[BallSource]]]],
     click: float,
     share: float,
     given: float,
@@ -174,8 +174,8 @@ def estimate_sources(
     )
     if not sources:
         return NOBODY
-    parts = _parts(misses, sources, np.array([click**2, share**2, given**2]))
-    logs, covariance, numbers = _fitted(parts)
+    parts = _make_source_variances(misses, sources, np.array([click**2, share**2, given**2]))
+    logs, covariance, numbers = _fit_factors(parts)
     seen = np.flatnonzero(numbers >= MIN_NUMBERS)
     return SourceFactors(
         math.hypot(click, given) if given and not click else click,
@@ -192,11 +192,11 @@ def _distinct_sources(seen: Sequence[Sequence[BallSource]]) -> list[BallSource]:
     return [one for one in every if not all(one in sources for sources in seen)]
 
 
-def _parts(
-    misses: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]],
+def _make_source_variances(
+    misses: Sequence[tuple[RayResidual, Mapping[str, Sequence[BallSource]]]],
     sources: Sequence[BallSource],
     squared: FloatArray,
-) -> _SourceShares:
+) -> _SourceVariances:
     place = {source: at for at, source in enumerate(sources)}
     known = np.array([miss.known for miss, _ in misses])
     added, rows, which = [], [], []
@@ -211,27 +211,27 @@ def _parts(
                 known[row] += np.dot(columns, squared)
     squares = np.array([miss.miss**2 for miss, _ in misses])
     of_each = np.array(which, float).reshape(-1, len(sources))
-    return _SourceShares(squares, known, np.array(added), np.array(rows, np.int64), of_each)
+    return _SourceVariances(squares, known, np.array(added), np.array(rows, np.int64), of_each)
 
 
-def _fitted(parts: _SourceShares) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _fit_factors(parts: _SourceVariances) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Logarithms of the factors, their covariance, and how much speaks of each."""
     logs = np.zeros(parts.of.shape[1])
     for _ in range(_ROUNDS):
-        kept = parts.kept(logs)
-        slopes, variance = (array[kept] for array in parts.slopes(logs))
+        kept = parts.without_outliers(logs)
+        slopes, variance = (array[kept] for array in parts.log_variance_derivatives(logs))
         pull = 0.5 * slopes.T @ (parts.squares[kept] / TRIMMED / variance - 1) - logs / SPREAD**2
-        step = np.linalg.solve(_information(slopes), pull)
+        step = np.linalg.solve(_fisher_information(slopes), pull)
         logs = logs + np.clip(step, -_LONGEST, _LONGEST)
         if np.abs(step).max() < _SETTLED:
             break
-    kept = parts.kept(logs)
-    slopes = parts.slopes(logs)[0][kept]
-    covariance = np.linalg.inv(_information(slopes)).astype(np.float64)
+    kept = parts.without_outliers(logs)
+    slopes = parts.log_variance_derivatives(logs)[0][kept]
+    covariance = np.linalg.inv(_fisher_information(slopes)).astype(np.float64)
     return logs, covariance, slopes.sum(axis=0) / 2
 
 
-def _information(slopes: FloatArray) -> FloatArray:
+def _fisher_information(slopes: FloatArray) -> FloatArray:
     """Fisher's, with that of the prior, shape (S, S)."""
     total: FloatArray = 0.5 * slopes.T @ slopes + np.eye(slopes.shape[1]) / SPREAD**2
     return total

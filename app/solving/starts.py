@@ -6,7 +6,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.resection import PARAMETERS
-from app.geometry.start_kernels import aim
+from app.geometry.start_kernels import aim_starts
 from app.solving.observations import Observations
 
 STANDS: FloatArray = np.array(
@@ -31,7 +31,7 @@ LEAST_SPREAD = 0.1
 """Markings are taken to be seen at least so far apart, as a share of the diagonal."""
 
 
-def stand_starts(observations: Observations, diagonal: float) -> FloatArray:
+def starts_from_stands(observations: Observations, diagonal: float) -> FloatArray:
     """One start for each stand, aimed and zoomed so that the seen markings lie where they are.
 
     Args:
@@ -42,7 +42,7 @@ def stand_starts(observations: Observations, diagonal: float) -> FloatArray:
         Parameters of ``geometry.resection``, shape (S, 8).
     """
     starts = np.empty((len(STANDS), PARAMETERS))
-    aim(
+    aim_starts(
         STANDS,
         observations.curves.kinds,
         observations.curves.shapes,

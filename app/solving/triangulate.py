@@ -45,9 +45,9 @@ class BallObservation:
         return self.calibration.camera
 
     @property
-    def is_bare(self) -> bool:
+    def is_given_without_uncertainty(self) -> bool:
         """Whether its camera came with the data and nobody says how exact it is."""
-        return self.calibration.is_bare
+        return self.calibration.is_given_without_uncertainty
 
     @cached_property
     def P(self) -> FloatArray:
@@ -139,7 +139,9 @@ def ball_observations(
     ]
 
 
-def meet(couples: Iterable[tuple[BallObservation, BallObservation]]) -> list[PairPoint]:
+def triangulate_observation_pairs(
+    couples: Iterable[tuple[BallObservation, BallObservation]],
+) -> list[PairPoint]:
     """Where the rays of each couple meet; one camera twice, and parallel rays, meet nowhere.
 
     Source: SoccerNet-v3D (arXiv 2504.10106), triangulation of ball annotations.
@@ -147,15 +149,15 @@ def meet(couples: Iterable[tuple[BallObservation, BallObservation]]) -> list[Pai
     couples = [(a, b) for a, b in couples if not np.array_equal(a.P, b.P)]
     if not couples:
         return []
-    points = triangulate_pairs(*observation_pairs([a for a, _ in couples], [b for _, b in couples]))
+    points = triangulate_pairs(*arrays_of_pairs([a for a, _ in couples], [b for _, b in couples]))
     return [
-        _pair_point(a, b, point)
+        _make_pair_point(a, b, point)
         for (a, b), point in zip(couples, points, strict=True)
         if np.isfinite(point).all()
     ]
 
 
-def observation_pairs(
+def arrays_of_pairs(
     a: Sequence[BallObservation], b: Sequence[BallObservation]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Couples of observations as ``triangulate_pairs`` takes them."""
@@ -167,7 +169,7 @@ def observation_pairs(
     )
 
 
-def _pair_point(a: BallObservation, b: BallObservation, point: FloatArray) -> PairPoint:
+def _make_pair_point(a: BallObservation, b: BallObservation, point: FloatArray) -> PairPoint:
     positions = a.camera.position, b.camera.position
     angle = parallax_angle(positions[0][None], positions[1][None], point[None])[0]
     return PairPoint(

@@ -13,7 +13,7 @@ from app.sample.scene import Scene
 from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.policy import PAPER
-from app.solving.calibrate import calibrate, calibration_key, measure
+from app.solving.calibrate import calibrate, calibration_key, measure_calibration
 from app.solving.solve import solve
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
@@ -55,7 +55,7 @@ def _errors(scene: Scene, make: Make, rng: np.random.Generator) -> tuple[float, 
         if truth is not None and found.camera is not None:
             key = calibration_key(view.station, group.pitch, PAPER.calibration)
             right = replace(found, camera=truth.camera)
-            known[key] = measure(right, view.station.lines, group.pitch, view.size)
+            known[key] = measure_calibration(right, view.station.lines, group.pitch, view.size)
     solution = solve(group, PAPER, known)
     places = [None if ball is None else ball.point for ball in (solution.ball, solution.best_ball)]
     mean, best = (

@@ -19,7 +19,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 from app.solving.leave_one_out import error_without
-from app.solving.score import score, score_frame
+from app.solving.score import score_frame, score_frames
 from tests.bench.table import print_table
 
 SIZE = ImageSize(960, 540)
@@ -83,7 +83,7 @@ def _run(frames: Mapping[str, Lines], policy: CalibrationPolicy) -> Run:
 
 
 def _scores(frames: Mapping[str, Lines], run: Run) -> list[object]:
-    total = score(
+    total = score_frames(
         None if found.camera is None else score_frame(found.camera, frames[stem], PITCH, SIZE)
         for stem, found in run.calibrations.items()
     )

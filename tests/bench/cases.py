@@ -17,7 +17,7 @@ from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
-from app.soccer.pitch import CIRCLES, MARKINGS, Pitch, twin_marking
+from app.soccer.pitch import CIRCLES, MARKINGS, Pitch, opposite_marking
 
 SIZE = ImageSize(1920, 1080)
 BALL_M = 0.226
@@ -114,7 +114,7 @@ def _make(case: Case, number: int, seed: int) -> Made:
         there = ball + velocity * (case.speed * case.delay_s if last else 0.0)
         lines = _clicks(rng, camera, case)
         if last and case.swapped:
-            lines = make_lines({twin_marking(name): lines[name] for name in lines})
+            lines = make_lines({opposite_marking(name): lines[name] for name in lines})
         key = f"{number}_{index}.png"
         station = Station(key, SIZE, lines=lines)
         views.append(View(key, station, (_ball(rng, camera, there, case),)))

@@ -15,10 +15,10 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.annotate import click_lines, loose_box
-from app.sample.cameras import aim, parallax
-from app.sample.faults import FaultPlan, spoil_view
+from app.sample.cameras import find_camera, parallax_angle_at_ball
+from app.sample.faults import FaultPlan, plant_annotation_fault
 from app.sample.scene import Scene, ViewTruth
-from app.sample.scenes import ball_box
+from app.sample.scenes import true_ball_box
 from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration, Solution
@@ -95,7 +95,7 @@ def swapped(scenes: Sequence[Scene]) -> list[Case]:
     cases = []
     for scene in scenes:
         main, replay, *rest = scene.group.views
-        spoiled, _ = spoil_view(FaultPlan("swapped_sides", 1, 1), replay)
+        spoiled, _ = plant_annotation_fault(FaultPlan("swapped_sides", 1, 1), replay)
         group = replace(scene.group, views=(main, spoiled, *rest))
         cases.append(Case(group, scene.truth.ball, replay.key))
     return cases
@@ -124,7 +124,7 @@ def _from_anywhere(
         camera = _camera_anywhere(rng, main, ball, degrees)
         if camera is None:
             return None
-        box = ball_box(camera, ball)
+        box = true_ball_box(camera, ball)
         station = replace(view.station, lines=click_lines(rng, camera))
         views.append(replace(view, station=station, balls=(loose_box(rng, box),)))
         truths.append(ViewTruth(view.key, camera, scene.truth.ball, box))
@@ -150,8 +150,11 @@ def _camera_anywhere(
                 [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z]
             )
             seat = seat + rng.normal(0, 1, 3)
-        if degrees[0] <= np.degrees(parallax(main, seat, ball)) < degrees[1] and seat[2] < -1.5:
-            camera = aim(rng, seat, ball, is_main=False)
+        if (
+            degrees[0] <= np.degrees(parallax_angle_at_ball(main, seat, ball)) < degrees[1]
+            and seat[2] < -1.5
+        ):
+            camera = find_camera(rng, seat, ball, is_main=False)
             if camera is not None:
                 return camera
     return None
@@ -358,7 +361,7 @@ def _later(rng: np.random.Generator, scene: Scene, seconds: float) -> Case:
 def _seen(rng: np.random.Generator, scene: Scene, view: View, ball: FloatArray) -> View:
     truth = scene.truth.view(view.key)
     assert truth is not None
-    return replace(view, balls=(loose_box(rng, ball_box(truth.camera, ball)),))
+    return replace(view, balls=(loose_box(rng, true_ball_box(truth.camera, ball)),))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
-from app.solving.observations import observe
+from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
 from tests.bench.table import print_table
 from tests.cameras import looking
@@ -69,7 +69,7 @@ def _refinement() -> list[list[object]]:
         marking: polyline[:: max(len(polyline) // 5, 1)]
         for marking, polyline in project_markings(camera, pitch, SIZE).items()
     }
-    observations = observe(make_lines(lines), pitch, SIZE)
+    observations = observations_of_lines(make_lines(lines), pitch, SIZE)
     problem = ResectionProblem.of(SIZE, CalibrationPolicy())
     start = problem.parameters(camera) + np.array([0.01, 0.01, 0.002, 1.0, 1.0, 0.5, 0.02, 0.0])
     ours = _best(lambda: problem.refine(observations, start[None]))

@@ -21,7 +21,7 @@ from app.errors import DegenerateGeometryError
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.arrays import FloatArray
-from app.geometry.resection import residuals
+from app.geometry.resection import curve_residuals
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES, Pitch
@@ -30,7 +30,7 @@ from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
 from app.solving.dataset_noise import view_line_evidence, view_line_noise
 from app.solving.line_noise import LineEvidence, estimate_line_noise
-from app.solving.observations import observe
+from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
 from tests.bench.cases import SIZE as MADE_SIZE
 from tests.bench.cases import Case, make_case
@@ -65,7 +65,7 @@ class LeftOut:
     """
 
     marking: str
-    residuals: FloatArray
+    curve_residuals: FloatArray
     camera: FloatArray
     clicks: float
     share: float
@@ -114,10 +114,10 @@ def left_out(
         found = calibrate(rest, PITCH, size, policies[0])
         if found.camera is None or found.covariance is None or found.unobservable:
             continue
-        seen = observe(make_lines({marking: lines[marking]}), PITCH, size)
+        seen = observations_of_lines(make_lines({marking: lines[marking]}), PITCH, size)
         parameters = ResectionProblem.of(size, policies[0]).parameters(found.camera)
         half = size.diagonal / 2
-        offsets, slopes = residuals(parameters, seen.curves, seen.curve_points(), half)
+        offsets, slopes = curve_residuals(parameters, seen.curves, seen.curve_points(), half)
         told = []
         for policy in policies:
             noise = view_line_noise(found, _used(found, rest), PITCH, size, policy)

@@ -41,8 +41,8 @@ from app.soccer.media import Media
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.soccer.solution import Calibration, Solution
-from app.solving.calibrate import calibrate, calibration_key, measure
-from app.solving.observations import observe
+from app.solving.calibrate import calibrate, calibration_key, measure_calibration
+from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
 from app.solving.solve import solve
 from tests.bench.table import print_table
@@ -171,11 +171,11 @@ def _balls(scene: Scene, shots: dict[str, Shot]) -> tuple[float, float, float]:
             continue
         key = calibration_key(view.station, group.pitch, PAPER.calibration)
         found = replace(shot.clicked, camera=shot.truth)
-        true[key] = measure(found, view.station.lines, group.pitch, view.size)
+        true[key] = measure_calibration(found, view.station.lines, group.pitch, view.size)
         if shot.snapped.planned is not None:
             covariance = tuple(shot.snapped.planned.ravel().tolist())
             found = replace(shot.clicked, camera=shot.snapped.camera, covariance=covariance)
-            known[key] = measure(found, view.station.lines, group.pitch, view.size)
+            known[key] = measure_calibration(found, view.station.lines, group.pitch, view.size)
     return (
         _ball_error(group, scene, {}),
         _ball_error(group, scene, known),
@@ -362,7 +362,7 @@ def _print_real(folder: Path) -> None:
             continue
         _, snapped, spent = _snap(image, found)
         problem = ResectionProblem.of(size, PAPER.calibration)
-        seen = observe(lines, PITCH, size)
+        seen = observations_of_lines(lines, PITCH, size)
         apart = [
             float(np.median(problem.distances(problem.parameters(camera), seen))) / problem.unit
             for camera in (found.camera, snapped.camera)

@@ -20,7 +20,7 @@ from app.paint.propose import FrameProposal, propose
 from app.sample.render import render
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import Pitch, twin_marking
+from app.soccer.pitch import Pitch, opposite_marking
 from app.solving.jaccard import camera_jaccard, project_markings
 from tests.bench.table import print_table
 from tests.scenes import make_scenes
@@ -210,7 +210,7 @@ def _near_clicks(found: FrameProposal, lines: Path, image: Image) -> bool | None
             if not name.startswith("Goal")
         }
     )
-    turned = {twin_marking(name): points for name, points in clicked.items()}
+    turned = {opposite_marking(name): points for name, points in clicked.items()}
     return max(_near(found.camera, clicked, size), _near(found.camera, turned, size)) >= RIGHT
 
 

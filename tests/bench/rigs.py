@@ -20,7 +20,7 @@ from app.soccer.annotation import make_lines
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
-from app.solving.ball_noise import Miss, estimate_ball_noise, misses_of
+from app.solving.ball_noise import RayResidual, estimate_ball_noise, ray_residuals
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import propose_rig
 from app.solving.solve import solve
@@ -148,12 +148,12 @@ def _cameras(group: Group) -> dict[str, list[BallSource]]:
     return {view.key: [BallSource("camera", view.station.key)] for view in group.views}
 
 
-def _misses(group: Group) -> tuple[Miss, ...]:
+def _misses(group: Group) -> tuple[RayResidual, ...]:
     solution = solve(group, PAPER)
     if solution.ball is None:
         return ()
     calibrations = [view.calibration for view in solution.views]
-    return misses_of(solution.ball, ball_observations(group.views, calibrations))
+    return ray_residuals(solution.ball, ball_observations(group.views, calibrations))
 
 
 def _with_stations(group: Group, change: Callable[[Station], Station]) -> Group:

@@ -14,8 +14,8 @@ from app.soccer.picture import OPEN
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
-from app.solving.ball_noise import Miss
-from app.solving.dataset_noise import DatasetNoise, SeenGroup, estimate_noise
+from app.solving.ball_noise import RayResidual
+from app.solving.dataset_noise import DatasetNoise, NoiseGroup, estimate_noise
 from app.solving.solve import solve
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.pitches import estimate_match
@@ -179,7 +179,7 @@ def with_found_pitch(made: list[Made], case: Case) -> list[Made]:
 
 def with_noise(made: list[Made]) -> Policy:
     """The policy ``paper`` with the noise that the groups themselves show."""
-    seen = [SeenGroup.of(one.group, solve(one.group, PAPER), PAPER) for one in made]
+    seen = [NoiseGroup.of(one.group, solve(one.group, PAPER), PAPER) for one in made]
     return noise_used(estimate_noise(seen, PAPER), replace(PAPER, name="estimated"))
 
 
@@ -199,9 +199,9 @@ def noise_used(noise: DatasetNoise, policy: Policy) -> Policy:
     return replace(policy, calibration=known)
 
 
-def misses_in(made: Made, policy: Policy) -> tuple[Miss, ...]:
+def misses_in(made: Made, policy: Policy) -> tuple[RayResidual, ...]:
     """What the rays to the ball of a group leave unexplained."""
-    return SeenGroup.of(made.group, solve(made.group, policy), policy).misses(policy)
+    return NoiseGroup.of(made.group, solve(made.group, policy), policy).misses(policy)
 
 
 def _error(ball: Ball3D | None, made: Made) -> float:

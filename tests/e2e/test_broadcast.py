@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.sample.recording import Part, write_recording
+from app.sample.recording import ShotPlan, write_recording
 from tests.e2e.screen import Screen, jobs_end
 from tests.e2e.service import delete_dataset
 from tests.e2e.test_recordings import shots_of, shows
 
 OpenPage = Callable[..., Page]
 PARTS = (
-    Part("main", 2.4, "start"), Part("replay", 3.0, "wipe", 0.5, 1), Part("main", 1.6, "wipe"),
+    ShotPlan("main", 2.4, "start"), ShotPlan("replay", 3.0, "wipe", 0.5, 1), ShotPlan("main", 1.6, "wipe"),
 )  # fmt: skip
 LONG_MS = 240_000
 """What decodes or tracks a film, on a machine that does other things."""

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from app.soccer.pitch import twin_marking
+from app.soccer.pitch import opposite_marking
 from tests.e2e.screen import (
     Document,
     Screen,
@@ -59,7 +59,7 @@ class Bench:
         """Label a view from the other end of the pitch."""
         lines = self.document()["views"][place]["lines"]
         turned: Document = dict.fromkeys(lines)
-        turned.update({twin_marking(name): points for name, points in lines.items()})
+        turned.update({opposite_marking(name): points for name, points in lines.items()})
         return self.change(place, "/lines", {"lines": turned})
 
     def open(self) -> Screen:

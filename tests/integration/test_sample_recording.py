@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.sample.recording import Part, write_recording
+from app.sample.recording import ShotPlan, write_recording
 from tests.bench.recording import KnownRecording, compared, link_errors
 
 PARTS = (
-    Part("main", 3.0, "start"), Part("closeup", 1.2), Part("main", 3.2),
-    Part("replay", 3.6, "wipe", 0.5, 0), Part("main", 2.4, "wipe"),
-    Part("other", 1.6), Part("main", 2.4, "dissolve"),
+    ShotPlan("main", 3.0, "start"), ShotPlan("closeup", 1.2), ShotPlan("main", 3.2),
+    ShotPlan("replay", 3.6, "wipe", 0.5, 0), ShotPlan("main", 2.4, "wipe"),
+    ShotPlan("other", 1.6), ShotPlan("main", 2.4, "dissolve"),
 )  # fmt: skip
 
 
@@ -40,7 +40,7 @@ class TestRecordingOfTheSample:
 
     def test_who_runs_before_bare_grass_is_one_shot(self, tmp_path: Path) -> None:
         """A long lens runs along with somebody, too fast to be followed, while other grass comes into view."""
-        write_recording(tmp_path / "film.mp4", parts=[Part("closeup", 5, "start")], since=27.0)
+        write_recording(tmp_path / "film.mp4", parts=[ShotPlan("closeup", 5, "start")], since=27.0)
         (shot,) = KnownRecording.open(tmp_path / "film.mp4").found_shots()
         assert (shot.first, shot.last, shot.kind) == (0, 124, "closeup")
 

@@ -16,7 +16,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.score import score, score_frame
+from app.solving.score import score_frame, score_frames
 from tests.bench.goals import LIMIT_PX, goal_distances, left_out_grass
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -43,7 +43,7 @@ def calibrations(frames):
 
 class TestCalibrate:
     def test_beats_the_published_calibrators_by_far(self, frames, calibrations):
-        total = score(
+        total = score_frames(
             None if found.camera is None else score_frame(found.camera, frames[stem], Pitch(), SIZE)
             for stem, found in calibrations.items()
         )
@@ -82,7 +82,7 @@ class TestScore:
     def test_gives_cameras_of_others_the_numbers_of_the_public_evaluator(self):
         report = Report()
         cameras = read_cameras(PNLCALIB, report)
-        total = score(
+        total = score_frames(
             score_frame(cameras[file.stem], file.lines, Pitch(), SIZE)
             if file.stem in cameras
             else None

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.features.comments.queries import StoredComment, StoredThread
 from app.features.comments.service import LONGEST
 from app.http.documents import Document, ListDocument
-from app.soccer.actors import is_of, person_of
+from app.soccer.actors import is_actor_of, person_of
 from app.soccer.frames import MAX_PIXEL
 
 Text = Annotated[str, Field(min_length=1, max_length=LONGEST, description="Plain text.")]
@@ -74,7 +74,7 @@ class CommentDocument(Document):
     @classmethod
     def of(cls, comment: StoredComment, actor: str) -> Self:
         """The document of a comment, for whom it is shown to."""
-        return cls(**vars(comment), mine=is_of(comment.actor, person_of(actor)))
+        return cls(**vars(comment), mine=is_actor_of(comment.actor, person_of(actor)))
 
 
 class ThreadDocument(Document):

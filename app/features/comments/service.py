@@ -31,7 +31,7 @@ from app.features.notifications.service import notify
 from app.features.people.logins import read_roles
 from app.features.people.queries import members, person_by_name
 from app.features.people.roles import Role
-from app.soccer.actors import is_of, person_of
+from app.soccer.actors import is_actor_of, person_of
 
 COMMENT = "comment"
 """Kind of the log's entries about comments."""
@@ -298,7 +298,7 @@ def _require_own_comment(
     thread = _require_thread(session, group_id, thread_id)
     for comment in thread.comments:
         if comment.id == comment_id and comment.text is not None:
-            if not is_of(comment.actor, person_of(actor)):
+            if not is_actor_of(comment.actor, person_of(actor)):
                 raise ForbiddenError("only its author can change a comment", hint="Reply to it.")
             return comment
     raise NotFoundError(f"thread {thread_id} has no comment {comment_id}")

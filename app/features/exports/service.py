@@ -34,7 +34,7 @@ from app.formats.export_formats import (
     WriteOptions,
     box_settings,
     export_names,
-    frame_layout,
+    frame_path_rule,
     missing_sentence,
     view_settings,
     write_format,
@@ -188,7 +188,9 @@ def export(
     with store.read() as session:
         source = _open_source(session, store, dataset, options, version)
         with output_anywhere(out, store.settings.exports, beside, progress) as root:
-            frames = ExportImages(root, images, read or _local_reader(store), frame_layout(format))
+            frames = ExportImages(
+                root, images, read or _local_reader(store), frame_path_rule(format)
+            )
             names = export_names(format, source.outlines())
             run = _ExportRun(source, options, frames, names, progress)
             # A version is the same every time; unassigned frames are the dataset's as it is.
@@ -288,7 +290,7 @@ def _require_format(
         if format == CARRY:
             return
         source = _SampleSource(whole)
-        frames = ExportImages(Path(folder), "none", _local_reader(store), frame_layout(format))
+        frames = ExportImages(Path(folder), "none", _local_reader(store), frame_path_rule(format))
         with ViewFiles(Path(folder)) as small:
             try:
                 names = export_names(format, source.outlines())

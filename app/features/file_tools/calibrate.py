@@ -33,7 +33,7 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import GoalEdge, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import as_lone, calibrate, look_alone
+from app.solving.calibrate import calibrate, lone_frame_of, with_lone_covariance
 from app.solving.calibration_findings import calibration_findings, lone_findings
 from app.solving.leave_one_out import leave_one_out
 from app.solving.lone_frame import LoneFrame
@@ -184,7 +184,7 @@ def _calibrate_file(
     calibration = calibrate(file.lines, Pitch(), size, policy)
     milliseconds = 1000 * (time.thread_time() - began)
     began = time.thread_time()
-    lone = look_alone(calibration, file.lines, Pitch(), size, policy)
+    lone = lone_frame_of(calibration, file.lines, Pitch(), size, policy)
     milliseconds += 1000 * (time.thread_time() - began)
     left_out = leave_one_out(file.lines, Pitch(), size, policy) if with_leave_one_out else ()
     return _make_frame(file.stem, calibration, size, milliseconds, tuple(left_out), lone)
@@ -224,7 +224,9 @@ def _make_frame(
         stem=stem,
         camera=None
         if camera is None
-        else camera_file_text(camera, as_lone(calibration, lone).known_covariance, size),
+        else camera_file_text(
+            camera, with_lone_covariance(calibration, lone).known_covariance, size
+        ),
         reason=calibration.reason,
         findings=tuple(findings),
         left_out=left_out,
@@ -242,8 +244,10 @@ def _frame_in_picture(
     camera = frame.alone.camera
     if picture is None or camera is None:
         return frame
-    known = as_lone(frame.alone, frame.lone).known_covariance
-    return replace(frame, camera=camera_file_text(picture.done(camera, size), known, size))
+    known = with_lone_covariance(frame.alone, frame.lone).known_covariance
+    return replace(
+        frame, camera=camera_file_text(picture.camera_of_shown_picture(camera, size), known, size)
+    )
 
 
 def _make_summary(frames: list[CalibratedFrame], report: Report, seconds: float) -> dict[str, Any]:

@@ -171,7 +171,7 @@ def as_taken(files: Sequence[LineFile], picture: PictureGeometry | None) -> list
     """Line files with their points where the pictures as they were taken show them."""
     if picture is None:
         return list(files)
-    return [replace(file, lines=picture.undone(file.lines, file.size)) for file in files]
+    return [replace(file, lines=picture.lines_as_taken(file.lines, file.size)) for file in files]
 
 
 def _estimate_picture(files: Sequence[LineFile], size: ImageSize) -> PictureEstimate:

@@ -18,7 +18,7 @@ from app.progress import ReportProgress
 from app.soccer.annotation import lines_without
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
-from app.solving.score import score, score_frame
+from app.solving.score import score_frame, score_frames
 
 
 def score_files(
@@ -68,7 +68,7 @@ def score_files(
         )
     # A line file that cannot be read is a frame without a camera.
     scores.extend([None] * (report.read - len(scores)))
-    total = score(scores)
+    total = score_frames(scores)
     return {
         "frames": total.frames,
         "calibrated": total.calibrated,

@@ -18,7 +18,7 @@ from app.soccer.group import CALIBRATIONS, Group, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
-from app.soccer.reasons import left_out
+from app.soccer.reasons import make_left_out
 
 MAX_POINTS = 1000
 """Most points of one marking."""
@@ -265,7 +265,7 @@ class IncludeView:
 
     def apply(self, group: Group) -> Group:
         """The group with or without the view."""
-        why = left_out(self.reason, self.note)
+        why = make_left_out(self.reason, self.note)
         if self.included and why is not None:
             raise InputError("only a left-out view can have a reason", pointer="/reason")
         view = need_view(group, self.view)

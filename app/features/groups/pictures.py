@@ -40,7 +40,7 @@ from app.soccer.paint_evidence import (
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import calibrate_clicks
+from app.solving.calibrate import calibrate_from_clicks
 from app.worker_pool import WorkerPool
 from app.worker_process import WorkerEnded
 
@@ -155,7 +155,7 @@ def read_view_paint(task: PaintTask, settings: Settings) -> PaintReading | None:
 
 def _read_paint_of_image(task: PaintTask, frame: str, image: Image) -> PaintReading | None:
     size, policy = task.view.size, task.policy
-    clicked = task.clicked or calibrate_clicks(task.group, task.view, policy)
+    clicked = task.clicked or calibrate_from_clicks(task.group, task.view, policy)
     if clicked.camera is None:
         return None
     if why_unreadable(image, size) is not None:

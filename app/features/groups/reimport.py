@@ -104,7 +104,7 @@ def update_station_from_dataset(
     # Under an edit the stored camera may be a person's; that of the dataset is the source's.
     brought = stored.station if source is None else source
     if incoming.given is None and brought.given is not None:
-        incoming = incoming.with_given(brought.given, brought.given_covariance)
+        incoming = incoming.with_given_camera(brought.given, brought.given_covariance)
     if not stored.edited:
         return MergedStation(incoming, incoming, None)
     kept = None
@@ -205,7 +205,7 @@ class SharedStations:
             if entry.kind == "station":
                 station = station_from_json(entry.body["base"] or entry.body["station"])
             elif entry.kind == "camera" and station is not None:
-                station = station.with_given(*camera_of_log_entry(entry.body))
+                station = station.with_given_camera(*camera_of_log_entry(entry.body))
             if station is not None and station_digest(station) == stored.source_digest:
                 found = station
         return found

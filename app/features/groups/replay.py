@@ -210,7 +210,7 @@ def _replay_camera(snapshot: StateSnapshot, entry: LogEntry) -> None:
     assert entry.station_id is not None
     record = snapshot.stations[entry.station_id]
     edited = station_digest(record.station) != record.source_digest
-    station = record.station.with_given(*camera_of_log_entry(entry.body))
+    station = record.station.with_given_camera(*camera_of_log_entry(entry.body))
     base = None if edited else station
     _save_station(snapshot, record.dataset_id, entry.station_id, station, base)
     if entry.group_id is not None:

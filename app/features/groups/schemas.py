@@ -27,7 +27,7 @@ from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
 from app.soccer.group import Group, View, view_letter
-from app.soccer.media import counts_time
+from app.soccer.media import is_numbered_in_time
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.pitch import MARKINGS, canonical_marking
 from app.soccer.reasons import MAX_NOTE, LeftOut, Reason
@@ -414,7 +414,7 @@ def _view_document(state: GroupState, view: View, index: int, label: str) -> Vie
 
 def _neighbours_address(group: str, view: View, view_id: int) -> str | None:
     media = view.media
-    if media is None or not counts_time(media, group, view.station.shared):
+    if media is None or not is_numbered_in_time(media, group, view.station.shared):
         return None
     return f"/api/v1/views/{view_id}/neighbours"
 

@@ -15,17 +15,17 @@ from app.soccer.finding import Finding, Fix, PlacedFinding
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Station, View, view_letter
 from app.soccer.picture import OPEN
-from app.soccer.pitch import Pitch, twin_marking
+from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT
-from app.solving.calibrate import calibrate_station, shortest_px
+from app.solving.calibrate import calibrate_station, shortest_counted_marking_px
 from app.solving.jaccard import (
-    evaluated,
+    as_evaluator_markings,
     jaccard,
+    marking_outcomes,
     measure_markings,
-    not_missing,
-    outcomes,
     project_markings,
+    unannotated_not_missing,
 )
 from app.solving.paint_findings import READ_PAINT
 
@@ -193,9 +193,9 @@ def _swap_sides_edit(view: View, _fix: Fix, _point: ImagePoint | None) -> Edit |
     lines = view.station.lines
     changes: dict[str, tuple[ImagePoint, ...] | None] = dict.fromkeys(lines)
     for marking, points in lines.items():
-        changes[twin_marking(marking)] = tuple(points)
+        changes[opposite_marking(marking)] = tuple(points)
     # What is not visible is the other end of the pitch, too.
-    unseen = tuple(map(twin_marking, view.station.not_visible))
+    unseen = tuple(map(opposite_marking, view.station.not_visible))
     for marking in (*view.station.not_visible, *unseen):
         changes.setdefault(marking, None)
     return SetLines(view.key, changes, not_visible=unseen) if changes else None
@@ -394,12 +394,14 @@ def _jac_and_distance_without(
     """JaC of the other markings, and the largest distance of this one."""
     pitch, size, lines = policy.fitted(pitch), station.size, station.lines
     measured = measure_markings(project_markings(camera, pitch, size), lines)
-    judged = evaluated(camera, pitch, size, lines, measured)
-    for short in not_missing(judged, lines, station.not_visible, shortest_px(policy, size)):
+    judged = as_evaluator_markings(camera, pitch, size, lines, measured)
+    for short in unannotated_not_missing(
+        judged, lines, station.not_visible, shortest_counted_marking_px(policy, size)
+    ):
         del judged[short]
     values = []
     for gamma in GAMMAS_PERCENT:
-        found = outcomes(judged, lines, gamma / 100 * size.diagonal)
+        found = marking_outcomes(judged, lines, gamma / 100 * size.diagonal)
         found.pop(marking, None)
         values.append(jaccard(found))
     seen = measured.get(marking) or judged.get(marking)

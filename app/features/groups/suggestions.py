@@ -26,7 +26,7 @@ from app.soccer.group import Group, View, view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
 from app.solving.jaccard import project_markings
-from app.solving.numbers import pixels
+from app.solving.numbers import format_pixels
 from app.solving.resect import REFERENCE_DIAGONAL
 from app.solving.solve import solve
 
@@ -222,7 +222,9 @@ def _candidates_of_undrawn_markings(
     if not undrawn or undrawn[0].length_px < shortest or camera is None:
         return
     letter = view_letter(group.views.index(view))
-    names = [f"{fit.marking} (visible over {pixels(max(fit.length_px, 1))})" for fit in undrawn]
+    names = [
+        f"{fit.marking} (visible over {format_pixels(max(fit.length_px, 1))})" for fit in undrawn
+    ]
     verb = "were" if len(names) > 1 else "was"
     advice = f"{' and '.join(names)} {verb} drawn in {letter}"
     fitted = group.pitch.with_goal(solved.calibration.goal)

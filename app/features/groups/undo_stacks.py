@@ -224,7 +224,7 @@ class _LogWalk:
         for item in (item for item in items if item.station_id == entry.station_id):
             view = self.base.view(item.view.key)
             if view is not None:
-                station = view.station.with_given(*camera_of_log_entry(entry.body))
+                station = view.station.with_given_camera(*camera_of_log_entry(entry.body))
                 self.base = self.base.with_view(replace(view, station=station))
 
     def _note_states(self, group: Group) -> None:

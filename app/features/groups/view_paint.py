@@ -32,11 +32,11 @@ from app.soccer.paint_evidence import PaintReading
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import (
-    calibrate_clicks,
-    clicks_key,
+    calibrate_from_clicks,
+    click_calibration_key,
     paint_search_key,
+    usable_paint_reading,
     view_key,
-    wanted_paint,
 )
 from app.solving.observations import principal_point
 from app.worker_pool import PoolTask
@@ -117,13 +117,13 @@ def _make_request(session: Session, view_id: int, lines: LineChanges) -> ViewPai
     known = known_calibrations(session, [group], policy)
     changed = next(item for item in group.views if item.key == view.key)
     # What the lines alone make: what was read of the paint before has no part in what is read.
-    start = known.get(clicks_key(group, changed, policy.calibration))
+    start = known.get(click_calibration_key(group, changed, policy.calibration))
     return ViewPaintRequest(
         group,
         changed,
         _require_media(changed),
         policy.calibration,
-        start=start or calibrate_clicks(group, changed, policy.calibration),
+        start=start or calibrate_from_clicks(group, changed, policy.calibration),
     )
 
 
@@ -244,11 +244,11 @@ def _outdated_tasks(
     if policy.source != "paint" or not group.paint:
         return
     for view in group.views:
-        reading = wanted_paint(group, view, policy)
-        if reading is None and (view.media is None or not view.takes_paint):
+        reading = usable_paint_reading(group, view, policy)
+        if reading is None and (view.media is None or not view.can_use_paint):
             continue
         key = paint_search_key(group, view, policy)
-        clicked = known.get(clicks_key(group, view, policy))
+        clicked = known.get(click_calibration_key(group, view, policy))
         # Clicks that were seen to make no camera say nowhere where to look.
         is_lost = clicked is not None and clicked.camera is None
         if (reading is None or reading.sought_for != key) and not is_lost:

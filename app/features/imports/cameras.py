@@ -23,7 +23,7 @@ from app.features.imports.ingest import IngestReport, ingest_session
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
 from app.geometry.camera import Camera
-from app.soccer.camera_size import other_size
+from app.soccer.camera_size import size_centred_on_principal_point
 from app.soccer.frames import ImageSize
 
 BATCH = 50
@@ -172,7 +172,7 @@ def _size_warnings(
 ) -> Iterator[str]:
     """What to say of a camera whose principal point is the middle of another size than was said."""
     for size in sorted({made_for or place.size for place in fitting}, key=lambda it: it.width):
-        other = other_size(camera, size)
+        other = size_centred_on_principal_point(camera, size)
         if other is not None:
             x, y = camera.principal_point
             yield (
@@ -206,7 +206,7 @@ def attach_cameras(
         if stored.station.given == given.camera and known:
             report.unchanged += 1
             continue
-        station = stored.station.with_given(*given)
+        station = stored.station.with_given_camera(*given)
         save_station(session, stored, station, source=None if stored.edited else station)
         shown = None if given.camera is None else camera_to_json(given.camera)
         body = {"source": source, "given": shown}

@@ -27,7 +27,7 @@ from app.soccer.frames import MAX_SIDE
 from app.soccer.group import CALIBRATIONS, Group, Station, View
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import PAPER, Policy
-from app.soccer.reasons import MAX_NOTE, REASONS, left_out
+from app.soccer.reasons import MAX_NOTE, REASONS, make_left_out
 
 MAX_LINE = 32 * 1024 * 1024
 MAX_BALLS, MAX_TEXT = 100, 1000
@@ -226,7 +226,7 @@ def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
 
 def _check_left_out(view: View) -> None:
     why = view.left_out
-    if view.included or why is None or left_out(_require_text(why.reason), why.note) != why:
+    if view.included or why is None or make_left_out(_require_text(why.reason), why.note) != why:
         raise InputError("has a view that was left out for a reason that Touchline does not know")
 
 

@@ -40,7 +40,7 @@ from app.media.frames import VideoIndexer
 from app.progress import ReportProgress
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES, PaintReading
 from app.soccer.policy import CalibrationPolicy
-from app.solving.calibrate import clicks_key, paint_search_key
+from app.solving.calibrate import click_calibration_key, paint_search_key
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerLimits
 
@@ -281,8 +281,8 @@ def _group_tasks(
 ) -> Iterator[PaintTask]:
     group = stored.group
     for view in group.views:
-        if view.takes_paint:
-            clicked = known.get(clicks_key(group, view, policy))
+        if view.can_use_paint:
+            clicked = known.get(click_calibration_key(group, view, policy))
             alone = replace(group, views=(view,), paint={})
             key, old = paint_search_key(group, view, policy), group.paint.get(view.key)
             yield PaintTask(alone, policy, key, clicked, old)

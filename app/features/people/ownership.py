@@ -18,7 +18,7 @@ from app.features.datasets.queries import dataset_of, find_dataset, owner_of_job
 from app.features.imports.upload_queries import get_upload
 from app.features.people.roles import DatasetRoles, Role
 from app.features.people.visibility_queries import RestrictedReader, Visibility, is_hidden_group
-from app.soccer.actors import is_of
+from app.soccer.actors import is_actor_of
 
 MIN_HASH = 8
 """So many digits of a hash name a version."""
@@ -77,7 +77,7 @@ def role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
         return Role.ADMIN
     if found.dataset is not None:
         return roles.role_in(found.dataset)
-    mine = any(is_of(owner, name) for owner in found.owners)
+    mine = any(is_actor_of(owner, name) for owner in found.owners)
     return roles.highest if mine else Role.NONE
 
 

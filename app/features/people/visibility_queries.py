@@ -13,7 +13,7 @@ from app.db.session import Session
 from app.features.batches.tables import BatchGroupModel
 from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
 from app.features.independent_annotations.tables import GoldModel, IndependentAnnotationModel
-from app.soccer.actors import TOKEN, is_of
+from app.soccer.actors import TOKEN, is_actor_of
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class Visibility:
     def sees(self, dataset_id: int | None, actor: str | None = None) -> bool:
         """Whether they see what belongs to a dataset, or (None) what somebody has made."""
         if dataset_id is None:
-            return self.name is None or is_of(actor or "", self.name)
+            return self.name is None or is_actor_of(actor or "", self.name)
         if self.all_but and self.copies is not None and dataset_id > COPIES:
             return dataset_id in self.copies
         return self.all_but != (dataset_id in self.datasets)

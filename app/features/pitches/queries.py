@@ -105,7 +105,7 @@ def _lines_as_taken(row: Any) -> tuple[Lines, ImageSize] | None:
     picture = None if row.picture is None else picture_from_json(parse(row.picture))
     if picture is None:
         return lines, size
-    return (picture.undone(lines, size), size) if picture.is_known else None
+    return (picture.lines_as_taken(lines, size), size) if picture.is_known else None
 
 
 def _cameras_statement(*columns: Any, dataset_id: int) -> Any:

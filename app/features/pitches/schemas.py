@@ -8,7 +8,7 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from app.features.groups.schemas import PitchSize
 from app.http.documents import Document, ListDocument
-from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Arc, Pitch, Segment, twin_marking
+from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Arc, Pitch, Segment, opposite_marking
 from app.solving.pitch_size import PitchEstimate
 
 XYZ = tuple[float, float, float]
@@ -33,7 +33,9 @@ class MarkingShape(BaseModel):
     def of(marking: str, shape: Segment | Arc) -> MarkingShape:
         """The document of a shape."""
         kind: Literal["segment", "arc"] = "arc" if isinstance(shape, Arc) else "segment"
-        return MarkingShape(marking=marking, twin=twin_marking(marking), kind=kind, **vars(shape))
+        return MarkingShape(
+            marking=marking, twin=opposite_marking(marking), kind=kind, **vars(shape)
+        )
 
 
 class PitchDocument(BaseModel):

@@ -25,8 +25,8 @@ from app.features.policies.service import PolicyState, apply_policy, read_policy
 from app.features.policies.text import CUSTOM, policy_with
 from app.features.solutions.queries import newest_solution, present_solutions
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
-from app.solving.ball_noise import BallNoise, Miss, Sigma
-from app.solving.dataset_noise import DatasetNoise, SeenGroup, estimate_noise
+from app.solving.ball_noise import BallNoise, RayResidual, Sigma
+from app.solving.dataset_noise import DatasetNoise, NoiseGroup, estimate_noise
 from app.solving.line_noise import LineEstimate
 from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
 
@@ -260,7 +260,9 @@ def _sources_of(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[
 
 
 def _estimate_source_factors(
-    seen: Sequence[tuple[Miss, Mapping[str, Sequence[BallSource]]]], ball: BallNoise, policy: Policy
+    seen: Sequence[tuple[RayResidual, Mapping[str, Sequence[BallSource]]]],
+    ball: BallNoise,
+    policy: Policy,
 ) -> SourceFactors:
     """Noise of the sources of some views, beside what is known of the dataset."""
     click = policy.click_sigma_px if ball.click is None else ball.click.value
@@ -294,11 +296,11 @@ def _estimate_noise(
     store: Store, ids: Sequence[int], policy: Policy
 ) -> tuple[int, list[Mapping[str, Sequence[BallSource]]], DatasetNoise]:
     """How many groups were asked, the sources of the balls of each, and what all of them say."""
-    seen: list[SeenGroup] = []
+    seen: list[NoiseGroup] = []
     sources: list[Mapping[str, Sequence[BallSource]]] = []
     for state, placed in _groups_with_ball_actors(store, noise_sample(ids)):
         if state.solution is not None:
-            seen.append(SeenGroup.of(state.group, state.solution, state.policy))
+            seen.append(NoiseGroup.of(state.group, state.solution, state.policy))
             sources.append(_sources_of(state, placed))
     return len(seen), sources, estimate_noise(seen, policy)
 

@@ -102,6 +102,6 @@ def first_policy(groups: Iterable[Group]) -> Policy:
     Args:
         groups: Those with which the dataset begins.
     """
-    views = [view for group in groups for view in group.views if view.takes_paint]
+    views = [view for group in groups for view in group.views if view.can_use_paint]
     pictures = sum(view.media is not None for view in views)
     return TOUCHLINE if pictures > LEAST_SHARE * len(views) else PAPER

@@ -50,7 +50,7 @@ PARTS = (
     ("replay", 6, "wipe", 0.5, 0),
     ("main", 3, "wipe"),
 )
-"""What the film shows, as ``sample.recording.Part``; the replay is filmed from the far side."""
+"""What the film shows, as ``sample.recording.ShotPlan``; the replay is filmed from the far side."""
 LOST = (0.4, 0.6)
 """Which part of the live shot has no cameras."""
 
@@ -131,7 +131,7 @@ def make_recording_practice(
 
 def draw_film(path: Path, parts: Sequence[Sequence[Any]], send: Send) -> None:
     """Draw the practice film, in a worker process."""
-    from app.sample.recording import Part, write_recording
+    from app.sample.recording import ShotPlan, write_recording
 
     def tell(done: int, total: int | None = None, sentence: str = "") -> None:
         send((done, total, sentence))
@@ -139,7 +139,7 @@ def draw_film(path: Path, parts: Sequence[Sequence[Any]], send: Send) -> None:
     write_recording(
         path,
         seed=SEED + 1,
-        parts=[Part(*part) for part in parts],
+        parts=[ShotPlan(*part) for part in parts],
         progress=tell,
     )
 

@@ -261,7 +261,7 @@ def _as_taken(stored: StoredGroup, view: View, live: _Shown) -> View:
     tracked = live.tracked
     is_free = kept.station.given is None and not kept.station.lines
     if is_free and view.key == f"{live.number}.png" and tracked is not None and tracked.camera:
-        station = station.with_given(tracked.camera, tracked.covariance)
+        station = station.with_given_camera(tracked.camera, tracked.covariance)
     if view.key in stored.edited_views:
         view = View(view.key, station, media=view.media, extras=view.extras)
     return replace(view, station=station)
@@ -284,7 +284,7 @@ def _view(settings: Settings, shown: _Shown, name: str, key: str) -> View:
     station = Station(key, ImageSize(facts.width, facts.height))
     told = {**_provenance(shown.recording, shown.index, shown.number), **(shown.link or {})}
     if frame is not None and frame.camera is not None:
-        station = station.with_given(frame.camera, frame.covariance)
+        station = station.with_given_camera(frame.camera, frame.covariance)
         # Another camera may be given later: this is what was given now.
         told["camera_when_taken"] = _given_by_track(frame)
     media = Media(str(settings.recordings / shown.place))

@@ -45,7 +45,7 @@ from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
 from app.solving.calibrate import calibrate_station, calibration_key, view_keys
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
-from app.solving.rethreshold import differs_in_smaller_tau, rethreshold, unchanged_under
+from app.solving.rethreshold import differs_in_smaller_tau, has_unchanged_pairs, rethreshold
 from app.solving.solve import solve_with_facts
 from app.workers.executors import fan_out
 
@@ -176,7 +176,7 @@ def _kept_by_policy(task: RethresholdTask) -> Iterator[list[KeptSolution]]:
 def _rethreshold(task: RethresholdTask, kept: Sequence[KeptSolution]) -> Iterator[Result]:
     policy = task.policy
     facts = facts_from_bytes([item.facts for item in kept])
-    same = unchanged_under(facts, task.before[kept[0].policy_hash], policy)
+    same = has_unchanged_pairs(facts, task.before[kept[0].policy_hash], policy)
     ends = np.cumsum(np.bincount(facts.view_group, minlength=facts.groups))
     diagonals = np.split(facts.view_diagonal, ends[:-1])
     for place in np.flatnonzero(same).tolist():

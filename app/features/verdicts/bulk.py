@@ -39,7 +39,7 @@ from app.features.verdicts.queries import (
 )
 from app.features.verdicts.service import Verdict, check_verdict
 from app.plural import plural
-from app.soccer.finding import makes_unusable
+from app.soccer.finding import makes_ball_unusable
 
 CHUNK = 100
 """Groups a transaction: two or three hundredths of a second, for which others wait to write."""
@@ -292,7 +292,7 @@ def _is_unusable(row: Any) -> bool:
     One that was dismissed says it, too: a verdict needs the note all the same.
     """
     kinds = [*row.findings.split(","), *row.dismissed.split(",")]
-    return any(makes_unusable(kind, row.sigma_m) for kind in kinds)
+    return any(makes_ball_unusable(kind, row.sigma_m) for kind in kinds)
 
 
 def _has_verdict(row: Any, verdict: Verdict) -> bool:

@@ -22,7 +22,7 @@ from app.features.verdicts.queries import (
 from app.finite import Moment
 from app.soccer.choices import VerdictState
 from app.soccer.group import Group
-from app.soccer.reasons import REASONS, checked_note, require_words
+from app.soccer.reasons import REASONS, checked_note, require_explanation
 from app.soccer.solution import Solution
 
 STATES: tuple[str, ...] = get_args(VerdictState)
@@ -96,7 +96,7 @@ def check_verdict(state: str, reason: str | None, note: str | None) -> Verdict:
     if state == "rejected" and reason not in REASONS:
         known = ", ".join(REASONS)
         raise InputError(f"a rejection needs a reason: {known}", pointer="/reason")
-    require_words(reason, note)
+    require_explanation(reason, note)
     return Verdict(state, reason, note)
 
 

@@ -15,17 +15,17 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT
-from app.solving.ball_covariance import MeanCovariance, longest_sigma
+from app.solving.ball_covariance import MeanCovariance, major_axis_sigma
 from app.solving.chi_square import p_values
 from app.solving.facts import Facts
 from app.solving.judgement import (
     Judgement,
-    compare_again,
-    failures,
-    judge,
-    judge_standing,
+    first_failed_gates,
+    judge_groups,
+    judge_known_failures,
+    recompare_thresholds,
     view_jac,
-    views_of,
+    views_in_pairs,
     widened_covariances,
 )
 
@@ -59,7 +59,7 @@ class BlockResults:
     def by(facts: Facts, jac: FloatArray, policy: Policy) -> BlockResults:
         """Judge groups."""
         uncertainty = MeanCovariance(facts)
-        judgement = judge(facts, policy, uncertainty, _jac_at_threshold(facts, jac, policy))
+        judgement = judge_groups(facts, policy, uncertainty, _jac_at_threshold(facts, jac, policy))
         found = BlockResults(facts, jac, policy, judgement)
         if policy.max_sigma_m is not None:
             found.sigma = _mean_sigmas(facts, policy, judgement, uncertainty)
@@ -88,7 +88,7 @@ class BlockResults:
         """What another policy makes of the groups."""
         if _uses_click_noise(policy) and noise_of(policy) != noise_of(self.policy):
             jac = _jac_at_threshold(self.facts, self.jac, policy)
-            return judge(self.facts, policy, self._uncertainty(), jac)
+            return judge_groups(self.facts, policy, self._uncertainty(), jac)
         return self._judge_under(policy)[0]
 
     def judged_by(self, policy: Policy) -> BlockResults:
@@ -108,11 +108,11 @@ class BlockResults:
         """The judgement, which groups had to be judged anew, and those by themselves."""
         facts, known = self.facts, self.judgement
         jac = _jac_at_threshold(facts, self.jac, policy)
-        view_failed, pair_failed = failures(facts, jac, policy)
+        view_failed, pair_failed = first_failed_gates(facts, jac, policy)
         new = np.zeros(facts.groups, bool)
         new[facts.view_group[np.flatnonzero(view_failed != known.view_failed)]] = True
         new[facts.pair_group[np.flatnonzero(pair_failed != known.pair_failed)]] = True
-        failed = compare_again(known, policy, *self._sigmas_and_p_values(policy))
+        failed = recompare_thresholds(known, policy, *self._sigmas_and_p_values(policy))
         numbers = [getattr(known, name) for name in _NUMBERS]
         part = None
         if new.any():
@@ -120,7 +120,7 @@ class BlockResults:
             views, pairs = new[facts.view_group], new[facts.pair_group]
             standing = view_failed[views], pair_failed[pairs]
             uncertainty = MeanCovariance(some)
-            found = judge_standing(
+            found = judge_known_failures(
                 some, policy, uncertainty, jac[views], standing, first_alone=True
             )
             failed[:, new] = found.failed
@@ -176,12 +176,12 @@ def _mean_sigmas(
     covariances = uncertainty.covariances(judgement.valid, there, point[there], policy)
     covariances = widened_covariances(facts, judgement.valid, there, covariances, point, policy)
     sigma = np.full(facts.groups, np.nan)
-    sigma[there] = longest_sigma(covariances)
+    sigma[there] = major_axis_sigma(covariances)
     return sigma
 
 
 def _p_values(facts: Facts, policy: Policy, judgement: Judgement) -> FloatArray:
-    return p_values(facts, views_of(facts, judgement.valid), judgement.point, policy)
+    return p_values(facts, views_in_pairs(facts, judgement.valid), judgement.point, policy)
 
 
 Given = TypeVar("Given")

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.facts import COLUMNS, NOTHING, Facts
-from app.solving.facts import join as join_facts
+from app.solving.facts import join_facts as join_facts
 from app.solving.judgement import MIN_VIEWS, view_jac
 
 JAC_STEPS = tuple((np.arange(101) / 100).tolist())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.formats.camera_json import camera_to_json
-from app.formats.issia_people import MIRRORED, mirrored_people, turn_people
+from app.formats.issia_people import MIRRORED, cameras_with_mirrored_people, turn_people
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.issia_writer import write_issia
 from app.formats.report import Report
@@ -39,7 +39,7 @@ def seen(number: int, *, mirrored: bool, source: str = "file://C:/a.mpg") -> Vip
 
 def asked(number: int, track: ViperTrack, given: dict[int, Camera]) -> list[int]:
     tracks = {1: seen(1, mirrored=False), number: track}
-    return mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH))
+    return cameras_with_mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH))
 
 
 class TestTurned:
@@ -74,7 +74,7 @@ class TestMirroredPeople:
     def test_other_cameras_are_what_they_are(self):
         tracks = {1: seen(1, mirrored=False), 3: seen(2, mirrored=True)}
         given = {1: CAMERAS[1], 3: CAMERAS[2]}
-        assert mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH)) == []
+        assert cameras_with_mirrored_people(tracks, given, dict.fromkeys(tracks, WIDTH)) == []
         assert {2, 6} == MIRRORED
 
 

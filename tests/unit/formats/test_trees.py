@@ -296,7 +296,7 @@ class TestNamesThatAreNoText:
     ) -> None:
         path = make_zip({"inner.zip": marked.read_bytes()}, marked.with_name("outer.zip"))
         outer = ZipTree(path, report, Limits())
-        with closing(outer), closing(outer.nested("inner.zip", report)) as inner:
+        with closing(outer), closing(outer.open_nested_zip("inner.zip", report)) as inner:
             assert inner.read_bytes("d.json") == b"three"
 
     @pytest.mark.parametrize(
@@ -314,7 +314,7 @@ class TestNamesThatAreNoText:
         outer = ZipTree(path, report, limits)
         with closing(outer), pytest.raises(DatasetFormatError, match=said):
             for name in ("one.zip", "two.zip"):
-                with closing(outer.nested(name, report)) as tree:
+                with closing(outer.open_nested_zip(name, report)) as tree:
                     for member in ("a", "b"):
                         tree.read_bytes(member)
 

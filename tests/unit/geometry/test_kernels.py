@@ -19,7 +19,11 @@ KERNELS = {
 
 
 def test_kernels_of_several_modules_are_found() -> None:
-    assert {"curve_fit.descend", "start_kernels.aim", "point_kernels.keep_farthest"} <= set(KERNELS)
+    assert {
+        "curve_fit.minimize_curve_costs",
+        "start_kernels.aim_starts",
+        "point_kernels.keep_farthest_points",
+    } <= set(KERNELS)
 
 
 @pytest.mark.parametrize("name", KERNELS)

@@ -4,12 +4,14 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.geometry.point_kernels import keep_farthest
+from app.geometry.point_kernels import keep_farthest_points
 
 
 def kept(pixels, curve, limits):
     keep = np.empty(len(pixels), dtype=np.bool_)
-    keep_farthest(np.array(pixels, float).reshape(-1, 2), np.array(curve), np.array(limits), keep)
+    keep_farthest_points(
+        np.array(pixels, float).reshape(-1, 2), np.array(curve), np.array(limits), keep
+    )
     return np.flatnonzero(keep).tolist()
 
 

@@ -11,7 +11,7 @@ from app.geometry.resection import (
     Curves,
     Prior,
     camera_from_parameters,
-    distances,
+    curve_distances,
     fit_curves,
     normal_equations,
     parameters_from_camera,
@@ -108,7 +108,7 @@ class TestCameraFromParameters:
 
 class TestDistances:
     def test_points_on_their_curve_have_distance_zero(self):
-        assert distances(TRUTH, CURVES, curve_points(0.0), HALF_DIAGONAL).max() < 1e-6
+        assert curve_distances(TRUTH, CURVES, curve_points(0.0), HALF_DIAGONAL).max() < 1e-6
 
     def test_a_point_aside_has_its_offset(self):
         seen = curve_points(0.0)
@@ -117,7 +117,9 @@ class TestDistances:
         along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
         moved = seen.pixels.copy()
         moved[2] += 5.0 * np.array([-along[1], along[0]])
-        apart = distances(TRUTH, CURVES, CurvePoints(moved, seen.curve, seen.weight), HALF_DIAGONAL)
+        apart = curve_distances(
+            TRUTH, CURVES, CurvePoints(moved, seen.curve, seen.weight), HALF_DIAGONAL
+        )
         assert apart[2] == pytest.approx(5.0, abs=0.01)
 
     def test_beyond_the_end_of_a_segment_it_is_the_distance_to_the_end(self):
@@ -125,11 +127,13 @@ class TestDistances:
         start, end = camera.project(CURVES.shapes[1].reshape(2, 3)) - CENTER
         beyond = end + 7.0 * (end - start) / np.linalg.norm(end - start)
         seen = CurvePoints(beyond[None], np.array([1]), np.ones(1))
-        assert distances(TRUTH, CURVES, seen, HALF_DIAGONAL)[0] == pytest.approx(7.0, abs=0.01)
+        assert curve_distances(TRUTH, CURVES, seen, HALF_DIAGONAL)[0] == pytest.approx(
+            7.0, abs=0.01
+        )
 
     def test_a_curve_behind_the_camera_is_far_from_everything(self):
         turned = TRUTH + np.pi * np.eye(8)[0]
-        assert (distances(turned, CURVES, curve_points(0.0), HALF_DIAGONAL) > 1000).all()
+        assert (curve_distances(turned, CURVES, curve_points(0.0), HALF_DIAGONAL) > 1000).all()
 
 
 class TestResidualRows:

@@ -8,9 +8,9 @@ from app.errors import ShapeError
 from app.geometry.camera import Camera
 from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import (
-    moved_points,
     parallax_angle,
     triangulate_pairs,
+    triangulation_shifts,
 )
 from tests.cameras import FULL_HD, looking
 
@@ -69,7 +69,7 @@ class TestMovedPoints:
         points = generator.uniform([10, -20, -5], [40, 20, 0], (4, 3))
         P_a, P_b = np.stack([MAIN.P] * 4), np.stack([REPLAY.P] * 4)
         pixels = [MAIN.project(points), REPLAY.project(points)]
-        moved = moved_points(P_a, P_b, *pixels, 0.5)
+        moved = triangulation_shifts(P_a, P_b, *pixels, 0.5)
         assert moved.shape == (4, 2, 2, 2, 3)
         for view, axis, way in product((0, 1), repeat=3):
             seen = [place.copy() for place in pixels]
@@ -79,7 +79,7 @@ class TestMovedPoints:
 
     def test_without_pairs_the_result_is_empty(self):
         none = np.empty((0, 2))
-        found = moved_points(np.empty((0, 3, 4)), np.empty((0, 3, 4)), none, none, 0.5)
+        found = triangulation_shifts(np.empty((0, 3, 4)), np.empty((0, 3, 4)), none, none, 0.5)
         assert found.shape == (0, 2, 2, 2, 3)
 
 

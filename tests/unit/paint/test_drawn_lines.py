@@ -8,7 +8,7 @@ from app.paint.drawn_lines import NOTHING_NEW, beside_drawn
 from app.paint.view_proposal import ViewProposal
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint
-from app.soccer.pitch import twin_marking
+from app.soccer.pitch import opposite_marking
 from app.soccer.policy import CalibrationPolicy
 from tests.cameras import SIZE
 from tests.unit.applications import lines_of
@@ -43,7 +43,9 @@ def test_drawn_markings_are_not_proposed_again() -> None:
 
 
 def test_drawn_lines_say_which_half_is_seen() -> None:
-    drawn = {twin_marking(name): SEEN[name] for name in ("Side line right", "Big rect. right main")}
+    drawn = {
+        opposite_marking(name): SEEN[name] for name in ("Side line right", "Big rect. right main")
+    }
     found = beside(make_lines(drawn))
     assert found.sentence == ""
     assert "Side line bottom" in found.lines and "Side line top" not in found.lines

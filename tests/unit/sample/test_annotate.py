@@ -64,7 +64,7 @@ class TestVisiblePaths:
         assert len(seen) > 5
         for number in seen:
             for share in (0.0, 1.0):
-                x, y = paths.at(np.array([number]), np.array([share]))[0]
+                x, y = paths.pixels_at(np.array([number]), np.array([share]))[0]
                 ends = camera.project(PITCH.sample(MARKINGS[number], 0.5, 0.5)[[0, -1]])
                 at_end = np.nanmin(np.linalg.norm(ends - (x, y), axis=1), initial=np.inf)
                 at_border = min(x, 1279 - x, y, 719 - y)
@@ -74,7 +74,7 @@ class TestVisiblePaths:
     def test_half_of_the_length_is_half_of_the_way(self, clean_scenes: list[Scene]):
         paths = visible_paths(clean_scenes[0].truth.views[0].camera)
         number = int(np.argmax(paths.lengths * [name not in CIRCLES for name in MARKINGS]))
-        start, middle, end = paths.at(np.full(3, number), np.array([0.0, 0.5, 1.0]))
+        start, middle, end = paths.pixels_at(np.full(3, number), np.array([0.0, 0.5, 1.0]))
         # Distortion bends the line a little.
         assert middle == pytest.approx((start + end) / 2, abs=12)
 

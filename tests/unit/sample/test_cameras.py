@@ -2,7 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.sample.cameras import REPLAYS, make_rig, parallax, replay_seat
+from app.sample.cameras import (
+    REPLAYS,
+    choose_replay_position,
+    parallax_angle_at_ball,
+    place_cameras,
+)
 from app.sample.scene import Scene
 from app.sample.views import CORNER_RADIUS
 
@@ -49,8 +54,8 @@ class TestAim:
 class TestReplaySeat:
     def test_replays_come_from_all_around(self):
         rng = np.random.default_rng(1)
-        rig = make_rig(rng)
-        drawn = [replay_seat(rng, rig, np.array([40.0, 0.0, -0.1])) for _ in range(300)]
+        rig = place_cameras(rng)
+        drawn = [choose_replay_position(rng, rig, np.array([40.0, 0.0, -0.1])) for _ in range(300)]
         assert {kind for kind, _ in drawn} == set(REPLAYS)
         seats = np.array([seat for _, seat in drawn])
         assert (seats[:, 1] < -40).any()
@@ -61,4 +66,6 @@ class TestReplaySeat:
 class TestParallax:
     def test_rays_along_two_axes_meet_at_a_right_angle(self):
         ball = np.array([0.0, 0.0, 0.0])
-        assert parallax(np.array([9.0, 0, 0]), np.array([0, 4.0, 0]), ball) == np.pi / 2
+        assert (
+            parallax_angle_at_ball(np.array([9.0, 0, 0]), np.array([0, 4.0, 0]), ball) == np.pi / 2
+        )

@@ -11,14 +11,14 @@ from app.sample.faults import (
     POINT_SHIFT_PX,
     TINY_BASELINE_M,
     FaultPlan,
-    confusions,
-    spoil_view,
+    confusable_markings,
+    plant_annotation_fault,
 )
 from app.sample.scene import FAULT_KINDS, PlantedFault, Scene
 from app.sample.views import PITCH
 from app.soccer.annotation import make_lines
 from app.soccer.group import View
-from app.soccer.pitch import MARKINGS, twin_marking
+from app.soccer.pitch import MARKINGS, opposite_marking
 from tests.scenes import make_scenes
 
 
@@ -75,7 +75,7 @@ class TestSwappedSides:
     def test_the_twin_of_every_label_fits(self, faulty_scenes: list[Scene]):
         for scene, _, view in _with_fault(faulty_scenes, "swapped_sides"):
             for marking, points in view.station.lines.items():
-                assert _distance(scene, view, twin_marking(marking), points[0]) < 7
+                assert _distance(scene, view, opposite_marking(marking), points[0]) < 7
 
     def test_only_replays_are_swapped(self, faulty_scenes: list[Scene]):
         for scene, fault, _ in _with_fault(faulty_scenes, "swapped_sides"):
@@ -136,7 +136,7 @@ class TestWrongLabel:
         view = faulty_scenes[0].group.views[0]
         everything = {name: ((i, 2.0), (i + 100.0, 3.0)) for i, name in enumerate(MARKINGS)}
         full = replace(view, station=replace(view.station, lines=make_lines(everything)))
-        spoilt, fault = spoil_view(FaultPlan("wrong_label", 0, 1), full)
+        spoilt, fault = plant_annotation_fault(FaultPlan("wrong_label", 0, 1), full)
         assert fault.true_marking not in spoilt.station.lines
         assert spoilt.station.lines[fault.marking] == full.station.lines[fault.true_marking]
 
@@ -144,7 +144,7 @@ class TestWrongLabel:
 class TestConfusions:
     def test_every_marking_can_be_taken_for_another(self):
         for marking in MARKINGS:
-            names = confusions(marking)
+            names = confusable_markings(marking)
             assert names
             assert marking not in names
             assert set(names) <= set(MARKINGS)

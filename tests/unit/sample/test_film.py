@@ -8,7 +8,14 @@ import pytest
 from app.geometry.camera import Camera
 from app.paint.evidence import read_picture, seek, trace
 from app.paint.grass import field_of_play
-from app.sample.film import Backdrop, add_grain, aimed, hides, make_backdrop, take
+from app.sample.film import (
+    Backdrop,
+    add_grain,
+    aim_cameras,
+    is_ball_hidden,
+    make_backdrop,
+    render_picture,
+)
 from app.sample.fixture import make_fixture
 from app.sample.instant import PEOPLE, Instant
 from app.sample.play import make_play
@@ -22,7 +29,7 @@ AIMS = np.array([[0.0, 0.0, 0.0], [30.0, -4.0, 0.0], [42.0, 6.0, 0.0]])
 
 @pytest.fixture(scope="module")
 def cameras() -> list[Camera]:
-    return aimed(POSITION, AIMS, np.array([1700.0, 2200.0, 2900.0]), 0.004)
+    return aim_cameras(POSITION, AIMS, np.array([1700.0, 2200.0, 2900.0]), 0.004)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +62,7 @@ class TestBackdrop:
         self, backdrop: Backdrop, cameras: list[Camera]
     ) -> None:
         for camera in cameras:
-            image = np.ascontiguousarray(backdrop.seen_by(camera)[..., ::-1])
+            image = np.ascontiguousarray(backdrop.render_from(camera)[..., ::-1])
             reading = read_picture(image, field_of_play(image))
             evidence = seek(reading, trace(reading, camera, Pitch()), 4.0)
             assert len(evidence.offsets) > 60
@@ -64,7 +71,7 @@ class TestBackdrop:
     def test_goals_stand_behind_their_lines(
         self, backdrop: Backdrop, cameras: list[Camera]
     ) -> None:
-        image = backdrop.seen_by(cameras[2]).min(axis=2)
+        image = backdrop.render_from(cameras[2]).min(axis=2)
         post = np.column_stack([np.full(9, 52.5), np.full(9, 3.66), -np.linspace(0.4, 2.2, 9)])
         columns, rows = cameras[2].project(post).round().astype(int).T
         assert (
@@ -77,12 +84,12 @@ class TestBackdrop:
 
     def test_the_other_side_of_the_angles_is_no_edge(self) -> None:
         """A camera that looks along +y has pans of 179 and of -179 degrees in one picture."""
-        camera = aimed(
+        camera = aim_cameras(
             np.array([0.0, -70.0, -14.0]), np.array([[0.0, 0.0, 0.0]]), np.array([1700.0]), 0.0
         )[0]
         image = make_backdrop([camera], LOOK)
         assert image.image.shape[1] < 1600
-        middle = image.seen_by(camera)[300:, 600:680].mean(axis=(0, 1))
+        middle = image.render_from(camera)[300:, 600:680].mean(axis=(0, 1))
         assert middle[1] > 1.2 * middle[2]
 
 
@@ -90,9 +97,9 @@ class TestTake:
     def test_people_and_ball_are_drawn_where_they_are(
         self, backdrop: Backdrop, cameras: list[Camera], instant: Instant
     ) -> None:
-        camera = aimed(POSITION, instant.ball[None] * (1, 1, 0), np.array([2200.0]), 0.0)[0]
+        camera = aim_cameras(POSITION, instant.ball[None] * (1, 1, 0), np.array([2200.0]), 0.0)[0]
         alone = make_backdrop([camera], LOOK)
-        image, empty = take(alone, camera, instant, LOOK), alone.seen_by(camera)
+        image, empty = render_picture(alone, camera, instant, LOOK), alone.render_from(camera)
         changed = np.abs(image.astype(int) - empty).max(axis=2) > 40
         places = np.column_stack([instant.feet, np.full(PEOPLE, -0.9)])
         pixels = camera.project(places)
@@ -105,15 +112,15 @@ class TestTake:
 
     def test_somebody_before_the_ball_hides_it(self, instant: Instant) -> None:
         ball = np.array([10.0, 0.0, -0.11])
-        camera = aimed(POSITION, ball[None], np.array([2200.0]), 0.0)[0]
+        camera = aim_cameras(POSITION, ball[None], np.array([2200.0]), 0.0)[0]
         away = np.column_stack([np.linspace(-40, -20, PEOPLE), np.full(PEOPLE, -20.0)])
         clear = replace(instant, ball=ball, feet=away)
-        assert not hides(camera, clear)
+        assert not is_ball_hidden(camera, clear)
         way = (POSITION - ball)[:2] / np.linalg.norm((POSITION - ball)[:2])
         before, behind = away.copy(), away.copy()
         before[4], behind[4] = ball[:2] + 0.8 * way, ball[:2] - 0.8 * way
-        assert hides(camera, replace(clear, feet=before))
-        assert not hides(camera, replace(clear, feet=behind))
+        assert is_ball_hidden(camera, replace(clear, feet=before))
+        assert not is_ball_hidden(camera, replace(clear, feet=behind))
 
 
 class TestAddGrain:

@@ -6,8 +6,8 @@ import pytest
 from app.sample.instant import (
     BALL_DIAMETER,
     PEOPLE,
-    clear_view,
-    later,
+    advance_instant,
+    clear_lines_of_sight,
     make_instant,
     shirt_numbers,
 )
@@ -43,12 +43,14 @@ class TestShirtNumbers:
 
 class TestLater:
     def test_the_ball_moves_by_the_shift_and_runners_run(self, instant):
-        moved = later(instant, 0.5, np.array([2.0, 1.0, -1.0]))
+        moved = advance_instant(instant, 0.5, np.array([2.0, 1.0, -1.0]))
         assert moved.ball == pytest.approx(instant.ball + np.array([2.0, 1.0, -1.0]))
         assert not np.allclose(moved.feet, instant.feet)
 
     def test_the_ball_does_not_sink_into_the_grass(self, instant):
-        assert later(instant, 0.5, np.array([0.0, 0.0, 50.0])).ball[2] == -BALL_DIAMETER / 2
+        assert (
+            advance_instant(instant, 0.5, np.array([0.0, 0.0, 50.0])).ball[2] == -BALL_DIAMETER / 2
+        )
 
 
 class TestClearSight:
@@ -59,6 +61,6 @@ class TestClearSight:
         feet = instant.feet.copy()
         feet[5] = ball[:2] + 2.0 * toward
         blocked = type(instant)(**{**vars(instant), "ball": ball, "feet": feet})
-        cleared = clear_view(blocked, camera[None])
+        cleared = clear_lines_of_sight(blocked, camera[None])
         offset = cleared.feet[5] - ball[:2]
         assert abs(offset[0] * toward[1] - offset[1] * toward[0]) > 0.7

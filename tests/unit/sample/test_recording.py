@@ -12,13 +12,13 @@ import pytest
 from app.errors import InputError
 from app.formats.camera_json import camera_from_json
 from app.sample.order import RECORDING_SECONDS
-from app.sample.recording import FPS, PARTS, Part, draw_logo, parts_of, write_recording
+from app.sample.recording import FPS, PARTS, ShotPlan, draw_logo, plan_shots, write_recording
 from tests.bench.shots import read_clip
 
 PIECE = (
-    Part("main", 1.6, "start"),
-    Part("replay", 1.6, "wipe", 0.25, 1),
-    Part("closeup", 0.6, "wipe"),
+    ShotPlan("main", 1.6, "start"),
+    ShotPlan("replay", 1.6, "wipe", 0.25, 1),
+    ShotPlan("closeup", 0.6, "wipe"),
 )
 
 
@@ -52,14 +52,14 @@ class TestPartsOf:
 
     @pytest.mark.parametrize(("seconds", "shots"), [(36, 11), (180, 11), (600, 33)])
     def test_it_is_as_long_as_it_shall_be(self, seconds: float, shots: int) -> None:
-        parts = parts_of(seconds)
+        parts = plan_shots(seconds)
         assert sum(part.seconds for part in parts) == pytest.approx(seconds)
         assert len(parts) == shots
         assert [part.entered_by for part in parts].count("start") == 1
 
     def test_too_short_a_one_is_refused(self) -> None:
         with pytest.raises(InputError, match="36 seconds or more"):
-            parts_of(20)
+            plan_shots(20)
 
 
 class TestWriteRecording:
@@ -124,7 +124,7 @@ class TestWriteRecording:
         assert np.percentile(brighter, 10) > 30
 
     def test_the_same_arguments_give_the_same_bytes(self, tmp_path: Path) -> None:
-        parts = [Part("main", 0.4, "start")]
+        parts = [ShotPlan("main", 0.4, "start")]
         for name in ("a.mp4", "b.mp4"):
             write_recording(tmp_path / name, parts=parts)
         write_recording(tmp_path / "c.mp4", parts=parts, seed=7)
@@ -134,7 +134,7 @@ class TestWriteRecording:
         assert truths[0] == truths[1] != truths[2]
 
     def test_play_that_has_gone_on_goes_on(self, tmp_path: Path) -> None:
-        parts = [Part("main", 1.2, "start"), Part("replay", 0.4, "cut", 0.5)]
+        parts = [ShotPlan("main", 1.2, "start"), ShotPlan("replay", 0.4, "cut", 0.5)]
         write_recording(tmp_path / "film.mp4", parts=parts, since=30.0)
         truth = json.loads((tmp_path / "film.json").read_text(encoding="utf-8"))
         (link,) = truth["links"]
@@ -145,7 +145,7 @@ class TestWriteRecording:
             assert row["play_s"] == pytest.approx(30.0 + shown, abs=1e-9)
 
     def test_a_blended_replay_mixes_its_pictures(self, tmp_path: Path) -> None:
-        parts = [Part("main", 1.2, "start"), Part("replay", 0.8, "cut", 0.25, 1, "blend")]
+        parts = [ShotPlan("main", 1.2, "start"), ShotPlan("replay", 0.8, "cut", 0.25, 1, "blend")]
         write_recording(tmp_path / "film.avi", parts=parts)
         rows = json.loads((tmp_path / "film.json").read_text(encoding="utf-8"))["each"]
         mixes = [row["mixes"] for row in rows if row["shot"] == 1]
@@ -156,17 +156,25 @@ class TestWriteRecording:
         ("name", "parts", "message"),
         [
             ("film.txt", None, "no ending of a video"),
-            ("film.mp4", [Part("replay", 3, "start", 0.5)], "no live shot is before it"),
-            ("film.mp4", [Part("main", 1, "start"), Part("replay", 8, "cut", 0.5)], "longer than"),
+            ("film.mp4", [ShotPlan("replay", 3, "start", 0.5)], "no live shot is before it"),
             (
                 "film.mp4",
-                [Part("main", 0.4, "start"), Part("main", 0.4, "wipe"), Part("main", 1, "wipe")],
+                [ShotPlan("main", 1, "start"), ShotPlan("replay", 8, "cut", 0.5)],
+                "longer than",
+            ),
+            (
+                "film.mp4",
+                [
+                    ShotPlan("main", 0.4, "start"),
+                    ShotPlan("main", 0.4, "wipe"),
+                    ShotPlan("main", 1, "wipe"),
+                ],
                 "no longer",
             ),
         ],
     )
     def test_what_cannot_be_shown_is_refused_and_nothing_left(
-        self, tmp_path: Path, name: str, parts: list[Part] | None, message: str
+        self, tmp_path: Path, name: str, parts: list[ShotPlan] | None, message: str
     ) -> None:
         with pytest.raises(InputError, match=message):
             write_recording(tmp_path / name, parts=parts)
@@ -178,7 +186,7 @@ class TestWriteRecording:
 
         with pytest.raises(KeyboardInterrupt):
             write_recording(
-                tmp_path / "film.mp4", parts=[Part("main", 0.4, "start")], progress=stop
+                tmp_path / "film.mp4", parts=[ShotPlan("main", 0.4, "start")], progress=stop
             )
         assert list(tmp_path.iterdir()) == []
 

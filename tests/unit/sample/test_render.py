@@ -6,7 +6,7 @@ import pytest
 from app.errors import NotFoundError
 from app.sample.render import Image, render
 from app.sample.scene import Scene
-from app.sample.views import COARSE, inside
+from app.sample.views import COARSE, is_inside_image
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ class TestRender:
             image = render(scene, view.view).min(axis=2).astype(float)
             goals = COARSE.points[:, 2] < 0
             pixels = view.camera.project(COARSE.points[~goals])
-            pixels = pixels[inside(pixels, 20)].round().astype(int)
+            pixels = pixels[is_inside_image(pixels, 20)].round().astype(int)
             on = image[pixels[:, 1], pixels[:, 0]]
             beside = image[pixels[:, 1] - 12, pixels[:, 0] + 12]
             brighter.append(np.median(on - beside))

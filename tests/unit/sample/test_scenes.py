@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.sample.cameras import MIN_PARALLAX, parallax
+from app.sample.cameras import MIN_PARALLAX, parallax_angle_at_ball
 from app.sample.order import SEED
 from app.sample.scene import Scene
-from app.sample.scenes import ball_box, make_match
+from app.sample.scenes import make_match, true_ball_box
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.solving.solve import solve
 from tests.scenes import make_scenes
@@ -48,7 +48,10 @@ class TestMakeScenes:
         for scene in clean_scenes:
             main, *others = (view.camera.position for view in scene.truth.views)
             for other in others:
-                assert parallax(main, other, np.array(scene.truth.ball)) > MIN_PARALLAX * 0.95
+                assert (
+                    parallax_angle_at_ball(main, other, np.array(scene.truth.ball))
+                    > MIN_PARALLAX * 0.95
+                )
 
     def test_clean_scenes_are_solved_within_a_decimetre(self, clean_scenes: list[Scene]):
         errors = []
@@ -82,7 +85,7 @@ class TestMakeMatch:
 class TestBallBox:
     def test_holds_the_outline_of_the_sphere(self, clean_scenes: list[Scene]):
         view = clean_scenes[0].truth.views[0]
-        box = ball_box(view.camera, np.array(view.ball))
+        box = true_ball_box(view.camera, np.array(view.ball))
         depth = view.camera.pitch_to_camera(np.array([view.ball]))[0, 2]
         expected = PAPER.ball_diameter_m * view.camera.focal_length[0] / depth
         assert box.diameter == pytest.approx(expected, rel=0.06)

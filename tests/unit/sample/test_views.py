@@ -4,12 +4,19 @@ import numpy as np
 
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.sample.views import CENTER, COARSE, Trials, inside, project_trials, seen_points
+from app.sample.views import (
+    CENTER,
+    COARSE,
+    TrialCameras,
+    count_seen_points,
+    is_inside_image,
+    project_trials,
+)
 from app.soccer.pitch import MARKINGS
 
 
-def _trials() -> Trials:
-    return Trials(
+def _trials() -> TrialCameras:
+    return TrialCameras(
         position=np.array([[1.0, 60.0, -14.0], [-70.0, 3.0, -9.0]]),
         pan=np.array([0.3, 1.4]),
         tilt=np.array([1.32, 1.40]),
@@ -38,7 +45,7 @@ class TestProjectTrials:
 
 class TestSeenPoints:
     def test_counts_the_points_of_each_marking(self):
-        counts = seen_points(np.ones(len(COARSE.points), dtype=bool), COARSE)
+        counts = count_seen_points(np.ones(len(COARSE.points), dtype=bool), COARSE)
         assert counts.sum() == len(COARSE.points)
         assert counts.shape == (len(MARKINGS),)
         assert counts.min() >= 5
@@ -46,7 +53,7 @@ class TestSeenPoints:
 
 class TestInside:
     def test_what_is_not_visible_is_not_inside(self):
-        assert inside(np.array([[5.0, 5.0], [-1.0, 5.0], [np.nan, np.nan]])).tolist() == [
+        assert is_inside_image(np.array([[5.0, 5.0], [-1.0, 5.0], [np.nan, np.nan]])).tolist() == [
             True,
             False,
             False,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.soccer.camera_size import other_size
+from app.soccer.camera_size import size_centred_on_principal_point
 from app.soccer.frames import ImageSize
 
 CAMERA = Camera(np.eye(3), np.zeros(3), (1000.0, 1000.0), (0.0, 0.0))
@@ -28,7 +28,7 @@ class TestOtherSize:
     def test_the_middle_of_another_size_tells_it(
         self, point: tuple[float, float], size: tuple[int, int] | None
     ) -> None:
-        found = other_size(replace(CAMERA, principal_point=point), VIEW)
+        found = size_centred_on_principal_point(replace(CAMERA, principal_point=point), VIEW)
         assert found == (None if size is None else ImageSize(*size))
 
     @pytest.mark.parametrize(
@@ -37,8 +37,10 @@ class TestOtherSize:
     def test_the_middle_of_the_view_and_estimated_points_tell_nothing(
         self, point: tuple[float, float]
     ) -> None:
-        assert other_size(replace(CAMERA, principal_point=point), VIEW) is None
+        assert size_centred_on_principal_point(replace(CAMERA, principal_point=point), VIEW) is None
 
     def test_any_enlargement_of_the_view_is_a_size(self) -> None:
-        found = other_size(replace(CAMERA, principal_point=(499.5, 249.5)), ImageSize(2000, 1000))
+        found = size_centred_on_principal_point(
+            replace(CAMERA, principal_point=(499.5, 249.5)), ImageSize(2000, 1000)
+        )
         assert found == ImageSize(1000, 500)

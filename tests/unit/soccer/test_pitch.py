@@ -9,7 +9,7 @@ from app.soccer.pitch import (
     Pitch,
     Segment,
     canonical_marking,
-    twin_marking,
+    opposite_marking,
 )
 
 PITCH = Pitch()
@@ -83,14 +83,14 @@ class TestTwinMarking:
     @pytest.mark.parametrize("marking", MARKINGS)
     def test_is_the_marking_that_a_half_turn_puts_there(self, marking):
         here = turned(PITCH.sample(marking, 0.9, 0.2))
-        there = PITCH.sample(twin_marking(marking), 0.9, 0.2)
+        there = PITCH.sample(opposite_marking(marking), 0.9, 0.2)
         apart = np.linalg.norm(here[:, None] - there[None], axis=2)
         assert apart.min(axis=1).max() < 0.9
         assert apart.min(axis=0).max() < 0.9
 
     @pytest.mark.parametrize("marking", MARKINGS)
     def test_the_twin_of_the_twin_is_the_marking_itself(self, marking):
-        assert twin_marking(twin_marking(marking)) == marking
+        assert opposite_marking(opposite_marking(marking)) == marking
 
 
 class TestCanonicalMarking:

@@ -15,7 +15,7 @@ from app.geometry.sphere import tight_box
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.solution import Ball3D, Calibration
-from app.solving.ball_box import expect_ball, fit_ball
+from app.solving.ball_box import fit_ball, predict_ball_in_view
 
 SIZE = ImageSize(600, 800)  # a diagonal of 1000 px
 BALL_M = 0.2
@@ -126,7 +126,9 @@ class TestExpectBall:
     GIVEN = Calibration("given", CAMERA)
 
     def test_a_place_by_hand_with_the_uncertainty_of_the_ball(self):
-        found = expect_ball(self.GIVEN, SIZE, ball3d(2.0, 0.0, -1.0, variance=0.04), BALL_M)
+        found = predict_ball_in_view(
+            self.GIVEN, SIZE, ball3d(2.0, 0.0, -1.0, variance=0.04), BALL_M
+        )
         assert found.place == pytest.approx((400.0, 350.0))
         assert isinstance(found.place, ImagePoint)
         # 20 cm are 10 px; the depth of a ball aside of the axis moves it a little, too.
@@ -145,16 +147,18 @@ class TestExpectBall:
         point = np.array([[0.0, 0.0, 0.0]])
         assert np.allclose(camera.project(point), [[300.0, 400.0]])
         lines = Calibration("lines", camera, covariance=tuple(moved.ravel()))
-        found = expect_ball(lines, SIZE, ball3d(0.0, 0.0, 0.0), BALL_M)
+        found = predict_ball_in_view(lines, SIZE, ball3d(0.0, 0.0, 0.0), BALL_M)
         assert np.allclose(np.reshape(found.covariance, (2, 2)), [[25.0, 0.0], [0.0, 0.0]])
 
     def test_without_a_camera_nothing_is_expected(self):
-        assert expect_ball(Calibration("lines", None), SIZE, ball3d(0, 0, 0), BALL_M) is None
+        assert (
+            predict_ball_in_view(Calibration("lines", None), SIZE, ball3d(0, 0, 0), BALL_M) is None
+        )
 
     def test_behind_the_camera_nothing_is_expected(self):
-        assert expect_ball(self.GIVEN, SIZE, ball3d(0.0, -21.0, 0.0), BALL_M) is None
+        assert predict_ball_in_view(self.GIVEN, SIZE, ball3d(0.0, -21.0, 0.0), BALL_M) is None
 
     def test_a_ball_that_reaches_the_camera_is_expected_without_a_box(self):
-        found = expect_ball(self.GIVEN, SIZE, ball3d(0.0, -19.95, 0.0), BALL_M)
+        found = predict_ball_in_view(self.GIVEN, SIZE, ball3d(0.0, -19.95, 0.0), BALL_M)
         assert found.place == pytest.approx((300.0, 400.0))
         assert found.box is None

@@ -17,16 +17,16 @@ from app.soccer.solution import Calibration
 from app.solving.ball_covariance import (
     CLICK_DIAGONAL,
     MeanCovariance,
+    ball_click_variance,
     calibration_covariance,
-    click_variance,
-    is_within,
-    known_covariances,
-    longest_sigma,
+    calibration_pixel_covariances,
+    is_covariance_within,
+    major_axis_sigma,
     pixel_covariance,
 )
-from app.solving.facts import group_facts, join
+from app.solving.facts import group_facts, join_facts
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
-from app.solving.judgement import judge
+from app.solving.judgement import judge_groups
 from app.solving.observations import principal_point
 from app.solving.picture_camera import picture_of, warp_of
 from app.solving.triangulate import BallObservation
@@ -42,20 +42,20 @@ DIAGONAL = np.array([CLICK_DIAGONAL])
 class TestClickVariance:
     def test_is_the_policys_value_at_the_diagonal_of_full_hd(self):
         policy = replace(PAPER, click_sigma_px=3.0, box_sigma_share=0.5)
-        assert click_variance(DIAGONAL, np.array([0.0]), policy) == pytest.approx(9.0)
-        assert click_variance(DIAGONAL / 2, np.array([0.0]), policy) == pytest.approx(2.25)
-        assert click_variance(DIAGONAL, np.array([8.0]), policy) == pytest.approx(9.0 + 16.0)
+        assert ball_click_variance(DIAGONAL, np.array([0.0]), policy) == pytest.approx(9.0)
+        assert ball_click_variance(DIAGONAL / 2, np.array([0.0]), policy) == pytest.approx(2.25)
+        assert ball_click_variance(DIAGONAL, np.array([8.0]), policy) == pytest.approx(9.0 + 16.0)
 
     @given(st.floats(0.01, 9.0), st.floats(0.0, 60.0))
     def test_a_single_value_has_the_bits_of_a_python_float(self, click, diameter):
         policy = replace(PAPER, click_sigma_px=click)
         sigma = float(np.hypot(click * CLICK_DIAGONAL / CLICK_DIAGONAL, 0.04 * diameter))
-        assert click_variance(DIAGONAL, np.array([diameter]), policy).tolist() == [sigma**2]
+        assert ball_click_variance(DIAGONAL, np.array([diameter]), policy).tolist() == [sigma**2]
 
     def test_given_cameras_add_theirs_where_nobody_says_how_exact_they_are(self):
         policy = replace(PAPER, click_sigma_px=3.0, given_sigma_px=4.0)
         bare = np.array([True, False])
-        found = click_variance(np.repeat(DIAGONAL, 2), np.zeros(2), policy, bare)
+        found = ball_click_variance(np.repeat(DIAGONAL, 2), np.zeros(2), policy, bare)
         assert found == pytest.approx([25.0, 9.0])
 
 
@@ -93,7 +93,9 @@ class TestPictureSpreads:
     HALF = SIZE.diagonal / 2
 
     def calibration(self, whole):
-        camera = self.DONE.done(camera_from_parameters(self.taken(), MIDDLE, self.HALF), SIZE)
+        camera = self.DONE.camera_of_shown_picture(
+            camera_from_parameters(self.taken(), MIDDLE, self.HALF), SIZE
+        )
         covariance = tuple(whole[:8, :8].ravel().tolist())
         whole_ = tuple(whole.ravel().tolist())
         return Calibration("lines", camera, covariance=covariance, picture_covariance=whole_)
@@ -103,7 +105,11 @@ class TestPictureSpreads:
 
     def pixel(self, unknowns):
         camera = camera_from_parameters(unknowns[:8], MIDDLE, self.HALF)
-        return picture_of(unknowns[8:], (0, 0, 0)).done(camera, SIZE).project(np.array([BALL]))[0]
+        return (
+            picture_of(unknowns[8:], (0, 0, 0))
+            .camera_of_shown_picture(camera, SIZE)
+            .project(np.array([BALL]))[0]
+        )
 
     def test_are_those_of_camera_and_picture_together(self):
         rng = np.random.default_rng(3)
@@ -129,7 +135,7 @@ class TestPictureSpreads:
         facts = group_facts(views, [calibration, other])
         found = facts_from_bytes([facts_to_bytes(facts)])
         points = np.array([BALL, BALL])
-        spreads = known_covariances(found, np.arange(2), points)
+        spreads = calibration_pixel_covariances(found, np.arange(2), points)
         for at, one in enumerate((calibration, other)):
             alone = calibration_covariance(one, SIZE, points[at])
             np.testing.assert_allclose(spreads[at], alone, rtol=2e-3)
@@ -139,12 +145,12 @@ class TestLongestSigma:
     def test_is_along_the_longest_axis(self):
         turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
         spread = turn @ np.diag([9.0, 1.0, 4.0]) @ turn.T
-        assert longest_sigma(spread[None]) == pytest.approx([3.0])
+        assert major_axis_sigma(spread[None]) == pytest.approx([3.0])
 
     def test_an_unknown_covariance_has_an_infinite_sigma(self):
         spreads = np.stack([np.full((3, 3), np.nan), np.eye(3)])
-        assert longest_sigma(spreads).tolist() == [np.inf, 1.0]
-        assert is_within(spreads, 2.0).tolist() == [False, True]
+        assert major_axis_sigma(spreads).tolist() == [np.inf, 1.0]
+        assert is_covariance_within(spreads, 2.0).tolist() == [False, True]
 
 
 class TestIsWithin:
@@ -152,18 +158,20 @@ class TestIsWithin:
     def test_says_what_the_eigenvalues_say(self, seed, share):
         root = np.random.default_rng(seed).normal(size=(20, 3, 3)) * [1.0, 0.3, 0.1]
         spreads = root @ root.transpose(0, 2, 1)
-        limit = share * float(np.median(longest_sigma(spreads)))
-        assert np.array_equal(is_within(spreads, limit), longest_sigma(spreads) <= limit)
+        limit = share * float(np.median(major_axis_sigma(spreads)))
+        assert np.array_equal(
+            is_covariance_within(spreads, limit), major_axis_sigma(spreads) <= limit
+        )
 
     def test_a_limit_equal_to_the_sigma_is_met(self):
         root = np.random.default_rng(4).normal(size=(50, 3, 3))
         for spread in (root @ root.transpose(0, 2, 1))[:, None]:
-            (sigma,) = longest_sigma(spread)
-            assert is_within(spread, float(sigma)).all()
-            assert not is_within(spread, float(np.nextafter(sigma, 0.0))).any()
+            (sigma,) = major_axis_sigma(spread)
+            assert is_covariance_within(spread, float(sigma)).all()
+            assert not is_covariance_within(spread, float(np.nextafter(sigma, 0.0))).any()
 
     def test_a_threshold_of_zero_lets_nothing_through(self):
-        assert is_within(np.eye(3)[None], 0.0).tolist() == [False]
+        assert is_covariance_within(np.eye(3)[None], 0.0).tolist() == [False]
 
 
 class TestMeanSpread:
@@ -171,7 +179,7 @@ class TestMeanSpread:
         views = [given_view(str(place), camera, BALL) for place, camera in enumerate(cameras)]
         facts = group_facts(views, [Calibration("given", camera) for camera in cameras])
         spread = MeanCovariance(facts)
-        judgement = judge(facts, policy, spread)
+        judgement = judge_groups(facts, policy, spread)
         return spread.covariances(judgement.valid, np.array([0]), judgement.point, policy)[0]
 
     def test_is_the_scatter_of_noisy_clicks(self):
@@ -237,11 +245,11 @@ class TestMeanSpread:
     @given(st.lists(st.integers(0, 1000), min_size=2, max_size=6))
     @settings(max_examples=30, deadline=None)
     def test_results_kept_for_other_policies_change_no_bit(self, seeds):
-        facts = join([group_facts(*random_views(seed)) for seed in range(60)])
+        facts = join_facts([group_facts(*random_views(seed)) for seed in range(60)])
         kept = MeanCovariance(facts)
         for seed in seeds:
             policy = replace(random_policy(seed), max_sigma_m=0.1)
-            judgement, groups = judge(facts, policy, kept), np.arange(facts.groups)
+            judgement, groups = judge_groups(facts, policy, kept), np.arange(facts.groups)
             there = groups[~np.isnan(judgement.point[:, 0])]
             asked = (judgement.valid, there, judgement.point[there], policy)
             fresh = MeanCovariance(facts).covariances(*asked)

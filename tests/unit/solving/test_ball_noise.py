@@ -6,7 +6,7 @@ import pytest
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, Calibration
 from app.solving.ball_covariance import CLICK_DIAGONAL
-from app.solving.ball_noise import LIMIT, TRIMMED, Miss, estimate_ball_noise, misses_of
+from app.solving.ball_noise import LIMIT, TRIMMED, RayResidual, estimate_ball_noise, ray_residuals
 from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE
@@ -32,7 +32,7 @@ def dataset(noise_px, groups=120, seed=0, source="lines", views=tuple(VIEWS)):
     return [
         miss
         for _ in range(groups)
-        for miss in misses_of(ball_in(views), list(sights(noise_px, rng, source)))
+        for miss in ray_residuals(ball_in(views), list(sights(noise_px, rng, source)))
     ]
 
 
@@ -40,7 +40,7 @@ def blurred(rng, sigma, share, numbers=600):
     """Misses by clicks of that sigma, of balls of 5 to 40 pixels."""
     for diameter in rng.uniform(5, 40, numbers):
         variance = sigma**2 + share**2 * diameter**2
-        yield Miss(rng.normal(0, np.sqrt(variance)), 1.0, diameter**2, 0.0, 0.0)
+        yield RayResidual(rng.normal(0, np.sqrt(variance)), 1.0, diameter**2, 0.0, 0.0)
 
 
 class TestMissesOf:
@@ -84,7 +84,7 @@ class TestEstimateBallNoise:
 
     def test_what_cameras_explain_is_not_blamed_on_clicks(self):
         rng = np.random.default_rng(4)
-        misses = [Miss(rng.normal(0, 2.0), 1.0, 0.0, 0.0, 3.0) for _ in range(400)]
+        misses = [RayResidual(rng.normal(0, 2.0), 1.0, 0.0, 0.0, 3.0) for _ in range(400)]
         assert estimate_ball_noise(misses, PAPER).click.value == pytest.approx(1.0, rel=0.25)
 
     def test_of_given_cameras_the_rest_is_theirs(self):
@@ -96,7 +96,7 @@ class TestEstimateBallNoise:
     def test_neighbours_that_err_alike_widen_the_interval(self):
         rng = np.random.default_rng(5)
         alike = [
-            Miss(scale * rng.normal(), 1.0, 0.0, 0.0, 0.0)
+            RayResidual(scale * rng.normal(), 1.0, 0.0, 0.0, 0.0)
             for scale in rng.choice([0.6, 1.5], 10).repeat(60)
         ]
         alone = [alike[at] for at in rng.permutation(len(alike))]
@@ -124,13 +124,13 @@ class TestEstimateBallNoise:
 
     @pytest.mark.parametrize("miss", [0.0, 2.0, 40.0])
     def test_one_number_is_enough_to_be_told(self, miss):
-        found = estimate_ball_noise([Miss(miss, 1.0, 100.0, 0.0, 0.1)]).click
+        found = estimate_ball_noise([RayResidual(miss, 1.0, 100.0, 0.0, 0.1)]).click
         assert found.low < found.value < found.high and found.high > 3 * found.low
 
     def test_of_few_numbers_it_is_wider_and_so_is_its_interval(self):
         """Ellipsoids must hold though nobody knows their size exactly."""
-        few = estimate_ball_noise([Miss(1.0, 1.0, 0.0, 0.0, 0.0)] * 3).click
-        many = estimate_ball_noise([Miss(1.0, 1.0, 0.0, 0.0, 0.0)] * 300).click
+        few = estimate_ball_noise([RayResidual(1.0, 1.0, 0.0, 0.0, 0.0)] * 3).click
+        many = estimate_ball_noise([RayResidual(1.0, 1.0, 0.0, 0.0, 0.0)] * 300).click
         assert few.value > 1.15 * many.value
         assert few.low < 0.5 * many.low and few.high > 1.5 * many.high
 
@@ -142,19 +142,19 @@ class TestEstimateBallNoise:
 
     def test_what_is_no_noise_is_none(self):
         rng = np.random.default_rng(6)
-        alike = [Miss(rng.normal(0, 500.0), 1.0, 0.0, 0.0, 1.0) for _ in range(100)]
+        alike = [RayResidual(rng.normal(0, 500.0), 1.0, 0.0, 0.0, 1.0) for _ in range(100)]
         found = estimate_ball_noise(alike, PAPER)
         assert (found.click, found.share) == (None, None)
         rest = [replace(item, given=1.0) for item in alike]
         assert estimate_ball_noise(rest, PAPER).given is None
 
     def test_clicks_that_cannot_be_told_from_none_are_small(self):
-        exact = [Miss(0.0, 1.0, 0.0, 0.0, 1.0)] * 100
+        exact = [RayResidual(0.0, 1.0, 0.0, 0.0, 1.0)] * 100
         assert estimate_ball_noise(exact, PAPER).click.value < 0.5
 
     def test_the_estimate_moves_by_less_than_the_steps_that_are_tried(self):
         rng = np.random.default_rng(8)
-        misses = [Miss(miss, 1.0, 0.0, 0.0, 0.0) for miss in rng.normal(0, 1.0, 400)]
+        misses = [RayResidual(miss, 1.0, 0.0, 0.0, 0.0) for miss in rng.normal(0, 1.0, 400)]
         larger = [replace(item, miss=1.01 * item.miss) for item in misses]
         one, other = (estimate_ball_noise(item, PAPER).click.value for item in (misses, larger))
         assert other / one == pytest.approx(1.01, abs=0.001)
@@ -175,6 +175,6 @@ class TestRigs:
             replace(sight, calibration=replace(sight.calibration, covariance=vague))
             for sight in sights(2.0, rng, "given")
         ]
-        assert misses_of(ball_in(VIEWS), rig) == ()
+        assert ray_residuals(ball_in(VIEWS), rig) == ()
         one = [*sights(2.0, rng, "given")][:2] + rig[2:]
-        assert len(misses_of(ball_in(VIEWS), one)) == 1
+        assert len(ray_residuals(ball_in(VIEWS), one)) == 1

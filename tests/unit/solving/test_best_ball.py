@@ -5,7 +5,7 @@ import numpy as np
 
 from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
-from app.solving.best_ball import _Views
+from app.solving.best_ball import _ViewSubsets
 from app.solving.solve import solve
 from app.solving.triangulate import ball_observations
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
@@ -66,19 +66,19 @@ class TestBestBall:
         assert solve(group(views()[0]), PAPER).best_ball is None
 
     def test_subsets_of_views_have_together_the_bits_that_each_has_alone(self):
-        views = _Views(ball_observations(*random_views(11)), PAPER)
+        views = _ViewSubsets(ball_observations(*random_views(11)), PAPER)
         chosen = list(combinations(range(len(views.observations)), 2))
         starts = [np.array([0.0, 0.0, -1.0])] * len(chosen)
-        together = views.estimates(chosen, starts)
+        together = views.estimate_subsets(chosen, starts)
         assert len([found for found in together if found is not None]) > 2
         for at, found in enumerate(together):
-            (alone,) = views.estimates([chosen[at]], [starts[at]])
+            (alone,) = views.estimate_subsets([chosen[at]], [starts[at]])
             assert repr(alone) == repr(found)
 
     def test_a_view_of_which_nothing_can_be_computed_takes_no_other_along(self):
-        views = _Views(ball_observations(*random_views(11)), PAPER)
+        views = _ViewSubsets(ball_observations(*random_views(11)), PAPER)
         chosen, start = [(0, 1), (0, 2)], np.array([0.0, 0.0, -1.0])
-        alone = views.estimates([chosen[1]], [start])
+        alone = views.estimate_subsets([chosen[1]], [start])
         # NumPy gives up on all matrices of a call where one has no eigenvalues.
-        lost = views.estimates(chosen, [np.full(3, np.nan), start])
+        lost = views.estimate_subsets(chosen, [np.full(3, np.nan), start])
         assert repr(lost) == repr([None, *alone])

@@ -27,7 +27,7 @@ class TestOf:
         assert found.picture is None
 
     def test_a_changed_picture_has_the_camera_that_took_it(self):
-        changed = PictureGeometry(1.2).done(BEHIND_GOAL, SIZE)
+        changed = PictureGeometry(1.2).camera_of_shown_picture(BEHIND_GOAL, SIZE)
         whole = np.arange(121.0).reshape(11, 11)
         calibration = Calibration(
             "lines", changed, covariance=KNOWN, picture_covariance=tuple(whole.ravel())

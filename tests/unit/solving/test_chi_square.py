@@ -13,9 +13,14 @@ from app.soccer.annotation import BallAnnotation
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.chi_square import Residuals, residuals_of, residuals_without, widening_of
-from app.solving.facts import Facts, group_facts, join
-from app.solving.judgement import judge, views_of
+from app.solving.chi_square import (
+    ChiSquareResiduals,
+    chi_square_residuals,
+    chi_square_residuals_without_each_view,
+    sigma_widening,
+)
+from app.solving.facts import Facts, group_facts, join_facts
+from app.solving.judgement import judge_groups, views_in_pairs
 from app.solving.solve import solve
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 from tests.unit.solving.random_groups import random_policy, random_views
@@ -42,9 +47,9 @@ def facts(keys: str = "abc", noise_px: float = 0.0, seed: int = 0) -> Facts:
     return group_facts(views(keys, noise_px, seed), calibrations)
 
 
-def found(of: Facts, policy=POLICY, off: float = 0.0) -> Residuals:
+def found(of: Facts, policy=POLICY, off: float = 0.0) -> ChiSquareResiduals:
     start = np.tile(np.array(BALL) + off, (of.groups, 1))
-    return residuals_of(of, np.ones(len(of.view_group), bool), start, policy)
+    return chi_square_residuals(of, np.ones(len(of.view_group), bool), start, policy)
 
 
 class TestResidualsOf:
@@ -70,7 +75,7 @@ class TestResidualsOf:
 
     @pytest.mark.parametrize("keys", ["ab", "abc"])
     def test_chance_alone_makes_every_p_value_alike(self, keys: str) -> None:
-        p_values = found(join([facts(keys, SIGMA, seed) for seed in range(300)])).p_value
+        p_values = found(join_facts([facts(keys, SIGMA, seed) for seed in range(300)])).p_value
         for share in (0.05, 0.5, 0.9):
             assert abs((p_values < share).mean() - share) < 3.5 * np.sqrt(share * (1 - share) / 300)
 
@@ -88,11 +93,11 @@ class TestResidualsOf:
     def test_one_view_alone_says_nothing(self) -> None:
         three = facts("abc")
         for used in ([True, False, False], [False, False, False]):
-            one = residuals_of(three, np.array(used), np.array([BALL]), POLICY)
+            one = chi_square_residuals(three, np.array(used), np.array([BALL]), POLICY)
             assert np.isnan([one.chi_square[0], one.p_value[0], one.point[0, 0]]).all()
 
     def test_without_a_start_nothing_is_said(self) -> None:
-        one = residuals_of(facts(), np.ones(3, bool), np.full((1, 3), np.nan), POLICY)
+        one = chi_square_residuals(facts(), np.ones(3, bool), np.full((1, 3), np.nan), POLICY)
         assert np.isnan(one.p_value).all()
 
     @given(st.lists(st.integers(0, 10_000), min_size=1, max_size=6), st.integers(0, 1000))
@@ -101,15 +106,17 @@ class TestResidualsOf:
         policy = random_policy(seed)
         parts = [group_facts(*random_views(seed)) for seed in seeds]
 
-        def residuals_at_ball(of: Facts) -> Residuals:
-            judgement = judge(of, policy, MeanCovariance(of))
-            return residuals_of(of, views_of(of, judgement.valid), judgement.point, policy)
+        def residuals_at_ball(of: Facts) -> ChiSquareResiduals:
+            judgement = judge_groups(of, policy, MeanCovariance(of))
+            return chi_square_residuals(
+                of, views_in_pairs(of, judgement.valid), judgement.point, policy
+            )
 
         together, alone = (
-            residuals_at_ball(join(parts)),
+            residuals_at_ball(join_facts(parts)),
             [residuals_at_ball(part) for part in parts],
         )
-        for item in fields(Residuals):
+        for item in fields(ChiSquareResiduals):
             pieces = np.concatenate([getattr(one, item.name) for one in alone])
             assert np.array_equal(getattr(together, item.name), pieces, equal_nan=True), item.name
 
@@ -157,7 +164,10 @@ class TestGivenCameras:
         unknown_pan = np.diag([0.0, *[1e-6] * 7])
         one = Calibration("given", MAIN, covariance=tuple(unknown_pan.ravel().tolist()))
         none = replace(one, covariance=(0.0,) * 64)
-        assert (one.is_bare, none.is_bare) == (False, True)
+        assert (one.is_given_without_uncertainty, none.is_given_without_uncertainty) == (
+            False,
+            True,
+        )
         of = group_facts(views("abc"), [one, none, replace(one, covariance=None)])
         assert of.view_bare.tolist() == [False, True, True]
 
@@ -178,7 +188,7 @@ class TestWideningOf:
         self, chi_square: float, freedom: int, p_value: float, times: float
     ) -> None:
         numbers = (np.array([number]) for number in (chi_square, freedom, p_value))
-        assert widening_of(*numbers) == pytest.approx([times], abs=1e-3)
+        assert sigma_widening(*numbers) == pytest.approx([times], abs=1e-3)
 
     def test_the_sigma_of_a_contradicted_ball_is_wider_and_its_point_stays(self) -> None:
         calm = solve(group(*views("ab")), POLICY)
@@ -207,13 +217,13 @@ class TestResidualsWithout:
     @settings(max_examples=25, deadline=None)
     def test_each_row_has_the_residuals_of_the_other_views_bit_by_bit(self, seed, policy_seed):
         of, policy = group_facts(*random_views(seed)), random_policy(policy_seed)
-        judgement = judge(of, policy, MeanCovariance(of))
-        used = views_of(of, judgement.valid)
-        rows = residuals_without(of, used, judgement.point, policy)
+        judgement = judge_groups(of, policy, MeanCovariance(of))
+        used = views_in_pairs(of, judgement.valid)
+        rows = chi_square_residuals_without_each_view(of, used, judgement.point, policy)
         assert len(rows.chi_square) == used.sum()
         for row, place in enumerate(np.flatnonzero(used)):
             others = used & (np.arange(len(used)) != place)
-            alone = residuals_of(of, others, judgement.point, policy)
-            for item in fields(Residuals):
+            alone = chi_square_residuals(of, others, judgement.point, policy)
+            for item in fields(ChiSquareResiduals):
                 one, other = getattr(rows, item.name)[row], getattr(alone, item.name)[0]
                 assert np.array_equal(one, other, equal_nan=True), item.name

@@ -18,11 +18,11 @@ from app.solving.contradiction import (
     TYPICAL_SPEED,
     Contradiction,
     chi_square_of,
-    contradiction,
+    find_contradiction,
 )
 from app.solving.facts import facts_of
-from app.solving.judgement import judge
-from app.solving.triangulate import ball_observations, meet
+from app.solving.judgement import judge_groups
+from app.solving.triangulate import ball_observations, triangulate_observation_pairs
 from tests.balls import seen
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
@@ -43,10 +43,10 @@ def torn(
         views.append(replace(given_view(key, CAMERAS[key], ball), balls=(point,)))
     calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in keys]
     sights = ball_observations(views, calibrations)
-    facts = facts_of(views, calibrations, meet(combinations(sights, 2)))
-    judgement = judge(facts, policy, MeanCovariance(facts))
+    facts = facts_of(views, calibrations, triangulate_observation_pairs(combinations(sights, 2)))
+    judgement = judge_groups(facts, policy, MeanCovariance(facts))
     chi_square = chi_square_of(keys, facts, judgement, policy)
-    return chi_square, contradiction(chi_square, keys, facts, judgement, sights, policy)
+    return chi_square, find_contradiction(chi_square, keys, facts, judgement, sights, policy)
 
 
 WIDE = replace(PAPER, tau_percent=5.0)

@@ -12,7 +12,7 @@ from app.geometry.triangulation import triangulate_pairs
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.solution import Calibration, MarkingFit
-from app.solving.facts import COLUMNS, NOTHING, STEP_PX, Facts, group_facts, join
+from app.solving.facts import COLUMNS, NOTHING, STEP_PX, Facts, group_facts, join_facts
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
@@ -103,7 +103,7 @@ class TestJoin:
     @settings(max_examples=25, deadline=None)
     def test_each_group_comes_back_alone(self, seeds):
         parts = random_facts(seeds)
-        whole = join(parts)
+        whole = join_facts(parts)
         assert whole.groups == len(parts)
         for place, part in enumerate(parts):
             assert same(whole.only(np.arange(len(parts)) == place), part)
@@ -112,10 +112,12 @@ class TestJoin:
     @settings(max_examples=15, deadline=None)
     def test_the_order_of_joining_does_not_matter(self, seeds, first):
         parts = random_facts(seeds)
-        assert same(join([join([NOTHING, *parts[:first]]), *parts[first:]]), join(parts))
+        assert same(
+            join_facts([join_facts([NOTHING, *parts[:first]]), *parts[first:]]), join_facts(parts)
+        )
 
     def test_selecting_every_group_gives_the_facts_unchanged(self):
-        whole = join(random_facts([1, 2, 3]))
+        whole = join_facts(random_facts([1, 2, 3]))
         assert same(whole.only(np.ones(3, bool)), whole)
         assert same(whole.only(np.zeros(3, bool)), NOTHING)
 
@@ -139,7 +141,7 @@ class TestPart:
     def test_rows_of_a_column_are_those_of_all_of_it_read_before_or_not(self) -> None:
         parts = [group_facts(*random_views(seed)) for seed in range(12)]
         kept = np.arange(12) % 3 != 1
-        part, whole = join(parts).part(kept), join(parts).only(kept)
+        part, whole = join_facts(parts).part(kept), join_facts(parts).only(kept)
         for name in ("view_covariance", "pair_moved", "pair_point", "view_known"):
             rows = np.arange(len(getattr(whole, name)))[::-2]
             told = [part.rows(name, rows), getattr(part, name)[rows], part.rows(name, rows)]

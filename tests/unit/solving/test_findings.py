@@ -12,8 +12,8 @@ from app.soccer.frames import Box
 from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BallFit, Calibration, ChiSquare, Pair, ViewSolution
 from app.solving.contradiction import Contradiction
-from app.solving.findings import _BY_WEIGHT, _sides_swapped, find
-from app.solving.sides import Swap
+from app.solving.findings import _BY_WEIGHT, _sides_swapped_finding, find_group_findings
+from app.solving.sides import SwappedView
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
 
@@ -44,7 +44,7 @@ def off(key: str, error_px: float | None) -> ViewSolution:
 
 def found(of, *, pairs=(), ball=GOOD, views=None, policy=PAPER, torn=None) -> tuple[Finding, ...]:
     views = views or [solved(view.key) for view in of.views]
-    return find(of, views, [], pairs, ball, policy, torn)
+    return find_group_findings(of, views, [], pairs, ball, policy, torn)
 
 
 class TestFind:
@@ -52,7 +52,7 @@ class TestFind:
         assert found(made("abc"), pairs=(pair("a", "b", 1.0, 2.0),)) == ()
 
     def test_a_group_without_views_has_none(self) -> None:
-        assert find(group(), (), (), (), None, PAPER) == ()
+        assert find_group_findings(group(), (), (), (), None, PAPER) == ()
 
     @given(st.floats(0, 10), st.floats(0, 3), st.floats(-60, 2), st.floats(0.2, 4), st.booleans())
     def test_what_explains_most_comes_first(self, angle, sigma, z, ratio, several) -> None:
@@ -277,14 +277,16 @@ class TestOfTheBall:
 
 class TestSidesSwapped:
     def test_without_an_error_as_labelled_there_is_no_number(self) -> None:
-        finding = _sides_swapped(Swap("7_1.png", None, 2.0, 1.0))
+        finding = _sides_swapped_finding(SwappedView("7_1.png", None, 2.0, 1.0))
         assert (finding.number, finding.threshold, finding.confidence) == (None, 2.0, 1.0)
         assert "within 2.0 px" in finding.sentence
 
     def test_the_error_as_labelled_is_the_number_of_the_finding(self) -> None:
-        assert _sides_swapped(Swap("7_1.png", 80.0, 2.0, 0.9)).number == pytest.approx(80.0)
+        assert _sides_swapped_finding(
+            SwappedView("7_1.png", 80.0, 2.0, 0.9)
+        ).number == pytest.approx(80.0)
 
     def test_a_main_camera_on_the_far_side_has_no_numbers_and_says_where_it_stands(self) -> None:
-        finding = _sides_swapped(Swap("7.png", None, None, 0.9))
+        finding = _sides_swapped_finding(SwappedView("7.png", None, None, 0.9))
         assert (finding.number, finding.threshold) == (None, None)
         assert "far side" in finding.sentence

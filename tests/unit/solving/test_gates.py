@@ -10,7 +10,7 @@ import pytest
 
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES, Ball3D, Calibration, ChiSquare, Gate, PaintFit, Pair
-from app.solving.gates import JudgedView, chance, describe
+from app.solving.gates import JudgedView, describe_gates, odds_text
 from app.solving.judgement import Judgement
 from tests.cameras import looking
 
@@ -64,7 +64,7 @@ def gates(
         parallax=nothing,
         distance=nothing,
     )
-    found = describe(views, left_out, pairs, ball, judgement, policy, chi_square)
+    found = describe_gates(views, left_out, pairs, ball, judgement, policy, chi_square)
     unasked = () if policy.min_agreement is not None else ("agreement",)
     assert tuple(gate.name for gate in found) == tuple(n for n in GATES if n not in unasked)
     return {gate.name: gate for gate in found}
@@ -415,4 +415,4 @@ class TestChiSquare:
         ],
     )
     def test_chance_is_said_for_people(self, p_value, words):
-        assert chance(p_value) == words
+        assert odds_text(p_value) == words

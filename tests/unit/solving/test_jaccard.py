@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import MARKINGS, Pitch, twin_marking
+from app.soccer.pitch import MARKINGS, Pitch, opposite_marking
 from app.solving.jaccard import (
     ProjectedMarking,
-    _samples,
+    _sample_markings,
     camera_jaccard,
     jaccard,
+    marking_outcomes,
     measure_markings,
-    outcomes,
     project_markings,
 )
 from tests.cameras import SIZE
@@ -41,7 +41,7 @@ class TestProjectMarkings:
 class TestOutcomes:
     def outcomes(self, lines, gamma=2.0):
         measured = measure_markings(project_markings(ABOVE, PITCH, SMALL), make_lines(lines))
-        return outcomes(measured, make_lines(lines), gamma)
+        return marking_outcomes(measured, make_lines(lines), gamma)
 
     def test_one_far_point_makes_the_whole_marking_a_false_positive(self):
         near, far = [(100.5, 20.0), (101.0, 150.0)], [(100.5, 20.0), (102.0, 150.0)]
@@ -74,7 +74,7 @@ class TestCameraJaccard:
         assert camera_jaccard(MAIN, click(MAIN), PITCH, SIZE, (GAMMA,))[0] > 0.9
 
     def test_turned_labels_count_only_in_benchmark_mode(self):
-        turned = make_lines({twin_marking(name): at for name, at in click(MAIN).items()})
+        turned = make_lines({opposite_marking(name): at for name, at in click(MAIN).items()})
         plain = camera_jaccard(MAIN, turned, PITCH, SIZE, (GAMMA,))
         benchmark = camera_jaccard(MAIN, turned, PITCH, SIZE, (GAMMA,), symmetric=True)
         assert plain[0] < 0.1
@@ -109,13 +109,15 @@ class TestOutcomesOfMeasured:
 
     def test_a_point_at_gamma_is_not_close(self):
         lines = make_lines({"Middle line": [(0.0, 0.0)]})
-        assert outcomes({"Middle line": self.NEAR}, lines, 2.0) == {"Middle line": "fp"}
-        assert outcomes({"Middle line": self.NEAR}, lines, 2.001) == {"Middle line": "tp"}
+        assert marking_outcomes({"Middle line": self.NEAR}, lines, 2.0) == {"Middle line": "fp"}
+        assert marking_outcomes({"Middle line": self.NEAR}, lines, 2.001) == {"Middle line": "tp"}
 
     def test_an_empty_annotation_is_none(self):
         bare = ProjectedMarking(np.zeros((2, 2)), np.empty(0), np.empty((0, 2)))
-        assert outcomes({"Middle line": bare}, {"Middle line": ()}, 2.0) == {"Middle line": "fp"}
-        assert outcomes({}, {"Middle line": ()}, 2.0) == {}
+        assert marking_outcomes({"Middle line": bare}, {"Middle line": ()}, 2.0) == {
+            "Middle line": "fp"
+        }
+        assert marking_outcomes({}, {"Middle line": ()}, 2.0) == {}
 
 
 class TestJaccard:
@@ -142,7 +144,7 @@ class TestLaws:
 
     def test_in_benchmark_mode_each_gamma_takes_its_own_better_labels(self):
         lines = {**click(MAIN, 1.0, 3), "Side line left": ((5.0, 5.0),)}
-        turned = make_lines({twin_marking(name): at for name, at in lines.items()})
+        turned = make_lines({opposite_marking(name): at for name, at in lines.items()})
         gammas = (1.0, 4.0, 16.0)
         plain = camera_jaccard(MAIN, lines, PITCH, SIZE, gammas)
         other = camera_jaccard(MAIN, turned, PITCH, SIZE, gammas)
@@ -153,7 +155,7 @@ class TestLaws:
 
 class TestSampling:
     def test_lines_are_sampled_at_ninety_centimetres_and_circles_at_twenty(self):
-        samples, limits = _samples(PITCH)
+        samples, limits = _sample_markings(PITCH)
         parts = {marking: samples[first:last] for marking, first, last in limits}
         assert tuple(parts) == MARKINGS
         assert limits[0][1] == 0

@@ -13,21 +13,21 @@ from hypothesis import strategies as st
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.facts import Facts, group_facts, join
+from app.solving.facts import Facts, group_facts, join_facts
 from app.solving.judgement import (
     PASSES,
     Judgement,
-    compare_again,
-    failures,
-    judge,
-    judge_standing,
+    first_failed_gates,
+    judge_groups,
+    judge_known_failures,
+    recompare_thresholds,
     view_jac,
 )
 from tests.unit.solving.random_groups import random_policy, random_views
 
 
 def judged(facts: Facts, policy: Policy = PAPER) -> Judgement:
-    return judge(facts, policy, MeanCovariance(facts))
+    return judge_groups(facts, policy, MeanCovariance(facts))
 
 
 def facts(views: int = 2, **changes: object) -> Facts:
@@ -108,7 +108,10 @@ class TestJudge:
     def test_a_table_is_judged_as_each_of_its_groups_alone_bit_by_bit(self, seeds, seed):
         policy = random_policy(seed)
         parts = [group_facts(*random_views(seed)) for seed in seeds]
-        together, alone = judged(join(parts), policy), [judged(part, policy) for part in parts]
+        together, alone = (
+            judged(join_facts(parts), policy),
+            [judged(part, policy) for part in parts],
+        )
         for item in fields(Judgement):
             axis = 1 if item.name == "failed" else 0
             pieces = np.concatenate([getattr(one, item.name) for one in alone], axis=axis)
@@ -118,10 +121,10 @@ class TestJudge:
     @settings(max_examples=40, deadline=None)
     def test_where_only_the_first_gate_matters_the_first_is_the_same(self, seeds, seed):
         policy = random_policy(seed)
-        found = join([group_facts(*random_views(seed)) for seed in seeds])
+        found = join_facts([group_facts(*random_views(seed)) for seed in seeds])
         jac = view_jac(found, policy.jac_gamma_percent)
-        standing, uncertainty = failures(found, jac, policy), MeanCovariance(found)
-        told = judge_standing(found, policy, uncertainty, jac, standing, first_alone=True)
+        standing, uncertainty = first_failed_gates(found, jac, policy), MeanCovariance(found)
+        told = judge_known_failures(found, policy, uncertainty, jac, standing, first_alone=True)
         assert told.first.tolist() == judged(found, policy).first.tolist()
 
     def test_a_view_that_does_not_count_has_no_part_in_sigma_and_residuals(self):
@@ -144,7 +147,7 @@ class TestJudge:
 
     @pytest.mark.parametrize("threshold", STRICTER)
     def test_each_stricter_threshold_stops_some_and_lets_nothing_more_through(self, threshold):
-        whole, stopped = join([group_facts(*random_views(seed)) for seed in range(150)]), 0
+        whole, stopped = join_facts([group_facts(*random_views(seed)) for seed in range(150)]), 0
         for seed in range(12):
             policy = random_policy(seed)
             stricter = STRICTER[threshold](getattr(policy, threshold))
@@ -157,7 +160,7 @@ class TestJudge:
         assert stopped
 
     def test_random_groups_and_policies_reach_every_gate(self):
-        whole = join([group_facts(*random_views(seed)) for seed in range(150)])
+        whole = join_facts([group_facts(*random_views(seed)) for seed in range(150)])
         first = np.concatenate([judged(whole, random_policy(seed)).first for seed in range(12)])
         assert set(first.tolist()) == set(range(PASSES + 1))
 
@@ -357,7 +360,7 @@ class TestViewJac:
         assert view_jac(bare, 0.5).tolist() == [0.0, 0.0]
 
 
-FOUR = join([facts()] * 4)
+FOUR = join_facts([facts()] * 4)
 EVERYTHING_ASKED = replace(
     PAPER, min_baseline_m=14.0, min_parallax_degrees=90.0, max_sigma_m=0.5, min_p_value=0.05
 )
@@ -378,7 +381,7 @@ class TestCompareAgain:
     p_value = np.array([0.05, 0.0499, np.inf, 0.0])
 
     def test_a_threshold_that_is_attained_is_met_and_what_is_not_known_meets_none(self, known):
-        failed = compare_again(known, EVERYTHING_ASKED, self.sigma, self.p_value)
+        failed = recompare_thresholds(known, EVERYTHING_ASKED, self.sigma, self.p_value)
         for gate in ("baseline", "parallax", "sigma"):
             assert failed[GATES.index(gate)].tolist() == [False, True, True, True], gate
         # A group that cannot be tested is not held against its pictures.
@@ -388,18 +391,18 @@ class TestCompareAgain:
         asked = replace(
             EVERYTHING_ASKED, min_parallax_degrees=None, max_sigma_m=None, min_p_value=None
         )
-        failed = compare_again(known, asked, self.sigma, self.p_value)
+        failed = recompare_thresholds(known, asked, self.sigma, self.p_value)
         assert not failed[GATES.index("parallax") :].any()
         assert failed[GATES.index("baseline")].tolist() == [False, True, True, True]
 
     def test_what_is_asked_for_and_not_measured_is_no_silent_pass(self, known):
         with pytest.raises(AssertionError):
-            compare_again(known, EVERYTHING_ASKED, None, self.p_value)
+            recompare_thresholds(known, EVERYTHING_ASKED, None, self.p_value)
         with pytest.raises(AssertionError):
-            compare_again(known, EVERYTHING_ASKED, self.sigma, None)
+            recompare_thresholds(known, EVERYTHING_ASKED, self.sigma, None)
 
     def test_gates_of_views_and_pairs_stay_and_the_verdict_that_is_known_stays_whole(self, known):
-        failed = compare_again(known, EVERYTHING_ASKED, self.sigma, self.p_value)
+        failed = recompare_thresholds(known, EVERYTHING_ASKED, self.sigma, self.p_value)
         for gate in ("calibratable", "jac", "agreement", "two_views", "ball", "reprojection"):
             assert failed[GATES.index(gate)].all(), gate
         assert known.failed.all()

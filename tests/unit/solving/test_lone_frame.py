@@ -15,7 +15,13 @@ from app.soccer.group import Group, Station, View
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE, CalibrationPolicy
-from app.solving.calibrate import as_lone, calibrate, calibrate_view, look_alone, view_keys
+from app.solving.calibrate import (
+    calibrate,
+    calibrate_view,
+    lone_frame_of,
+    view_keys,
+    with_lone_covariance,
+)
 from app.solving.calibration_findings import lone_findings
 from app.solving.lone_frame import PRIORS, LoneFrame
 from tests.cameras import SIZE, looking
@@ -32,7 +38,7 @@ INSIDE = float(chi2.ppf(0.95, 3))
 def alone(lines: Lines, policy: CalibrationPolicy = ANY) -> tuple[Camera, FloatArray, LoneFrame]:
     """The camera, its covariance by the clicks, and what nobody says of the frame."""
     found = calibrate(lines, PITCH, SIZE, policy)
-    lone = look_alone(found, lines, PITCH, SIZE, policy)
+    lone = lone_frame_of(found, lines, PITCH, SIZE, policy)
     assert found.camera is not None and found.covariance is not None and lone is not None
     return found.camera, np.reshape(found.covariance, (8, 8)), lone
 
@@ -80,7 +86,7 @@ class TestLoneFrame:
 
     @pytest.mark.parametrize("aspect", [4 / 3, 3 / 4])
     def test_in_a_stretched_picture_the_truth_is_within_reach(self, aspect: float) -> None:
-        squeezed = PictureGeometry(aspect).done(WIDE, SIZE)
+        squeezed = PictureGeometry(aspect).camera_of_shown_picture(WIDE, SIZE)
         told = [alone(click(squeezed, 1.0, seed)) for seed in range(10)]
         assert sum(off_by(camera, WIDE, clicked) < INSIDE for camera, clicked, _ in told) == 0
         assert sum(off_by(camera, WIDE, lone.covariance) < INSIDE for camera, _, lone in told) >= 8
@@ -90,7 +96,7 @@ class TestLoneFrame:
         lines = click(camera, 1.0, 3, Pitch(95.0, 68.0))
         found = calibrate(lines, PITCH, SIZE, ANY)
         assert found.suspects
-        lone = look_alone(found, lines, PITCH, SIZE, ANY)
+        lone = lone_frame_of(found, lines, PITCH, SIZE, ANY)
         assert lone is not None
         assert set(lone.explains) == {suspect.marking for suspect in found.suspects}
         assert lone.pitch.length == pytest.approx(95.0, abs=1.0)
@@ -101,14 +107,14 @@ class TestLoneFrame:
     def test_where_both_are_known_nothing_is_added(self) -> None:
         lines = click(WIDE, 1.0)
         found = calibrate(lines, PITCH, SIZE, PAPER.calibration)
-        assert look_alone(found, lines, PITCH, SIZE, PAPER.calibration) is None
-        assert as_lone(found, None) is found
+        assert lone_frame_of(found, lines, PITCH, SIZE, PAPER.calibration) is None
+        assert with_lone_covariance(found, None) is found
         assert PAPER.calibration.lone_frames == STRICT.calibration.lone_frames == "exact"
 
     def test_the_camera_itself_stays(self) -> None:
         lines = click(WIDE, 1.0, 3, Pitch(98.0, 64.0))
         found = calibrate(lines, PITCH, SIZE, ANY)
-        told = as_lone(found, look_alone(found, lines, PITCH, SIZE, ANY))
+        told = with_lone_covariance(found, lone_frame_of(found, lines, PITCH, SIZE, ANY))
         assert told == replace(found, covariance=told.covariance)
         assert told.covariance != found.covariance
 

@@ -27,7 +27,7 @@ def frames(picture, count=6, noise_px=0.8):
         for index in range(count)
     ]
     return [
-        PictureFrame(click(picture.done(camera, SIZE), noise_px, seed), SIZE)
+        PictureFrame(click(picture.camera_of_shown_picture(camera, SIZE), noise_px, seed), SIZE)
         for seed, camera in enumerate(cameras)
     ]
 

@@ -4,7 +4,7 @@ import pytest
 from app.soccer.annotation import make_lines
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_near
-from app.solving.main_position import PositionPrior, match_prior
+from app.solving.main_position import PositionPrior, position_prior_of_match
 from app.solving.match_model import FramePlace
 from app.solving.match_position import NO_PLACES, Places, place_of, share_position
 from tests.cameras import SIZE, looking
@@ -132,7 +132,7 @@ class TestSharePosition:
         apart = []
         for prior in (
             PositionPrior(near, np.full(3, 0.2), 4.0),
-            match_prior(near, np.full(3, 0.2)),
+            position_prior_of_match(near, np.full(3, 0.2)),
         ):
             found = calibrate_near(alone, prior, lines, PITCH, SIZE, POLICY)
             apart.append(np.linalg.norm(found.camera.position - near))

@@ -10,9 +10,9 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Ball3D, BestBall, Calibration
 from app.solving.ball_covariance import MeanCovariance
 from app.solving.facts import facts_of
-from app.solving.judgement import judge
-from app.solving.mean_ball import judged_pairs, leaving_ball, mean_ball
-from app.solving.triangulate import ball_observations, meet
+from app.solving.judgement import judge_groups
+from app.solving.mean_ball import exported_ball, judged_pairs, mean_ball
+from app.solving.triangulate import ball_observations, triangulate_observation_pairs
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 from tests.unit.solving.test_solve import shifted
 
@@ -28,10 +28,12 @@ def solved(*shifts: float, policy=PAPER):
         for key, camera, shift in zip(KEYS, cameras, shifts, strict=True)
     ]
     calibrations = [Calibration("given", camera) for camera in cameras]
-    meetings = meet(combinations(ball_observations(views, calibrations), 2))
+    meetings = triangulate_observation_pairs(
+        combinations(ball_observations(views, calibrations), 2)
+    )
     facts = facts_of(views, calibrations, meetings)
     spread = MeanCovariance(facts)
-    judgement = judge(facts, policy, spread)
+    judgement = judge_groups(facts, policy, spread)
     return judged_pairs(meetings, judgement), mean_ball(KEYS, facts, judgement, spread, policy)
 
 
@@ -75,10 +77,10 @@ class TestLeavingBall:
     POLICY = replace(PAPER, point="best")
 
     def test_the_mean_leaves_unless_the_policy_asks_for_the_most_likely_point(self):
-        assert leaving_ball(self.MEAN, self.BEST, PAPER) is self.MEAN
-        found = leaving_ball(self.MEAN, self.BEST, self.POLICY)
+        assert exported_ball(self.MEAN, self.BEST, PAPER) is self.MEAN
+        found = exported_ball(self.MEAN, self.BEST, self.POLICY)
         assert found == Ball3D((1.1, 2.0, -0.4), (0.5,) * 9, 0.2, 20.0, ("a", "b"))
 
     def test_without_a_valid_pair_none_leaves_and_without_a_best_one_the_mean_does(self):
-        assert leaving_ball(None, self.BEST, self.POLICY) is None
-        assert leaving_ball(self.MEAN, None, self.POLICY) is self.MEAN
+        assert exported_ball(None, self.BEST, self.POLICY) is None
+        assert exported_ball(self.MEAN, None, self.POLICY) is self.MEAN

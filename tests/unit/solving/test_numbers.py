@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.solving.numbers import degrees, metres, percent, pixels
+from app.solving.numbers import format_degrees, format_metres, format_percent, format_pixels
 
 
 class TestNumbers:
@@ -22,10 +22,10 @@ class TestNumbers:
         ],
     )
     def test_pixels_need_four_characters(self, value: float, shown: str) -> None:
-        assert pixels(value) == shown
+        assert format_pixels(value) == shown
 
     def test_per_cent_need_four_characters(self) -> None:
-        assert [percent(value) for value in (0.057, 9.994, 16.42, 113.2)] == [
+        assert [format_percent(value) for value in (0.057, 9.994, 16.42, 113.2)] == [
             "0.06",
             "9.99",
             "16.4",
@@ -33,4 +33,8 @@ class TestNumbers:
         ]
 
     def test_metres_and_degrees_have_one_rounding_each(self) -> None:
-        assert (metres(0.067), metres(64.6), degrees(44.46)) == ("0.07 m", "64.60 m", "44.5°")
+        assert (format_metres(0.067), format_metres(64.6), format_degrees(44.46)) == (
+            "0.07 m",
+            "64.60 m",
+            "44.5°",
+        )

@@ -9,7 +9,7 @@ from app.soccer.group import Station
 from app.soccer.picture import OPEN, PictureGeometry
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_picture, calibrate_station, calibration_key
-from app.solving.observations import observe
+from app.solving.observations import observations_of_lines
 from app.solving.picture_camera import PictureProblem, estimate_picture, warp_of
 from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
@@ -22,12 +22,12 @@ BOTH = PictureGeometry(1.1, (-0.2, 0.1))
 
 
 def shown(picture, camera=BEHIND_GOAL, noise_px=0.0, seed=0):
-    return click(picture.done(camera, SIZE), noise_px, seed)
+    return click(picture.camera_of_shown_picture(camera, SIZE), noise_px, seed)
 
 
 def fitted(picture, lines):
     problem = ResectionProblem.of(SIZE, POLICY)
-    return PictureProblem.of(problem, observe(lines, PITCH, SIZE), picture)
+    return PictureProblem.of(problem, observations_of_lines(lines, PITCH, SIZE), picture)
 
 
 class TestRows:
@@ -56,7 +56,9 @@ class TestEstimatePicture:
     @pytest.mark.parametrize("truth", [STRETCHED, CROPPED, BOTH])
     def test_the_lines_of_one_view_say_what_was_done(self, truth):
         problem = ResectionProblem.of(SIZE, POLICY)
-        found = estimate_picture(problem, observe(shown(truth, noise_px=0.3), PITCH, SIZE), OPEN)
+        found = estimate_picture(
+            problem, observations_of_lines(shown(truth, noise_px=0.3), PITCH, SIZE), OPEN
+        )
         off = np.abs(warp_of(found) - warp_of(truth))
         assert (off < 4 * np.array(found.sigma)).all()
         assert off.max() < 0.05
@@ -64,7 +66,10 @@ class TestEstimatePicture:
     def test_what_is_known_is_not_asked_again(self):
         problem = ResectionProblem.of(SIZE, POLICY)
         known = replace(STRETCHED, sigma=(0.004, 0.02, 0.02))
-        assert estimate_picture(problem, observe(shown(BOTH), PITCH, SIZE), known) is known
+        assert (
+            estimate_picture(problem, observations_of_lines(shown(BOTH), PITCH, SIZE), known)
+            is known
+        )
 
 
 class TestCalibratePicture:

@@ -9,7 +9,7 @@ from app.soccer.group import Group
 from app.soccer.policy import PAPER, STRICT, Policy
 from app.soccer.solution import Solution
 from app.solving.facts import Facts
-from app.solving.rethreshold import differs_in_smaller_tau, rethreshold, unchanged_under
+from app.solving.rethreshold import differs_in_smaller_tau, has_unchanged_pairs, rethreshold
 from app.solving.solve import solve, solve_with_facts
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group, view
@@ -44,7 +44,7 @@ def again(found: Group, before: Policy, policy: Policy) -> tuple[Solution | None
     """Retold under a policy, and solved."""
     then, facts = solve_with_facts(found, before, {})
     now = solve(found, policy)
-    if not unchanged_under(facts, before, policy)[0]:
+    if not has_unchanged_pairs(facts, before, policy)[0]:
         return None, now
     return rethreshold(then, facts.view_diagonal.tolist(), policy), now
 
@@ -61,8 +61,8 @@ class TestUndecided:
     def test_a_pair_between_the_two_taus_is_decided_anew(self):
         facts: Facts = solve_with_facts(apart(0.0, 0.8 * TAU_PX), PAPER, {})[1]
         error = facts.pair_errors.max() / SIZE.diagonal * 100
-        assert not unchanged_under(facts, PAPER, with_tau(0.99 * error))[0]
-        assert unchanged_under(facts, PAPER, with_tau(1.01 * error))[0]
+        assert not has_unchanged_pairs(facts, PAPER, with_tau(0.99 * error))[0]
+        assert has_unchanged_pairs(facts, PAPER, with_tau(1.01 * error))[0]
 
 
 class TestRetold:

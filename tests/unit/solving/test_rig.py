@@ -8,7 +8,7 @@ from app.geometry.resection import parameters_from_camera, projection_jacobians
 from app.soccer.frames import ImagePoint
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
-from app.solving.rig import RigCamera, RigFrame, adjust, grass_in_view, make_rig
+from app.solving.rig import RigCamera, RigFrame, adjust_rig, grass_in_view, make_rig
 from tests.cameras import EVERY_COEFFICIENT, SIZE, wide
 from tests.rigs import TRUTH, cameras, frames
 
@@ -42,7 +42,7 @@ def rig():
 
 @pytest.fixture(scope="module")
 def fit(rig):
-    return adjust(rig)
+    return adjust_rig(rig)
 
 
 class TestMakeRig:
@@ -102,17 +102,19 @@ class TestAdjust:
 
     def test_without_lines_where_the_pitch_lies_rests_on_the_cameras_in_use(self):
         bare = rig_of(lines=False)
-        fitted = adjust(bare)
+        fitted = adjust_rig(bare)
         assert gaps(bare, fitted.parameters) < 0.7
         assert max(off_px(bare, fitted.parameters)) < 10.0
         # Balls cannot turn the whole rig back; the covariance knows.
-        assert np.trace(fitted.covariance_of(0)) > 2 * np.trace(adjust(rig_of()).covariance_of(0))
+        assert np.trace(fitted.covariance_of(0)) > 2 * np.trace(
+            adjust_rig(rig_of()).covariance_of(0)
+        )
 
     def test_what_is_said_of_the_error_holds(self):
         shares = []
         for seed in range(2):
             rig = rig_of(seed)
-            fit = adjust(rig)
+            fit = adjust_rig(rig)
             for row, camera in enumerate(rig.cameras):
                 grass = grass_in_view(camera)[::7]
                 rows = np.repeat(TRUE[row][None], len(grass), axis=0)
@@ -126,4 +128,4 @@ class TestAdjust:
     def test_noisier_balls_get_a_larger_sigma(self):
         noisy = make_rig(cameras(), frames(noise_px=3.0), PITCH, PAPER)[0]
         # The policy's 1 px holds at 1920 x 1080, and this picture is two thirds of it.
-        assert adjust(noisy).ball_sigma == pytest.approx(4.5, rel=0.15)
+        assert adjust_rig(noisy).ball_sigma == pytest.approx(4.5, rel=0.15)

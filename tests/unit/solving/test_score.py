@@ -1,6 +1,6 @@
 import pytest
 
-from app.solving.score import FrameScore, score, score_frame
+from app.solving.score import FrameScore, score_frame, score_frames
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN, PITCH, click
 
@@ -8,17 +8,17 @@ from tests.unit.solving.conftest import MAIN, PITCH, click
 class TestScore:
     def test_a_frame_without_a_camera_counts_as_zero(self):
         good = FrameScore((1.0, 1.0, 1.0), 0.9, (1.0, 3.0))
-        total = score([good, None])
+        total = score_frames([good, None])
         assert (total.frames, total.calibrated, total.completeness) == (2, 1, 0.5)
         assert total.jac == (0.5, 0.5, 0.5)
         assert (total.share, total.challenge) == (0.5, 0.45)
         assert total.error_median_px == 2.0
 
     def test_three_quarters_is_not_above_three_quarters(self):
-        assert score([FrameScore((0.75, 1.0, 1.0), 1.0, ())]).share == 0.0
+        assert score_frames([FrameScore((0.75, 1.0, 1.0), 1.0, ())]).share == 0.0
 
     def test_without_frames_every_score_is_zero(self):
-        total = score([])
+        total = score_frames([])
         assert (total.completeness, total.share, total.error_median_px) == (0.0, 0.0, None)
 
 

@@ -11,7 +11,7 @@ from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.sides import Swap, find_swaps, turned_camera
+from app.solving.sides import SwappedView, find_swaps, turned_camera
 from app.solving.triangulate import BallObservation
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH
@@ -34,7 +34,7 @@ TURNED = sight("b", BEHIND_GOAL, labelled=turned_camera(BEHIND_GOAL))
 
 def swaps(
     *sights: BallObservation, first: BallObservation | None = A, **changes: float
-) -> tuple[Swap, ...]:
+) -> tuple[SwappedView, ...]:
     return find_swaps(first, sights, PITCH, replace(PAPER, **changes))
 
 
@@ -102,7 +102,7 @@ class TestFindSwaps:
         wrong = sight("a", MAIN, labelled=turned_camera(MAIN))
         others = (wrong, TURNED)
         found = swaps(*(others[place] for place in usable), first=wrong)
-        assert found == (Swap("a", None, None, 0.9),)
+        assert found == (SwappedView("a", None, None, 0.9),)
 
     def test_a_given_main_camera_may_stand_where_it_likes(self):
         far = sight("a", turned_camera(MAIN), source="given")

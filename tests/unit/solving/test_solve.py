@@ -8,7 +8,7 @@ from app.geometry.sphere import tight_box
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Station, View
-from app.soccer.pitch import Pitch, twin_marking
+from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, MarkingFit, Suspect
 from app.solving.calibrate import calibrate_station
@@ -340,7 +340,7 @@ class TestFindings:
 class TestSidesSwapped:
     def test_a_replay_labelled_for_the_other_side_is_found_by_its_ball(self, clean):
         replay = clean.views[1]
-        lines = {twin_marking(name): points for name, points in replay.station.lines.items()}
+        lines = {opposite_marking(name): points for name, points in replay.station.lines.items()}
         turned = replace(replay, station=replace(replay.station, lines=make_lines(lines)))
         found = solve(group(clean.views[0], turned, clean.views[2]), PAPER).findings
         assert [(item.kind, item.view, item.fix.action) for item in found] == [
@@ -350,7 +350,7 @@ class TestSidesSwapped:
 
     def test_a_main_camera_on_the_far_side_is_the_one_that_is_swapped(self, clean):
         main = clean.views[0]
-        lines = {twin_marking(name): points for name, points in main.station.lines.items()}
+        lines = {opposite_marking(name): points for name, points in main.station.lines.items()}
         turned = replace(main, station=replace(main.station, lines=make_lines(lines)))
         found = solve(group(turned, clean.views[1]), PAPER).findings
         assert [(item.kind, item.view) for item in found] == [("sides_swapped", "7.png")]
@@ -358,7 +358,7 @@ class TestSidesSwapped:
     def test_views_that_are_all_labelled_from_the_other_end_agree_and_are_still_wrong(self, clean):
         turned = []
         for one in clean.views[:2]:
-            lines = {twin_marking(name): points for name, points in one.station.lines.items()}
+            lines = {opposite_marking(name): points for name, points in one.station.lines.items()}
             turned.append(replace(one, station=replace(one.station, lines=make_lines(lines))))
         solution = solve(group(*turned), PAPER)
         assert solution.passes
@@ -369,7 +369,7 @@ class TestSidesSwapped:
     def test_a_pair_that_meets_far_from_any_pitch_clears_no_view(self, clean):
         # The rays of the view as labelled meet, but high in the air and far behind the stands.
         replay = clean.views[1]
-        lines = {twin_marking(name): points for name, points in replay.station.lines.items()}
+        lines = {opposite_marking(name): points for name, points in replay.station.lines.items()}
         turned = replace(replay, station=replace(replay.station, lines=make_lines(lines)))
         loose = replace(PAPER, tau_percent=100.0)
         solution = solve(group(clean.views[0], turned), loose)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from app.solving.ball_noise import Miss
+from app.solving.ball_noise import RayResidual
 from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
 
 TRUE = {"ann": 1.0, "bea": 1.0, "cleo": 3.0, "dora": 0.5}
 KNOWN = 0.2
-Seen = tuple[Miss, Mapping[str, Sequence[BallSource]]]
+Seen = tuple[RayResidual, Mapping[str, Sequence[BallSource]]]
 
 
 def person(name: str) -> BallSource:
@@ -40,7 +40,7 @@ def drawn(
         miss = rng.normal(0, np.sqrt(variance)) * (30 if rng.random() < mistakes else 1)
         by_view = (("left", part, 0.0, 0.0), ("right", 1 - part, 0.0, 0.0))
         of = {"left": [person(a)], "right": [person(b)]}
-        found.append((Miss(miss, 1.0, 0.0, 0.0, known, by_view), of))
+        found.append((RayResidual(miss, 1.0, 0.0, 0.0, known, by_view), of))
     return found
 
 
@@ -59,7 +59,7 @@ def filmed(seed: int, placed: Mapping[str, Sequence[str]], true: Mapping[str, fl
             view: [camera(at), person(who)]
             for view, at, who in zip(("left", "right"), cameras, people, strict=True)
         }
-        found.append((Miss(miss, 1.0, 0.0, 0.0, 0.0, by_view), of))
+        found.append((RayResidual(miss, 1.0, 0.0, 0.0, 0.0, by_view), of))
     return found
 
 
@@ -94,7 +94,10 @@ class TestEstimateSources:
         """Two people whose misses are normal without chance: the noise is theirs to a thousandth."""
         misses = 1.2 * ndtri((np.arange(3000) + 0.5) / 3000)
         seen: list[Seen] = [
-            (Miss(miss, 1.0, 0.0, 0.0, 0.0, (("left", 1.0, 0.0, 0.0),)), {"left": [person(name)]})
+            (
+                RayResidual(miss, 1.0, 0.0, 0.0, 0.0, (("left", 1.0, 0.0, 0.0),)),
+                {"left": [person(name)]},
+            )
             for name in ("ann", "bea")
             for miss in misses.tolist()
         ]
@@ -105,7 +108,9 @@ class TestEstimateSources:
         misses = ndtri((np.arange(1000) + 0.5) / 1000)
         seen: list[Seen] = [
             (
-                Miss(miss * np.hypot(1.2, off), 1.0, 0.0, 0.0, off**2, (("a", 1.0, 0.0, 0.0),)),
+                RayResidual(
+                    miss * np.hypot(1.2, off), 1.0, 0.0, 0.0, off**2, (("a", 1.0, 0.0, 0.0),)
+                ),
                 {"a": [person(name)]},
             )
             for name, off in (("ann", 2.0), ("bea", 0.0))
@@ -150,7 +155,7 @@ class TestEstimateSources:
             miss = rng.normal(0, np.hypot(*noise) / np.sqrt(2))
             by_view = (("left", 0.0, 0.0, 0.5), ("right", 0.0, 0.0, 0.5))
             of = {"left": [camera(str(a))], "right": [camera(str(b))]}
-            seen.append((Miss(miss, 0.0, 0.0, 1.0, 0.0, by_view), of))
+            seen.append((RayResidual(miss, 0.0, 0.0, 1.0, 0.0, by_view), of))
         worst, *_ = estimate_sources(seen, 0.0, 0.0, 2.6).of("camera")
         assert worst.source == "3" and worst.low < 4.0 < worst.high
 

@@ -16,7 +16,12 @@ from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Station, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
-from app.solving.triangulate import BallObservation, ball_observations, meet, observation_pairs
+from app.solving.triangulate import (
+    BallObservation,
+    arrays_of_pairs,
+    ball_observations,
+    triangulate_observation_pairs,
+)
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view
 
@@ -116,13 +121,15 @@ class TestSightsOf:
 
 class TestMeet:
     def test_the_baseline_lies_between_the_cameras_wherever_they_stand(self):
-        (found,) = meet([(looks_at("a", MAIN, BALL), looks_at("b", BEHIND_GOAL, BALL))])
+        (found,) = triangulate_observation_pairs(
+            [(looks_at("a", MAIN, BALL), looks_at("b", BEHIND_GOAL, BALL))]
+        )
         apart = np.linalg.norm(MAIN.position - BEHIND_GOAL.position)
         assert found.baseline_m == pytest.approx(float(apart))
 
     def test_a_meeting_by_hand(self):
         # Both look at the origin: 2 px across are 4 cm at 20 m, and 2 cm at 10 m.
-        (found,) = meet(
+        (found,) = triangulate_observation_pairs(
             [(sight("a", ALONG_Y, (500.0, 500.0)), sight("b", ALONG_X, (500.0, 502.0)))]
         )
         assert (found.a.view, found.b.view) == ("a", "b")
@@ -142,7 +149,7 @@ class TestMeet:
             looks_at("a", ALONG_Y, (0.0, -10.0, 0.0)),
             looks_at("b", ALONG_X, (0.0, -10.0, 0.0)),
         )
-        assert meet([couple])[0].parallax_degrees == pytest.approx(135.0)
+        assert triangulate_observation_pairs([couple])[0].parallax_degrees == pytest.approx(135.0)
 
     @given(
         st.floats(5, 50),
@@ -161,7 +168,7 @@ class TestMeet:
             for a, b in combinations([seen[place] for place in order], 2)
             if np.isfinite([*a.center, *b.center]).all()
         ]
-        found = meet(couples)
+        found = triangulate_observation_pairs(couples)
         assert [(item.a, item.b) for item in found] == couples
         for item in found:
             assert item.point == pytest.approx([x, y, z], abs=1e-3)
@@ -171,31 +178,41 @@ class TestMeet:
     def test_a_couple_gives_the_same_bits_alone_and_among_others(self):
         seen = [looks_at(key, camera, BALL) for key, camera in (("a", MAIN), ("b", OPPOSITE))]
         seen.append(sight("c", BEHIND_GOAL, (700.0, 300.0)))
-        together = meet(combinations(seen, 2))
-        alone = [found for couple in combinations(seen, 2) for found in meet([couple])]
+        together = triangulate_observation_pairs(combinations(seen, 2))
+        alone = [
+            found
+            for couple in combinations(seen, 2)
+            for found in triangulate_observation_pairs([couple])
+        ]
         assert [item.place for item in together] == [item.place for item in alone]
         assert [item.errors_px for item in together] == [item.errors_px for item in alone]
 
     def test_one_camera_twice_meets_nowhere(self):
         a, b = looks_at("a", MAIN, BALL), looks_at("b", MAIN, BALL)
-        assert meet([(a, b)]) == []
+        assert triangulate_observation_pairs([(a, b)]) == []
         other = looks_at("c", OPPOSITE, BALL)
-        assert [item.b.view for item in meet([(a, b), (a, other)])] == ["c"]
+        assert [item.b.view for item in triangulate_observation_pairs([(a, b), (a, other)])] == [
+            "c"
+        ]
 
     def test_parallel_rays_meet_nowhere_and_others_do(self):
         square = Camera(ALONG_Y.rotation, ALONG_Y.position, (1.0, 1.0), (0.0, 0.0))
         aside = replace(square, position=ALONG_Y.position + np.array([1.0, 0.0, 0.0]))
         parallel = sight("a", square, (0.0, 0.0)), sight("b", aside, (0.0, 0.0))
         crossing = looks_at("c", ALONG_Y, (0.0, 0.0, 0.0)), looks_at("d", ALONG_X, (0.0, 0.0, 0.0))
-        assert [item.a.view for item in meet([parallel, crossing])] == ["c"]
+        assert [item.a.view for item in triangulate_observation_pairs([parallel, crossing])] == [
+            "c"
+        ]
 
     def test_without_couples_there_are_no_meetings(self):
-        assert meet([]) == []
+        assert triangulate_observation_pairs([]) == []
 
     def test_a_point_behind_a_camera_is_measured_and_not_in_front(self):
         # The rays part before the cameras; their lines cross 20 m behind both.
         aside = replace(ALONG_Y, position=np.array([4.0, -20.0, 0.0]))
-        (found,) = meet([(sight("a", ALONG_Y, (400.0, 500.0)), sight("b", aside, (600.0, 500.0)))])
+        (found,) = triangulate_observation_pairs(
+            [(sight("a", ALONG_Y, (400.0, 500.0)), sight("b", aside, (600.0, 500.0)))]
+        )
         assert found.point == pytest.approx([2.0, -40.0, 0.0], abs=1e-6)
         assert not found.in_front
         assert found.errors_px == pytest.approx((0.0, 0.0), abs=1e-6)
@@ -206,14 +223,16 @@ class TestMeet:
         a = sight("a", ALONG_Y, tuple(pixel[:2] / pixel[2]))
         b = looks_at("b", ALONG_X, behind)
         for couple in ((a, b), (b, a)):
-            (found,) = meet([couple])
+            (found,) = triangulate_observation_pairs([couple])
             assert found.point == pytest.approx(behind, abs=1e-6)
             assert not found.in_front
 
     @pytest.mark.parametrize(("depth", "in_front"), [(2e-3, True), (5e-4, False)])
     def test_a_millimetre_is_the_least_depth(self, depth: float, in_front: bool):
         place = (0.0, -20.0 + depth, 0.0)
-        (found,) = meet([(sight("a", ALONG_Y, (500.0, 500.0)), looks_at("b", ALONG_X, place))])
+        (found,) = triangulate_observation_pairs(
+            [(sight("a", ALONG_Y, (500.0, 500.0)), looks_at("b", ALONG_X, place))]
+        )
         assert found.point == pytest.approx(place, abs=1e-6)
         assert found.in_front is in_front
 
@@ -221,7 +240,7 @@ class TestMeet:
 class TestLinesOfSight:
     def test_come_in_the_order_that_triangulation_takes(self):
         a, b = looks_at("a", MAIN, BALL), looks_at("b", OPPOSITE, BALL)
-        P_a, P_b, pixels_a, pixels_b = observation_pairs([a, b], [b, a])
+        P_a, P_b, pixels_a, pixels_b = arrays_of_pairs([a, b], [b, a])
         assert np.array_equal(P_a, [MAIN.P, OPPOSITE.P])
         assert np.array_equal(P_b, [OPPOSITE.P, MAIN.P])
         assert np.array_equal(pixels_a, [a.ideal_center, b.ideal_center])

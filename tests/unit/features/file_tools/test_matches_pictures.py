@@ -27,7 +27,7 @@ def write(folder: Path, aspect: float = 1.06, count: int = 4) -> list[LineFile]:
     files = []
     for number in range(count):
         camera = looking(POSITION, (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
-        shown = PictureGeometry(aspect).done(camera, SIZE)
+        shown = PictureGeometry(aspect).camera_of_shown_picture(camera, SIZE)
         files.append(LineFile(f"{number}", SIZE, click(shown, 0.7, number, Pitch(goal="middle"))))
     write_line_files(folder, files)
     return files

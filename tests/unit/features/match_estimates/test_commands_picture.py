@@ -31,7 +31,11 @@ def frames(pitch: Pitch) -> list[LineFile]:
     for number in range(4):
         camera = looking((1.0, 62.0, -16.0), (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
         files.append(
-            LineFile(f"{number}", SIZE, click(TRUE.done(camera, SIZE), 0.7, number, pitch))
+            LineFile(
+                f"{number}",
+                SIZE,
+                click(TRUE.camera_of_shown_picture(camera, SIZE), 0.7, number, pitch),
+            )
         )
     return files
 

@@ -38,7 +38,7 @@ def frames(match: str) -> list[Group]:
     groups = []
     for number in range(FRAMES):
         camera = looking((1.0, 62.0, -16.0), (-30.0 + 20.0 * number, -4.0, 0.0), 1300.0, bend=BEND)
-        lines = click(DONE[match].done(camera, SIZE), 0.7, number)
+        lines = click(DONE[match].camera_of_shown_picture(camera, SIZE), 0.7, number)
         view = View(f"{number}.png", Station(f"{match}/{number}", SIZE, lines=lines))
         groups.append(Group(f"{match}/{number}.png", (view,), match=match))
     return groups

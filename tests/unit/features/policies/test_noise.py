@@ -30,8 +30,8 @@ from app.soccer.group import Group, Station, View
 from app.soccer.policy import PAPER, TOUCHLINE, Policy, is_shipped
 from app.solving import dataset_noise
 from app.solving.ball_covariance import CLICK_DIAGONAL
-from app.solving.ball_noise import Miss
-from app.solving.dataset_noise import SeenGroup
+from app.solving.ball_noise import RayResidual
+from app.solving.dataset_noise import NoiseGroup
 from app.solving.resect import REFERENCE_DIAGONAL
 from tests.cameras import SIZE
 from tests.unit.stores import BEHIND, MAIN, OPPOSITE, drawn
@@ -204,11 +204,11 @@ class TestReadNoise:
         make(store, given=False)
         rng = np.random.default_rng(2)
         misses = [
-            Miss(rng.normal(0, np.hypot(0.5, 0.08 * size)), 1.0, size**2, 0.0, 0.0)
+            RayResidual(rng.normal(0, np.hypot(0.5, 0.08 * size)), 1.0, size**2, 0.0, 0.0)
             for size in rng.uniform(5, 40, 600)
         ]
         shown = iter([misses])
-        monkeypatch.setattr(SeenGroup, "misses", lambda *_: tuple(next(shown, ())))
+        monkeypatch.setattr(NoiseGroup, "misses", lambda *_: tuple(next(shown, ())))
         found = read_noise(store, "demo")
         click, share = found.advice
         assert (click.name, share.name, share.unit) == (

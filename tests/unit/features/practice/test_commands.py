@@ -17,7 +17,7 @@ class TestSampleRecording:
     def test_a_video_and_its_truth_are_written(
         self, tmp_path: Path, touchline: Run, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(recording, "PARTS", (recording.Part("main", 180, "start"),))
+        monkeypatch.setattr(recording, "PARTS", (recording.ShotPlan("main", 180, "start"),))
         out = tmp_path / "made" / "film.mp4"
         # All that there is of three minutes, a hundredth as long.
         monkeypatch.setattr(recording, "FPS", 1)

@@ -14,7 +14,7 @@ from app.sample.scene import PRACTICE_KINDS, Scene
 from app.sample.scenes import make_scene
 from app.soccer.annotation import make_lines
 from app.soccer.group import Group, View
-from app.soccer.pitch import twin_marking
+from app.soccer.pitch import opposite_marking
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 
@@ -47,7 +47,7 @@ def with_view(group: Group, view: View) -> Group:
 def swapped(group: Group, key: str) -> Group:
     view = group.view(key)
     assert view is not None
-    lines = {twin_marking(name): points for name, points in view.station.lines.items()}
+    lines = {opposite_marking(name): points for name, points in view.station.lines.items()}
     return with_view(group, replace(view, station=replace(view.station, lines=make_lines(lines))))
 
 

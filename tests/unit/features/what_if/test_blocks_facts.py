@@ -13,7 +13,7 @@ from app.features.groups.submit import load
 from app.features.solutions.tables import SolutionModel
 from app.features.what_if.blocks import read_tables
 from app.features.what_if.table import YieldTable
-from app.solving.facts import COLUMNS, group_facts, join
+from app.solving.facts import COLUMNS, group_facts, join_facts
 from tests.databases import said_for_sqlite
 
 
@@ -43,7 +43,7 @@ def solved(request, store, fill, make_group, make_static) -> list[int]:
 class TestReadTables:
     def test_facts_are_those_that_solving_judges(self, store, solved) -> None:
         states = [load(store, group) for group in solved]
-        expected = join(
+        expected = join_facts(
             [
                 group_facts(state.group.views, [item.calibration for item in state.solution.views])
                 for state in states

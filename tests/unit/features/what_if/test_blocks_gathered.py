@@ -140,7 +140,7 @@ class TestAfterARestart:
     ) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
         before = get_yield(YieldStore(store), 1)
-        monkeypatch.setattr("app.features.what_if.block_results.judge", None)
+        monkeypatch.setattr("app.features.what_if.block_results.judge_groups", None)
         assert get_yield(YieldStore(store), 1) == before
 
     @pytest.mark.parametrize("name", ["table.json", "*.facts", "*.judged", "bare.heads"])

@@ -26,8 +26,8 @@ from app.soccer.group import Group
 from app.soccer.policy import PAPER, THRESHOLDS, CalibrationPolicy, Policy
 from app.soccer.solution import GATES, PaintFit, Solution
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.facts import group_facts, join
-from app.solving.judgement import PASSES, Judgement, judge, view_jac
+from app.solving.facts import group_facts, join_facts
+from app.solving.judgement import PASSES, Judgement, judge_groups, view_jac
 from app.solving.solve import solve
 from tests.scenes import make_scenes
 
@@ -98,7 +98,7 @@ def random_policy(seed: int) -> Policy:
 
 
 def judge_table(table: YieldTable, policy: Policy) -> Judgement:
-    return judge(table.facts, policy, MeanCovariance(table.facts))
+    return judge_groups(table.facts, policy, MeanCovariance(table.facts))
 
 
 def solved_again(group: Group, solution: Solution, policy: Policy) -> Solution:
@@ -147,14 +147,14 @@ class TestJudgeTable:
     @pytest.mark.parametrize("seed", range(3))
     def test_agreement_is_judged_as_solve_does(self, solutions, seed: int) -> None:
         painted = [(group, with_paint(solution)) for group, solution in solutions]
-        table = join(
+        table = join_facts(
             [
                 group_facts(group.views, [view.calibration for view in solution.views])
                 for group, solution in painted
             ]
         )
         policy = replace(random_policy(seed), min_agreement=0.5, min_jac=0.5, tau_percent=1.0)
-        judged = judge(table, policy, MeanCovariance(table))
+        judged = judge_groups(table, policy, MeanCovariance(table))
         assert GATES.index("agreement") in judged.first and judged.passes.any()
         for place, (group, old) in enumerate(painted):
             failing = solved_again(group, old, policy).first_failing
