@@ -46,6 +46,7 @@ from tests.unit.own_stores import settings as settings
 from tests.unit.stores import empty as empty
 from tests.unit.stores import fill as fill
 from tests.unit.stores import filled_before as filled_before
+from tests.unit.stores import lock_watcher as lock_watcher
 from tests.unit.stores import make_group as make_group
 from tests.unit.stores import make_static as make_static
 from tests.unit.stores import once as once

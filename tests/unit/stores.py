@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -30,7 +31,8 @@ from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.solution import SOLVER_VERSION
 from tests.balls import seen
 from tests.cameras import SIZE, looking
-from tests.databases import Databases
+from tests.databases import Databases, Files
+from tests.locks import LockWatcher
 
 MATCH = "north_league/2030-2031/2030-08-17 - 18-00 Alder Town 3 - 1 Birch Rovers"
 
@@ -128,13 +130,30 @@ def empty(only_store: Store, databases: Databases) -> Any:
     return databases.keep(only_store)
 
 
+@pytest.fixture(scope="session")
+def lock_watcher() -> Iterator[LockWatcher | None]:
+    """Tells whether the locks of a database are there; None where files have no such locks."""
+    watcher = LockWatcher() if sys.platform == "linux" else None
+    yield watcher
+    if watcher is not None:
+        watcher.close()
+
+
 @pytest.fixture
-def store(only_store: Store, databases: Databases, empty: Any) -> Store:
+def store(
+    only_store: Store, databases: Databases, empty: Any, lock_watcher: LockWatcher | None
+) -> Iterator[Store]:
     """An empty database: a real one, put back before each test."""
     databases.put_back(only_store, empty)
     # What an earlier test saw is not true of this database.
     only_store._damage = None
-    return only_store
+    yield only_store
+    if lock_watcher is not None and isinstance(databases, Files):
+        file = only_store.settings.database_file
+        assert lock_watcher.sees_open(file), (
+            "this test ended the locks of the open database: it opened and closed the file in its own "
+            "process (read it with tests.databases.all_that_is_kept)"
+        )
 
 
 @pytest.fixture

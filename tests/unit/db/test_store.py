@@ -22,20 +22,10 @@ from app.db.migrate import migrate
 from app.db.store import Store
 from app.errors import BusyError, DamagedError, InputError, StorageError
 from tests.databases import said_for_sqlite
+from tests.locks import LockWatcher
 from tests.unit.db.homes import INSERT, add, names
 
-_LOCKING = """
-import fcntl, sys
-with open(sys.argv[1], "r+b") as file:
-    fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 510, 0x40000002)
-"""
-"""Take the bytes that SQLite locks while it has a database open."""
-
-
-def can_lock(database: Path) -> bool:
-    """Whether another process could take a database for its own."""
-    command = [sys.executable, "-c", _LOCKING, database]
-    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+ON_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="layout of its locks")
 
 
 class TestOpen:
@@ -46,19 +36,32 @@ class TestOpen:
         assert settings.home.stat().st_mode & 0o777 == 0o700
         own_store.close()
 
+    @ON_LINUX
     @pytest.mark.file_of_sqlite("locks of a file")
     def test_a_second_one_in_this_process_leaves_the_locks_of_the_first(
-        self, own_store: Store, settings: Settings
+        self, own_store: Store, settings: Settings, lock_watcher: LockWatcher
     ) -> None:
         """Closing any descriptor of a file ends the locks that its process has on it."""
         with own_store.read() as session:
             session.execute(text("SELECT count(*) FROM sqlite_schema"))
-            assert not can_lock(settings.database_file)
+            assert lock_watcher.sees_open(settings.database_file)
             Store.open(settings).close()
             migrate(settings)
-            assert not can_lock(settings.database_file)
+            assert lock_watcher.sees_open(settings.database_file)
         own_store.close()
-        assert can_lock(settings.database_file)
+        assert not lock_watcher.sees_open(settings.database_file)
+
+    @ON_LINUX
+    @pytest.mark.file_of_sqlite("locks of a file")
+    def test_reading_the_file_in_this_process_is_seen_to_end_its_locks(
+        self, own_store: Store, settings: Settings, lock_watcher: LockWatcher
+    ) -> None:
+        """What the fixture ``store`` refuses of every test."""
+        with own_store.read() as session:
+            session.execute(text("SELECT count(*) FROM sqlite_schema"))
+            settings.database_file.with_name("touchline.db-shm").read_bytes()
+            assert not lock_watcher.sees_open(settings.database_file)
+        own_store.close()
 
     @pytest.mark.parametrize("name", PRAGMAS)
     @pytest.mark.file_of_sqlite("PRAGMAs of a connection")
