@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from app.features.recordings.links import get_link
 from app.features.recordings.service import get_recording
 from app.features.tracks.codec import TrackInputs, inputs_to_json, track_to_json
 from app.features.tracks.queries import insert_track
-from app.features.tracks.service import TrackSummary, _stamp
+from app.features.tracks.stored import TrackSummary, track_stamp
 from app.geometry.arrays import FloatArray
 from app.soccer.pitch import Pitch
 from app.solving.sides import turned_camera
@@ -215,13 +216,11 @@ def insert_track_of(store: Store, ball: FloatArray, times: FloatArray, view: str
     dataset = get_recording(store, 1).dataset_id
     with store.write() as session, without_response():
         policy = read_dataset_head(session, dataset).policy
+        stretch = {"key": "final 0-149", "match": "final", "first": 0, "last": count - 1}
         values = {
             "dataset_id": dataset,
-            "key": "final 0-149",
-            "match": "final",
-            "first": 0,
-            "last": count - 1,
-            "stamp": _stamp(policy, (), 0, count - 1),
+            **stretch,
+            "stamp": track_stamp(policy, (), SimpleNamespace(**stretch)),
             "digest": "none",
             "inputs": pack(inputs_to_json(inputs)),
             "body": pack(track_to_json(made)),
