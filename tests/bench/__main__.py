@@ -11,6 +11,7 @@ from pathlib import Path
 
 from tests.bench.annotators import bench_annotators
 from tests.bench.ball import bench_ball
+from tests.bench.ball_follow import bench_ball_follow
 from tests.bench.ball_noise import bench_ball_noise
 from tests.bench.ball_track import bench_ball_track
 from tests.bench.browser import bench_browser
@@ -75,6 +76,7 @@ def main() -> None:
     bench_link(REAL_DATA)
     bench_long_recording()
     bench_recording()
+    bench_ball_follow(90)
     bench_ball_track(REAL_DATA)
     bench_requests()
     bench_listeners()

@@ -41,7 +41,7 @@ ALL_RANGES = ("/static/{file}", f"{API}/exports/{{export}}/content", f"{API}/vie
 """Files that are read from the disk, and what is made when it is asked for."""
 NOT_THERE = (
     *("/lesson", "/independent-annotation", "/adjudication", "/guidelines/pictures/{digest}"),
-    *("/cameras/{frame}", "/cameras/{frame}/file"),
+    *("/cameras/{frame}", "/cameras/{frame}/file", "/ball-runs/{run}"),
 )
 """Ends of routes about what these groups and datasets do not have."""
 OF_TEAMS = tuple(

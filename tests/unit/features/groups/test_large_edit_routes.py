@@ -85,7 +85,7 @@ def test_a_group_and_its_solution_travel_whole(app: FastAPI, ready) -> None:
     with app.state.services.store.read() as session:
         stored = read_record(session, 1).stored
     given = stored.group, stored.policy, {}
-    assert ready.run(solve_encoded, *given) == solve_encoded(*given)
+    assert ready.solve(solve_encoded, *given) == solve_encoded(*given)
 
 
 def test_a_process_that_breaks_down_costs_its_large_edit_alone(
@@ -103,8 +103,8 @@ def test_a_process_that_breaks_down_costs_its_large_edit_alone(
 
 def test_what_takes_the_place_of_one_that_broke_down_is_made_ready_too(ready) -> None:
     with pytest.raises(OverloadedError, match="made its process crash"):
-        ready.run(break_down, None, None, {})
-    assert ready.run(solve_here, None, None, {}) == os.getpid()
+        ready.solve(break_down, None, None, {})
+    assert ready.solve(solve_here, None, None, {}) == os.getpid()
     end = time.monotonic() + SECONDS
     while not ready.workers[0].begin():
         assert time.monotonic() < end, "no other took its place"
@@ -122,7 +122,7 @@ def test_what_people_draw_is_solved_by_the_server(app, ready, api, monkeypatch) 
 def test_one_that_is_not_begun_when_the_server_closes_is_told_to_come_again(ready) -> None:
     blocking = ready.workers[0].submit(signal.pause)
     with ThreadPoolExecutor() as threads:
-        waiting = threads.submit(ready.run, solve_nothing, None, None, {})
+        waiting = threads.submit(ready.solve, solve_nothing, None, None, {})
         end = time.monotonic() + SECONDS
         while not COUNTS["large"].waiting:
             assert time.monotonic() < end, "it does not wait"

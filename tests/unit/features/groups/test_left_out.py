@@ -75,7 +75,7 @@ class TestIncludeView:
             IncludeView("7_1.png", False, reason, note).apply(make_group(7))
 
     def test_only_a_view_that_is_left_out_has_a_reason(self, make_group) -> None:
-        with pytest.raises(InputError, match="left out"):
+        with pytest.raises(InputError, match="left-out"):
             IncludeView("7_1.png", True, "duplicate_view").apply(make_group(7))
 
     def test_taking_the_view_in_again_removes_it(self, make_group) -> None:
