@@ -114,7 +114,7 @@ def test_what_takes_the_place_of_one_that_broke_down_is_made_ready_too(ready) ->
 
 
 def test_what_people_draw_is_solved_by_the_server(app, ready, api, monkeypatch) -> None:
-    monkeypatch.setattr(ready, "run", break_down)
+    monkeypatch.setattr(ready, "solve", break_down)
     few = {"lines": {"Middle line": [{"x": 5.0, "y": 9.0}, {"x": 5.5, "y": 400.0}]}}
     assert draw(api, few).status_code == 200
 
