@@ -87,7 +87,9 @@ class TestAfterHandIn:
             raise OSError("the power went")
 
         with monkeypatch.context() as broken:
-            broken.setattr(weigh, "settle_rest" if comes_to == "agreed" else "_announce_disagreement", fail)
+            broken.setattr(
+                weigh, "settle_rest" if comes_to == "agreed" else "_announce_disagreement", fail
+            )
             with pytest.raises(OSError, match="power"):
                 after_submission(store, second.copy_id)
         assert load(store, state.id).etag == state.etag

@@ -136,7 +136,10 @@ class TestSendPart:
         )
         assert self.begin(api).json() == first.json() == api.get(place).json()
         gap = self.part(api, place, 5000, self.FILM[5000:])
-        assert (gap.status_code, "4,000 bytes of final.mp4 were received" in gap.text) == (409, True)
+        assert (gap.status_code, "4,000 bytes of final.mp4 were received" in gap.text) == (
+            409,
+            True,
+        )
         last = self.part(api, place, 4000, self.FILM[4000:])
         assert last.json()["bytes"] == 10000
         folder = app.state.services.settings.uploads / last.json()["id"]
