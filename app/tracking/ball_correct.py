@@ -12,10 +12,10 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, IntArray
 from app.soccer.pitch import Pitch
+from app.tracking.ball_constraints import EventConstraint, PlaceConstraint, TrackConstraints
 from app.tracking.ball_join import joined
 from app.tracking.ball_models import BOUNCE, KICK, REST
 from app.tracking.ball_prediction import summed
-from app.tracking.ball_said import Said, SaidEvent, SaidPlace
 from app.tracking.ball_solve import track_ball
 from app.tracking.ball_solve_run import TrackOptions, runs_of, solve_run
 from app.tracking.ball_track import (
@@ -134,10 +134,12 @@ def _whole(
     track: BallTrack, measurements: BallMeasurements, pitch: Pitch, said: tuple[Correction, ...]
 ) -> tuple[TrackPatch, ...]:
     """What is said may give a track where measurements alone say none."""
-    events = tuple(_said_events(track, said))
+    events = tuple(_event_constraints(track, said))
     if not events:
         return ()
-    found = track_ball(measurements, track.frames, track.times, pitch=pitch, said=Said(events))
+    found = track_ball(
+        measurements, track.frames, track.times, pitch=pitch, said=TrackConstraints(events)
+    )
     if found.reason is not None:
         return ()
     return (TrackPatch(said, np.arange(len(measurements)), found),)
@@ -191,8 +193,8 @@ def _solved(
     near, options = measurements.part(numbers), TrackOptions()
     late = dict(track.offsets)
     shift = np.array([late.get(name, 0.0) for name in near.names])
-    said = Said(
-        tuple(_said_events(track, corrections)),
+    said = TrackConstraints(
+        tuple(_event_constraints(track, corrections)),
         tuple(_held(track, begin, end, first, last, corrections, pitch)),
     )
     own = slice(begin, end + 1)
@@ -236,7 +238,9 @@ def _solved(
     return TrackPatch(corrections, numbers[inner], cut)
 
 
-def _said_events(track: BallTrack, corrections: Iterable[Correction]) -> Iterator[SaidEvent]:
+def _event_constraints(
+    track: BallTrack, corrections: Iterable[Correction]
+) -> Iterator[EventConstraint]:
     """Kicks and bounces that are forced and forbidden; where both are said, both hold."""
     step = _step(track)
     for item in corrections:
@@ -244,7 +248,7 @@ def _said_events(track: BallTrack, corrections: Iterable[Correction]) -> Iterato
             at = float(track.times[item.frame - track.frames[0]])
             # People see an event in a frame, and not when between two of them.
             slack = step / 2 if item.added else NEAR_FRAMES * step
-            yield SaidEvent(_KINDS[item.kind], at - slack, at + slack, item.added)
+            yield EventConstraint(_KINDS[item.kind], at - slack, at + slack, item.added)
 
 
 def _held(
@@ -255,7 +259,7 @@ def _held(
     last: int,
     corrections: Iterable[Correction],
     pitch: Pitch,
-) -> Iterator[SaidPlace]:
+) -> Iterator[PlaceConstraint]:
     """Where the rest of the track holds the ball, and the lines at which it is said to be out."""
     known = _known(track)
     for rows in (range(begin, first), range(end, last, -1)):
@@ -269,7 +273,7 @@ def _held(
             sigma = max(float(np.sqrt(max(value, 0.0))), _LEAST_HELD_M)
             place = float(axis @ track.position[row])
             x, y, z = axis.tolist()
-            yield SaidPlace(float(track.times[row]), (x, y, z), place, sigma)
+            yield PlaceConstraint(float(track.times[row]), (x, y, z), place, sigma)
     for item in corrections:
         row = int(item.frame - track.frames[0])
         if item.kind == "out" and item.added and known[row]:
@@ -279,7 +283,7 @@ def _held(
                 (1.0 if x > 0 else -1.0, 0.0, 0.0) if over else (0.0, 1.0 if y > 0 else -1.0, 0.0)
             )
             line = (pitch.length if over else pitch.width) / 2 + REST
-            yield SaidPlace(float(track.times[row]), normal, line, _LINE_SIGMA_M)
+            yield PlaceConstraint(float(track.times[row]), normal, line, _LINE_SIGMA_M)
 
 
 def _step(track: BallTrack) -> float:

@@ -8,8 +8,8 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
+from app.tracking.ball_constraints import InstantConstraints, TrackConstraints, constraints_at
 from app.tracking.ball_models import REST
-from app.tracking.ball_said import Asked, Said, asked_of
 from app.tracking.ball_search_kernels import likeliest
 from app.tracking.ball_track import BallMeasurements
 
@@ -54,7 +54,7 @@ class Knots:
     far: FloatArray
     far_sigma: FloatArray
     view: IntArray
-    asked: Asked
+    asked: InstantConstraints
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,10 @@ class History:
 
 
 def knots_of(
-    measurements: BallMeasurements, times: FloatArray, shift: FloatArray, said: Said | None = None
+    measurements: BallMeasurements,
+    times: FloatArray,
+    shift: FloatArray,
+    said: TrackConstraints | None = None,
 ) -> Knots:
     """Instants and rays; pixels through which no ray goes have none.
 
@@ -125,7 +128,7 @@ def knots_of(
         far,
         np.where(known, far * size_sigma / np.where(known, size, 1.0), 0.0),
         view[rows],
-        asked_of(knots, said or Said()),
+        constraints_at(knots, said or TrackConstraints()),
     )
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray, IntArray
 from app.soccer.pitch import Pitch
+from app.tracking.ball_constraints import TrackConstraints
 from app.tracking.ball_join import OPEN, joined
-from app.tracking.ball_said import Said
 from app.tracking.ball_solve_run import FEWEST as FEWEST
 from app.tracking.ball_solve_run import Run, contradiction, runs_of, solve_run, too_few
 from app.tracking.ball_solve_run import TrackOptions as TrackOptions
@@ -28,7 +28,7 @@ def track_ball(
     *,
     pitch: Pitch,
     options: TrackOptions | None = None,
-    said: Said | None = None,
+    said: TrackConstraints | None = None,
 ) -> BallTrack:
     """The ball in every frame of a stretch, from one ball in one or more calibrated views.
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
+from app.tracking.ball_constraints import TrackConstraints
 from app.tracking.ball_fit import Fitted, fit
 from app.tracking.ball_models import NOTHING
-from app.tracking.ball_said import Said
 from app.tracking.ball_search import History, Knots, knots_of, louder, search
 from app.tracking.ball_track import BallMeasurements
 
@@ -101,7 +101,7 @@ def solve_run(
     shift: FloatArray,
     pitch: Pitch,
     options: TrackOptions,
-    said: Said | None = None,
+    said: TrackConstraints | None = None,
 ) -> Run:
     """Search and fit a run.
 

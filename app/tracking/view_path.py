@@ -1,4 +1,4 @@
-"""View path: where a camera looks over time, by which a replay is likened to live shots before anything links them.
+"""View path: where a camera looks over time, by which a replay is compared with live shots before anything links them.
 
 Cameras follow play. Two that show the same play look at places some metres apart, whatever they stand and zoom like.
 """
@@ -43,7 +43,7 @@ class ViewPath:
 
 
 @dataclass(frozen=True)
-class PathLikeness:
+class PathComparison:
     """How much a replay looks where a live shot does.
 
     Attributes:
@@ -77,7 +77,7 @@ def view_path(times: Sequence[float], cameras: Sequence[Camera | None]) -> ViewP
     return ViewPath(rows[:, 0], rows[:, 1:])
 
 
-def liken(live: ViewPath, replay: ViewPath) -> PathLikeness | None:
+def compare_paths(live: ViewPath, replay: ViewPath) -> PathComparison | None:
     """How much a replay looks where a live shot does, at the offset and speed that suit it best.
 
     None where too little is known of one of them, or the live shot is too short for all that the replay shows.
@@ -91,10 +91,10 @@ def liken(live: ViewPath, replay: ViewPath) -> PathLikeness | None:
     return turned if turned.apart_m < _LEAST_GAIN * plain.apart_m else plain
 
 
-def _best(live: ViewPath, replay: ViewPath, turn: bool) -> PathLikeness | None:
+def _best(live: ViewPath, replay: ViewPath, turn: bool) -> PathComparison | None:
     places = replay.places * _HALF_TURN if turn else replay.places
     times = replay.times - replay.times[0]
-    best: PathLikeness | None = None
+    best: PathComparison | None = None
     for speed in SPEEDS:
         if speed * times[-1] < LEAST_S:
             continue
@@ -115,5 +115,5 @@ def _best(live: ViewPath, replay: ViewPath, turn: bool) -> PathLikeness | None:
         at = int(middle.argmin())
         if best is None or middle[at] < best.apart_m:
             offset = float(offsets[at] - speed * replay.times[0])
-            best = PathLikeness(float(middle[at]), offset, speed, turn)
+            best = PathComparison(float(middle[at]), offset, speed, turn)
     return best

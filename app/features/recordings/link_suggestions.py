@@ -15,7 +15,7 @@ from app.features.recordings.match_clock import MatchClock, clock_at
 from app.features.recordings.service import Recording, list_recordings
 from app.features.recordings.shots import Shot, get_shots
 from app.tracking.link_fit import SLOWEST
-from app.tracking.view_path import PathLikeness, ViewPath, liken, view_path
+from app.tracking.view_path import PathComparison, ViewPath, compare_paths, view_path
 
 SUGGESTED = 6
 """Live shots that are suggested for a replay."""
@@ -107,7 +107,7 @@ def suggest_live(store: Store, recording_id: int, frame: int) -> list[LiveSugges
         like = None
         if path is not None and number < LIKENED:
             live = paths.of(one.recording, one.shot)
-            like = None if live is None else liken(live, path)
+            like = None if live is None else compare_paths(live, path)
         short = one.seconds < SLOWEST * (end - start)
         rank = _rank(like)
         ranked.append(
@@ -150,7 +150,7 @@ def _of_others(store: Store, mine: Recording, half: int | None, most: int) -> li
     return found[: max(most, 0)]
 
 
-def _rank(like: PathLikeness | None) -> tuple[float, float]:
+def _rank(like: PathComparison | None) -> tuple[float, float]:
     """What a likeness says first, and by how much: the smaller, the likelier."""
     if like is None or ALIKE_M < like.apart_m <= UNLIKE_M:
         return 1.0, 0.0
@@ -159,7 +159,7 @@ def _rank(like: PathLikeness | None) -> tuple[float, float]:
     return 0.0, like.apart_m // _ROUND_M
 
 
-def _why(one: _Candidate, short: bool, like: PathLikeness | None) -> str:
+def _why(one: _Candidate, short: bool, like: PathComparison | None) -> str:
     if one.before is None:
         told = f"Main camera of {one.recording.name}; when that was, nothing says"
     else:

@@ -29,7 +29,7 @@ BATCH = 200
 
 
 @dataclass(frozen=True)
-class BallBeside:
+class ContradictingBall:
     """A ball that a track does not explain.
 
     Attributes:
@@ -49,7 +49,7 @@ class BallBeside:
     reason: str
 
 
-def balls_beside(ball: BallTrack, inputs: TrackInputs) -> list[BallBeside]:
+def contradicting_balls(ball: BallTrack, inputs: TrackInputs) -> list[ContradictingBall]:
     """The balls that a track does not explain, in its order."""
     measured, first = inputs.measurements, int(ball.frames[0]) if len(ball.frames) else 0
     found = []
@@ -62,7 +62,7 @@ def balls_beside(ball: BallTrack, inputs: TrackInputs) -> list[BallBeside]:
             seen = measured.cameras[row].project(place)[0]
         there = (float(seen[0]), float(seen[1])) if np.isfinite(seen).all() else None
         view = measured.views[row]
-        found.append(BallBeside(frame, view, (at[0], at[1]), there, item.px, item.reason))
+        found.append(ContradictingBall(frame, view, (at[0], at[1]), there, item.px, item.reason))
     return found
 
 
@@ -92,7 +92,7 @@ def refresh_findings(
         body = read_bodies(session, [row.id])[row.id]
         inputs = replace(inputs_from_json(unpack(body.inputs)), corrections=corrections_of(row))
         patches = () if body.patches is None else patches_from_json(unpack(body.patches))
-        beside = balls_beside(
+        beside = contradicting_balls(
             corrected(inputs, track_from_json(unpack(body.body)), patches), inputs
         )
         found += _notices(session, beside, mine[row.id])
@@ -114,7 +114,7 @@ def _contradicted(row: Any) -> int:
 
 
 def _notices(
-    session: Session, beside: Sequence[BallBeside], groups: Mapping[int, TrackGroup]
+    session: Session, beside: Sequence[ContradictingBall], groups: Mapping[int, TrackGroup]
 ) -> list[BallNotice]:
     ids = sorted({groups[item.frame].id for item in beside if item.frame in groups})
     stored: dict[int, StoredGroup] = {}
@@ -136,7 +136,7 @@ def _notices(
     return found
 
 
-def _view_of(stored: StoredGroup, item: BallBeside) -> str | None:
+def _view_of(stored: StoredGroup, item: ContradictingBall) -> str | None:
     """Key of the view that still shows the ball where the track met it; None: none does."""
     for view in stored.group.views:
         center = None if view.ball is None or not view.included else view.ball.center

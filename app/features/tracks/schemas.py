@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
 from app.features.tracks.around import AROUND, Around
-from app.features.tracks.findings import balls_beside
+from app.features.tracks.findings import contradicting_balls
 from app.features.tracks.listing import ListedTrack
 from app.features.tracks.service import (
     MOST_CORRECTIONS,
@@ -257,7 +257,7 @@ class TrackEdit(BaseModel):
 
 def _contradictions(detail: TrackDetail) -> list[ContradictionDocument]:
     found = []
-    for item in balls_beside(detail.ball, detail.inputs):
+    for item in contradicting_balls(detail.ball, detail.inputs):
         group = detail.groups.get(item.frame)
         x, y = item.place or (None, None)
         fix = (

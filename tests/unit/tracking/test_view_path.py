@@ -5,7 +5,7 @@ import pytest
 
 from app.geometry.camera import Camera
 from app.solving.sides import turned_camera
-from app.tracking.view_path import ViewPath, liken, view_path
+from app.tracking.view_path import ViewPath, compare_paths, view_path
 from tests.bench.link import at_times, film, made_ball
 
 BALL = made_ball(30.0, seed=7)
@@ -48,7 +48,7 @@ class TestLiken:
     def test_a_replay_is_like_the_play_that_it_shows(self, speed: float) -> None:
         live, other = shown(2, 14, LIVE_STAND), shown(16, 28, LIVE_STAND)
         replay = shown(7, 10, OPPOSITE, speed)
-        found, unlike = liken(live, replay), liken(other, replay)
+        found, unlike = compare_paths(live, replay), compare_paths(other, replay)
         assert found is not None and unlike is not None
         assert found.apart_m < 3 and found.apart_m < unlike.apart_m / 2
         assert not found.turned
@@ -58,11 +58,11 @@ class TestLiken:
         times = np.arange(0, 6, 0.04)
         filmed = film(at_times(BALL, 7 + 0.5 * times), times, OPPOSITE, 1900.0, lag=24)
         replay = view_path(times.tolist(), [turned_camera(one) for one in filmed.cameras])
-        found = liken(shown(2, 14, LIVE_STAND), replay)
+        found = compare_paths(shown(2, 14, LIVE_STAND), replay)
         assert found is not None and found.turned and found.apart_m < 3
 
     def test_too_little_is_like_nothing(self) -> None:
         live = shown(2, 14, LIVE_STAND)
-        assert liken(live, view_path([], [])) is None
-        assert liken(shown(2, 2.5, LIVE_STAND), live) is None
-        assert liken(live, shown(7, 7.6, OPPOSITE)) is None
+        assert compare_paths(live, view_path([], [])) is None
+        assert compare_paths(shown(2, 2.5, LIVE_STAND), live) is None
+        assert compare_paths(live, shown(7, 7.6, OPPOSITE)) is None

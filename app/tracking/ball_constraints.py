@@ -1,5 +1,4 @@
-"""What people say of a ball's way, as the search and the fit take it: events that happened, events that
-did not, and places."""
+"""Constraints of a track that people's corrections are: events that happened, events that did not, and places."""
 
 from __future__ import annotations
 
@@ -15,7 +14,7 @@ _SAME_S = 1e-3
 
 
 @dataclass(frozen=True)
-class SaidEvent:
+class EventConstraint:
     """An event that happened between two instants, or did not.
 
     Attributes:
@@ -31,7 +30,7 @@ class SaidEvent:
 
 
 @dataclass(frozen=True)
-class SaidPlace:
+class PlaceConstraint:
     """Where a ball is at an instant, in one direction.
 
     Attributes:
@@ -48,15 +47,15 @@ class SaidPlace:
 
 
 @dataclass(frozen=True)
-class Said:
+class TrackConstraints:
     """All that is said of a stretch."""
 
-    events: tuple[SaidEvent, ...] = ()
-    places: tuple[SaidPlace, ...] = ()
+    events: tuple[EventConstraint, ...] = ()
+    places: tuple[PlaceConstraint, ...] = ()
 
 
 @dataclass(frozen=True)
-class Asked:
+class InstantConstraints:
     """What is said, by the knots of a run.
 
     Attributes:
@@ -93,7 +92,7 @@ class Asked:
         return not int(self.may_not[to]) >> kind & 1
 
 
-def asked_of(times: FloatArray, said: Said) -> Asked:
+def constraints_at(times: FloatArray, said: TrackConstraints) -> InstantConstraints:
     """What is said of a run.
 
     Args:
@@ -121,7 +120,7 @@ def asked_of(times: FloatArray, said: Said) -> Asked:
         if abs(times[at] - place.time) < _SAME_S:
             places.append((at, place))
     places.sort(key=lambda one: one[0])
-    return Asked(
+    return InstantConstraints(
         wanted,
         begin,
         due,
