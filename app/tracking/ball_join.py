@@ -11,7 +11,7 @@ from scipy.stats import norm
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_fit import Fitted
-from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, LEAST_CHANGE, NOTHING, REST, ROLL
+from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, KICK, LEAST_CHANGE, REST, ROLL
 from app.tracking.ball_prediction import left_out, summed
 from app.tracking.ball_search import History, Knots
 from app.tracking.ball_solve_run import Run, TrackOptions
@@ -173,7 +173,7 @@ def _events(
     times: FloatArray,
 ) -> Iterator[BallEvent]:
     """Kicks and bounces that change the velocity clearly, or that somebody saw, where the track is known."""
-    places = np.flatnonzero((history.event != NOTHING) & known)
+    places = np.flatnonzero(np.isin(history.event, (KICK, BOUNCE)) & known)
     change = np.linalg.norm(
         fitted.state[places, 3:6] - fitted.state[np.maximum(places - 1, 0), 3:6], axis=1
     )

@@ -24,6 +24,8 @@ LEAST_CHANGE = 2.5
 """Of the velocity by what is called an event; hops of a rolling ball are less, m/s."""
 TOUCHED, TOUCHED_SIGMA = 0.9, 0.9
 """Height at which a ball in the air is touched: by feet mostly, by heads at twice that, metres."""
+JUMP_SHARE, JUMP_SIGMA = 0.1, 0.7
+"""How often other cameras contradict those before, and how far each coordinate is off then, metres."""
 REACH = 2.7
 """Height above which nobody but a keeper touches a ball, metres."""
 GRASS_SIGMA = 0.12
@@ -39,5 +41,6 @@ HELD_SIGMA, HELD_S = 12.0, 0.25
 
 FLIGHT, ROLL, HELD = 0, 1, 2
 """Modes of the search, by number."""
-NOTHING, KICK, BOUNCE = 0, 1, 2
-"""What happens between two instants, by number; a bounce into a roll is a landing."""
+NOTHING, KICK, BOUNCE, JUMP = 0, 1, 2, 3
+"""What happens between two instants, by number; a bounce into a roll is a landing, and a jump is of no
+ball: other cameras see it from then on, which are not exact."""

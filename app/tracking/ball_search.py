@@ -168,12 +168,23 @@ def search(knots: Knots, pitch: Pitch, width: int = _WIDTH) -> History:
     mode, event, left, state, score = likeliest(
         knots.times, knots.starts, knots.centres, knots.across, knots.along,
         knots.noise, knots.scale, knots.far, knots.far_sigma, room, width,
-        asked.wanted, asked.begin, asked.due, asked.may_not,
+        changed_views(knots), asked.wanted, asked.begin, asked.due, asked.may_not,
         np.searchsorted(asked.at, np.arange(len(knots.times) + 1)),
         asked.normal, asked.value, asked.sigma,
     )  # fmt: skip
     bit = np.arange(len(knots.at)) - knots.starts[knots.at]
     return History(mode, event, state, (left[knots.at] >> bit) & 1 == 0, float(score))
+
+
+def changed_views(knots: Knots) -> BoolArray:
+    """Whether other views see the ball at a knot than at the last one before it that any does, (K,)."""
+    result = np.zeros(len(knots.times), dtype=bool)
+    before: set[int] = set()
+    for knot in np.unique(knots.at).tolist():
+        views = set(knots.view[knots.starts[knot] : knots.starts[knot + 1]].tolist())
+        result[knot] = bool(before) and views != before
+        before = views
+    return result
 
 
 def _across(along: FloatArray) -> FloatArray:

@@ -10,266 +10,33 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from app.tracking.ball_filter_kernels import bounce, copy, jump, move, pin, see, touch
 from app.tracking.ball_models import (
     BOUNCE,
-    DRAG,
     FLIGHT,
-    GRASS_S,
     GRASS_SIGMA,
-    GRAVITY,
     HELD,
-    HELD_S,
-    HELD_SIGMA,
-    HOLDS_A_SECOND,
-    KEPT,
-    KEPT_SIGMA,
+    JUMP,
     KICK,
-    KICK_LIFT,
-    KICK_SPEED,
-    KICKS_A_SECOND,
     NOTHING,
     REACH,
     REST,
-    RESTITUTION,
-    RESTITUTION_SIGMA,
     ROLL,
-    ROLL_S,
-    ROLL_SIGMA,
-    ROLLING,
-    SPIN_LEAST,
-    SPIN_S,
-    SPIN_SHARE,
-    TOUCH_SPEED,
-    TOUCHED,
-    TOUCHED_SIGMA,
 )
 
-_OUTLIER = np.log(0.01 / 1000.0**2)
-"""Logarithm of the density of a measurement of something else, per square pixel."""
 _WORST = 35.0
 """Natural logarithm by which a hypothesis may be less likely than the best."""
 _UNLIKELY = 30.0
 """The same, by which a place that is known makes one less likely at most."""
 _ALIKE = 2
 """Hypotheses that are kept of those whose mode and last event are the same."""
-_PER_KNOT = 5
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _move(m, P, mode, dt):
-    """Carry a state, shape (6,), and its covariance over a time without events, in place."""
-    if dt <= 0.0:
-        return
-    speed = np.sqrt(m[3] ** 2 + m[4] ** 2 + m[5] ** 2)
-    keep = 1.0
-    noise = (SPIN_SHARE * DRAG * speed**2 + SPIN_LEAST) ** 2 * SPIN_S
-    if mode == FLIGHT:
-        keep = np.exp(-DRAG * speed * dt)
-    elif mode == ROLL:
-        pace = np.sqrt(m[3] ** 2 + m[4] ** 2)
-        keep = max(0.0, 1.0 - ROLLING * dt / max(pace, 0.5))
-        noise = ROLL_SIGMA**2 * 2 * ROLL_S
-    else:
-        keep = np.exp(-dt / 1.0)
-        noise = HELD_SIGMA**2 * 2 * HELD_S
-    for i in range(3):
-        after = m[3 + i] * keep
-        m[i] += dt * (m[3 + i] + after) / 2
-        m[3 + i] = after
-    if mode == FLIGHT:
-        m[2] += GRAVITY * dt * dt / 2
-        m[5] += GRAVITY * dt
-    step = dt * (1 + keep) / 2
-    for i in range(3):
-        for j in range(6):
-            P[i, j] += step * P[3 + i, j]
-    for i in range(3):
-        for j in range(6):
-            P[3 + i, j] *= keep
-    for j in range(3):
-        for i in range(6):
-            P[i, j] += step * P[i, 3 + j]
-    for j in range(3):
-        for i in range(6):
-            P[i, 3 + j] *= keep
-    for i in range(3):
-        P[i, i] += noise * dt**3 / 3
-        P[i, 3 + i] += noise * dt**2 / 2
-        P[3 + i, i] += noise * dt**2 / 2
-        P[3 + i, 3 + i] += noise * dt
-    if mode == ROLL:
-        stay = np.exp(-dt / GRASS_S)
-        m[2] = -REST + stay * (m[2] + REST)
-        m[5] = 0.0
-        for i in range(6):
-            P[2, i] *= stay
-            P[i, 5] = 0.0
-            P[5, i] = 0.0
-        for i in range(6):
-            P[i, 2] *= stay
-        P[2, 2] += GRASS_SIGMA**2 * (1 - stay * stay)
-        P[5, 5] = 0.01
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _pin(m, P, e, value, variance):
-    """Take a measurement ``e . position = value``; the square of its miss by its variance, and that."""
-    g = np.zeros(6)
-    for i in range(6):
-        g[i] = P[i, 0] * e[0] + P[i, 1] * e[1] + P[i, 2] * e[2]
-    total = g[0] * e[0] + g[1] * e[1] + g[2] * e[2] + variance
-    miss = value - (m[0] * e[0] + m[1] * e[1] + m[2] * e[2])
-    for i in range(6):
-        m[i] += g[i] * miss / total
-        for j in range(6):
-            P[i, j] -= g[i] * g[j] / total
-    return miss * miss / total, total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _copy(to_m, to_P, m, P):
-    for i in range(6):
-        to_m[i] = m[i]
-        for j in range(6):
-            to_P[i, j] = P[i, j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _forget(P, first, last):
-    for i in range(first, last):
-        for j in range(6):
-            P[i, j] = 0.0
-            P[j, i] = 0.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _touch(m, P, before, mode, dt):
-    """A kick at an unknown time between two knots, in place; its logarithm of probability."""
-    cost = np.log(KICKS_A_SECOND * max(dt, 1e-3))
-    _move(m, P, before, dt / 2)
-    if before == FLIGHT and mode != ROLL:
-        up = np.array([0.0, 0.0, 1.0])
-        square, _ = _pin(m, P, up, -TOUCHED, TOUCHED_SIGMA**2)
-        cost -= min(square / 2, 12.0)
-    spread = dt * dt / 12 * (m[3] ** 2 + m[4] ** 2 + KICK_SPEED**2)
-    if mode == ROLL:
-        cost += np.log(0.5)
-        square, total = _pin(m, P, np.array([0.0, 0.0, 1.0]), -REST, 4 * GRASS_SIGMA**2)
-        cost += min(0.0, -square / 2 - np.log(total) / 2 + np.log(0.4))
-        _forget(P, 3, 6)
-        m[5] = 0.0
-        if before == ROLL:
-            P[3, 3] = P[4, 4] = TOUCH_SPEED**2
-        else:
-            m[3] *= 0.3
-            m[4] *= 0.3
-            P[3, 3] = P[4, 4] = KICK_SPEED**2 / 2
-        P[5, 5] = 0.01
-        P[2, 2] += GRASS_SIGMA**2
-    elif mode == FLIGHT:
-        cost += np.log(0.5)
-        _forget(P, 3, 6)
-        m[3] *= 0.2
-        m[4] *= 0.2
-        m[5] = -3.0
-        P[3, 3] = P[4, 4] = KICK_SPEED**2
-        P[5, 5] = KICK_LIFT**2
-    else:
-        cost = np.log(HOLDS_A_SECOND * max(dt, 1e-3))
-        P[3, 3] += 4.0**2
-        P[4, 4] += 4.0**2
-        P[5, 5] += 2.0**2
-        m[3] *= 0.5
-        m[4] *= 0.5
-        m[5] *= 0.2
-    for i in range(3):
-        P[i, i] += spread
-    _move(m, P, mode, dt / 2)
-    return cost
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _bounce(m, P, mode, dt):
-    """A bounce between two knots, in place; its logarithm of probability, -inf where there is none."""
-    fall = m[5]
-    height = -m[2] - REST
-    if P[5, 5] < 4.0 and fall < -1.5:
-        return -np.inf
-    fall = max(fall, 0.5)
-    when = min(max(height / fall, 0.0), dt)
-    if abs(height - fall * when) > 1.0 + 4 * np.sqrt(P[2, 2]):
-        return -np.inf
-    _move(m, P, FLIGHT, when)
-    fall = max(m[5], 0.3)
-    slack = (fall * dt) ** 2 / 12 + 0.04**2
-    square, total = _pin(m, P, np.array([0.0, 0.0, 1.0]), -REST, slack)
-    cost = (
-        -square / 2
-        - np.log(2 * np.pi * total) / 2
-        + np.log((fall + np.sqrt(P[5, 5])) * max(dt, 1e-3))
-    )
-    cost = min(cost, 0.0) - 0.7
-    fall = m[5]
-    pace = np.sqrt(m[3] ** 2 + m[4] ** 2)
-    kept = KEPT
-    back = -RESTITUTION
-    if mode == ROLL:
-        back = 0.0
-        cost -= 0.7 * max(0.0, fall - 1.5) ** 2
-    for i in range(3, 6):
-        keep = kept if i < 5 else back
-        m[i] *= keep
-        for j in range(6):
-            P[i, j] *= keep
-        for j in range(6):
-            P[j, i] *= keep
-    P[3, 3] += (KEPT_SIGMA * pace + 0.4) ** 2
-    P[4, 4] += (KEPT_SIGMA * pace + 0.4) ** 2
-    P[5, 5] += (RESTITUTION_SIGMA * abs(fall) + 0.3) ** 2 if mode == FLIGHT else 0.01
-    spread = dt * dt / 12 * (0.3 * pace) ** 2 + 1e-4
-    P[0, 0] += spread
-    P[1, 1] += spread
-    P[2, 2] += dt * dt / 12 * (1.6 * fall) ** 2 + 1e-4
-    _move(m, P, mode, dt - when)
-    return cost
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _see(m, P, first, last, centres, across, along, noise, scale, far, far_sigma):
-    """Take the measurements of a knot, in place; their log likelihood and those left out, as bits."""
-    total, left = 0.0, 0
-    kept_m, kept_P = np.zeros(6), np.zeros((6, 6))
-    for row in range(first, last):
-        reach = 0.0
-        for i in range(3):
-            reach += along[row, i] * (m[i] - centres[row, i])
-        reach = min(max(reach, 3.0), 200.0)
-        likely = 0.0
-        _copy(kept_m, kept_P, m, P)
-        for which in range(2):
-            e = across[row, which]
-            value = e[0] * centres[row, 0] + e[1] * centres[row, 1] + e[2] * centres[row, 2]
-            square, spread = _pin(m, P, e, value, (noise[row] * reach) ** 2)
-            # Metres at this reach to pixels.
-            pixels = np.sqrt(spread) / reach * scale[row]
-            likely += -square / 2 - np.log(pixels) - 0.919
-        if far_sigma[row] > 0:
-            e = along[row]
-            value = e[0] * centres[row, 0] + e[1] * centres[row, 1] + e[2] * centres[row, 2]
-            square, spread = _pin(m, P, e, value + far[row], far_sigma[row] ** 2)
-            likely += max(-square / 2, -4.0) - np.log(np.sqrt(spread) / far_sigma[row])
-        if likely < _OUTLIER:
-            _copy(m, P, kept_m, kept_P)
-            likely = _OUTLIER
-            left |= 1 << (row - first)
-        total += likely
-    return total, left
+_PER_KNOT = 6
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def likeliest(
     times, starts, centres, across, along, noise, scale, far, far_sigma, room, width,
-    wanted, begin, due, may_not, places, normal, value, sigma,
+    changed, wanted, begin, due, may_not, places, normal, value, sigma,
 ):  # fmt: skip
     """The likeliest history of modes and events.
 
@@ -284,6 +51,7 @@ def likeliest(
         far, far_sigma: Distances from the cameras by size, and noise, 0 where unknown, shape (M,).
         room: Lowest and highest x, y and z of a ball, shape (3, 2).
         width: Hypotheses kept.
+        changed: Whether other views see the ball at a knot than before it, shape (K,).
         wanted: Kind of the event that happens once before a knot of its window, or ``NOTHING``, (K,).
         begin: First knot of that window, shape (K,).
         due: Whether a knot is its last, shape (K,).
@@ -304,13 +72,13 @@ def likeliest(
     count = 3
     M, C = np.zeros((width, 6)), np.zeros((width, 6, 6))
     score, since = np.zeros(width), np.zeros(width, np.int64)
-    latest = np.zeros(width, np.int64)
+    latest, jumped = np.zeros(width, np.int64), np.zeros(width, np.int64)
     size = width * _PER_KNOT + 3
     cm, cC = np.zeros((size, 6)), np.zeros((size, 6, 6))
     cs, cp = np.zeros(size), np.zeros(size, np.int64)
     cmode, cevent = np.zeros(size, np.int64), np.zeros(size, np.int64)
     csince, cleft = np.zeros(size, np.int64), np.zeros(size, np.int64)
-    clatest = np.zeros(size, np.int64)
+    clatest, cjump = np.zeros(size, np.int64), np.zeros(size, np.int64)
     order = np.zeros(size, np.int64)
     for k in range(K):
         made = 0
@@ -322,10 +90,10 @@ def likeliest(
                 P[2, 2] = GRASS_SIGMA**2 if mode == ROLL else 4.0**2
                 P[3, 3] = P[4, 4] = 10.0**2
                 P[5, 5] = 0.01 if mode == ROLL else 5.0**2
-                _copy(cm[made], cC[made], m, P)
+                copy(cm[made], cC[made], m, P)
                 cs[made] = -0.7 if mode < 2 else -4.0
                 cmode[made], cevent[made], cp[made], csince[made] = mode, NOTHING, 0, 0
-                clatest[made] = NOTHING
+                clatest[made], cjump[made] = NOTHING, 0
                 made += 1
         else:
             dt = times[k] - times[k - 1]
@@ -341,51 +109,59 @@ def likeliest(
                     now = missing != NOTHING and due[k] and strict == 0
                     for way in range(_PER_KNOT):
                         event = NOTHING if way == 0 else BOUNCE if way == 4 else KICK
+                        if way == 5:
+                            if not changed[k]:
+                                continue
+                            event = JUMP
                         may = event == NOTHING or not (may_not[k] >> event) & 1
                         if (now or not may) and (event != missing or event == NOTHING):
                             continue
                         m, P = cm[made], cC[made]
-                        _copy(m, P, M[h], C[h])
+                        copy(m, P, M[h], C[h])
                         after, cost = mode, 0.0
                         if way == 0:
-                            _move(m, P, mode, dt)
+                            move(m, P, mode, dt)
                         elif way == 1:
                             after = FLIGHT
-                            cost = _touch(m, P, mode, FLIGHT, dt)
+                            cost = touch(m, P, mode, FLIGHT, dt)
                         elif way == 2:
                             after = ROLL
-                            cost = _touch(m, P, mode, ROLL, dt)
+                            cost = touch(m, P, mode, ROLL, dt)
                         elif way == 3:
                             if mode == HELD:
                                 continue
                             after = HELD
-                            cost = _touch(m, P, mode, HELD, dt)
+                            cost = touch(m, P, mode, HELD, dt)
+                        elif way == 5:
+                            cost = jump(m, P, mode, dt)
                         else:
                             if mode != FLIGHT:
                                 continue
-                            cost = _bounce(m, P, FLIGHT, dt)
+                            cost = bounce(m, P, FLIGHT, dt)
                             if cost > -np.inf and m[5] > -1.2:
                                 # Too low a hop to be seen as one.
-                                _copy(m, P, M[h], C[h])
+                                copy(m, P, M[h], C[h])
                                 after = ROLL
-                                cost = _bounce(m, P, ROLL, dt)
+                                cost = bounce(m, P, ROLL, dt)
                         if cost == -np.inf:
                             continue
                         cmode[made], cevent[made], cp[made] = after, event, h
-                        csince[made] = since[h] if event == NOTHING else k
-                        clatest[made] = latest[h] if event == NOTHING else event
+                        happened = event in (KICK, BOUNCE)
+                        csince[made] = k if happened else since[h]
+                        clatest[made] = event if happened else latest[h]
+                        cjump[made] = k if event == JUMP else jumped[h]
                         cs[made] = score[h] + cost
                         made += 1
         best = -np.inf
         for c in range(made):
             m, P = cm[c], cC[c]
-            likely, left = _see(
+            likely, left = see(
                 m, P, starts[k], starts[k + 1], centres, across, along, noise, scale, far, far_sigma
             )
             cs[c] += likely
             cleft[c] = left
             for row in range(places[k], places[k + 1]):
-                square, total = _pin(m, P, normal[row], value[row], sigma[row] ** 2)
+                square, total = pin(m, P, normal[row], value[row], sigma[row] ** 2)
                 cs[c] -= min(square / 2, _UNLIKELY) + np.log(total) / 2
             for i in range(3):
                 slack = 2 * np.sqrt(max(P[i, i], 0.0)) + 0.1
@@ -411,17 +187,18 @@ def likeliest(
                 break
             alike = 0
             for other in range(kept):
-                if modes[k, other] == cmode[c] and since[other] == csince[c]:
+                same = since[other] == csince[c] and jumped[other] == cjump[c]
+                if same and modes[k, other] == cmode[c]:
                     alike += events[k, other] == cevent[c]
             if alike >= _ALIKE:
                 continue
-            _copy(M[kept], C[kept], cm[c], cC[c])
+            copy(M[kept], C[kept], cm[c], cC[c])
             for i in range(6):
                 states[k, kept, i] = cm[c, i]
             score[kept] = cs[c]
             parent[k, kept], modes[k, kept], events[k, kept] = cp[c], cmode[c], cevent[c]
             lefts[k, kept] = cleft[c]
-            since[kept], latest[kept] = csince[c], clatest[c]
+            since[kept], latest[kept], jumped[kept] = csince[c], clatest[c], cjump[c]
             kept += 1
         count = kept
     path = np.zeros(K, np.int64)

@@ -31,7 +31,7 @@ from app.tracking.ball_track import (
     Untracked,
 )
 
-TRACK_VERSION = "2"
+TRACK_VERSION = "3"
 """Of the solver: tracks of another one are stale."""
 EVENT_KINDS: tuple[str, ...] = get_args(EventKind)
 _UPPER = np.triu_indices(6)

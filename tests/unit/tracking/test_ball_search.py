@@ -7,7 +7,7 @@ import pytest
 
 from app.soccer.pitch import Pitch
 from app.tracking.ball_models import BOUNCE, FLIGHT, KICK, ROLL
-from app.tracking.ball_search import knots_of, louder, search
+from app.tracking.ball_search import changed_views, knots_of, louder, search
 from tests.unit.tracking.test_ball_solve import BALL, BOTH, LEFT, PLACES, RIGHT, TIMES, seen
 
 
@@ -36,6 +36,13 @@ class TestKnots:
         )
         assert knots.far == pytest.approx(far, rel=1e-6)
         assert knots.far_sigma == pytest.approx(knots.far / sizes)
+
+
+class TestChangedViews:
+    def test_it_is_where_a_view_comes_or_goes(self) -> None:
+        given = seen(BOTH, hide=[("left", 40, 60), ("left", 80, 90), ("right", 80, 90)])
+        changed = changed_views(knots_of(given, TIMES, np.zeros(2)))
+        assert np.flatnonzero(changed).tolist() == [40, 60]
 
 
 class TestLouder:

@@ -116,6 +116,40 @@ class TestTwoViews:
         assert np.allclose(again.position, track.position, atol=1e-3)
 
 
+class TestHandover:
+    """A view that takes over from another one, with a camera that puts the ball half a metre beside."""
+
+    TILTED = looking((12.0, -58.0, -12.0), (0.0, 0.0, -0.3), 1100.0)
+    LOB = np.array([-12.0, 2.0, -0.3]) + np.outer(TIMES, (10.0, 1.0, -12.0))
+
+    def handed(self, camera: Camera, kicked: float = 0.0) -> BallTrack:
+        """A lob whose second half another view sees than its first; what the camera of that is said to be."""
+        rows = np.flatnonzero(TIMES < 2.2)
+        places = self.LOB[rows].copy()
+        places[:, 2] += 9.81 / 2 * TIMES[rows] ** 2
+        places[:, 1] += kicked * np.maximum(TIMES[rows] - TIMES[28], 0.0)
+        views = BOTH | {"other": RIGHT}
+        hide = [("other", 0, 28), ("right", 28, len(TIMES))]
+        given = seen(views, places=places, hide=hide)
+        cameras = zip(given.views, given.cameras, strict=True)
+        said = tuple(camera if view == "other" else one for view, one in cameras)
+        given = replace(given, cameras=said)
+        return track_ball(given, FRAMES[rows], TIMES[rows], pitch=Pitch())
+
+    def test_the_jump_is_no_kick(self) -> None:
+        track = self.handed(self.TILTED)
+        aside = track.position[28, 1] - track.position[27, 1]
+        assert track.reason is None and abs(aside) > 0.3
+        assert track.events == () and track.contradicted == ()
+        assert np.abs(np.diff(track.velocity[:, 1])).max() < 1.0
+
+    def test_a_kick_at_that_instant_is_one(self) -> None:
+        for camera in (RIGHT, self.TILTED):
+            track = self.handed(camera, kicked=-9.0)
+            (kick,) = track.events
+            assert kick.kind == "kick" and abs(kick.frame - FRAMES[28]) <= 2
+
+
 class TestLeftOutFrames:
     def test_what_one_view_sees_and_what_none_sees_are_told_apart(self) -> None:
         track = tracked(seen(BOTH, hide=[("left", 40, 60), ("right", 50, 60)]))
