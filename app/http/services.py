@@ -32,9 +32,9 @@ from app.features.recordings.ball_runs import BallFollower
 from app.features.recordings.camera_jobs import resume_cameras
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
-from app.features.recordings.link_ball import resume_ball_links
 from app.features.solve.jobs import resume_solving, solve_leftovers
 from app.features.tracks.jobs import TRACKS
+from app.features.tracks.link_ball import resume_ball_links
 from app.features.upkeep.service import Upkeep
 from app.features.versions.jobs import resume_versions
 from app.features.webhooks.sender import WebhookSender

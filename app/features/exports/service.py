@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import get_args
 
+from app.config import Settings
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
@@ -194,7 +195,7 @@ def export(
             names = export_names(format, source.outlines())
             run = _ExportRun(source, options, frames, names, progress)
             # A version is the same every time; unassigned frames are the dataset's as it is.
-            run.tracks = _open_track_source(session, source, options)
+            run.tracks = _open_track_source(session, store.settings, source, options)
             if format == "parquet" and source.tracks:
                 run.kept = frozen_records(_frozen(session, source))
             if format == "issia" and isinstance(source, LiveSource):
@@ -295,7 +296,9 @@ def _require_format(
             try:
                 names = export_names(format, source.outlines())
                 run = _ExportRun(source, options, frames, names, None)
-                run.tracks = _open_track_source(session, source, options, try_only=True)
+                run.tracks = _open_track_source(
+                    session, store.settings, source, options, try_only=True
+                )
                 counts = run.write(Path(folder), small.put)
             except InputError as error:
                 raise _UnrepresentableError(error.message, hint=error.hint) from error
@@ -374,6 +377,7 @@ def _open_source(
 
 def _open_track_source(
     session: Session,
+    settings: Settings,
     source: LiveSource | VersionSource | _SampleSource,
     options: _ExportOptions,
     *,
@@ -383,7 +387,9 @@ def _open_track_source(
     if options.format not in TRACKS:
         return None
     frozen = None if source.tracks is None else _frozen(session, source)
-    found = track_source(session, source.dataset_id, source.dataset, source.policy, frozen)
+    found = track_source(
+        session, settings, source.dataset_id, source.dataset, source.policy, frozen
+    )
     everything = options.everything or frozen is not None
     return replace(found, everything=everything, try_only=try_only)
 

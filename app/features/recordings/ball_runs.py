@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import CancelledError
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,13 +12,11 @@ from typing import Any
 from app.canonical import canonical
 from app.config import Settings
 from app.db.idempotency import without_response
-from app.db.json_columns import Json, as_written, pack, parse, unpack
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
 from app.features.audit.audit_events import add_audit_event
 from app.features.groups.bulk_edits import ViewEdits, edit_views
-from app.features.groups.digest import digest
 from app.features.groups.edit import Edit, SetBalls
 from app.features.groups.queries import read_groups
 from app.features.groups.state import read_etags, require_etag
@@ -31,6 +29,8 @@ from app.features.recordings.ball_run_queries import (
     predicted_in,
     update_run,
 )
+from app.features.recordings.ball_run_values import StoredRun as StoredRun
+from app.features.recordings.ball_run_values import run_columns, run_of_row
 from app.features.recordings.camera_queries import views_of_video
 from app.features.recordings.cameras import cameras_at
 from app.features.recordings.index import read_index
@@ -53,46 +53,6 @@ EACH_WAY = 250
 KEPT_BYTES, BEHIND = 160 * 2**20, 16
 """Of decoded frames; and how many are decoded together where it goes backwards."""
 _BATCH = 100
-
-
-@dataclass(frozen=True)
-class StoredRun:
-    """A run as it stands.
-
-    Attributes:
-        run: Its frames.
-        confirmed: Uncertain frames that a person said are right.
-        accepted_by: Who accepted it; None: nobody.
-        stale: Whether the video is another one by now.
-        groups: What accepting did: views that got the ball (``placed``), and that had one already (``kept``).
-    """
-
-    id: int
-    dataset_id: int
-    recording: int
-    run: BallRun
-    confirmed: tuple[int, ...]
-    accepted_by: str | None
-    stale: bool
-    groups: Mapping[str, int]
-    actor: str
-    created: str
-    etag: str
-
-    @property
-    def name(self) -> str:
-        """What balls that come from it say they come from."""
-        return f"ball run {self.id}"
-
-    @property
-    def trusted(self) -> dict[int, FollowedBall]:
-        """The balls that accepting it stands for, by frame: all but uncertain ones that nobody confirmed."""
-        sure = {*self.confirmed, *(click.frame for click in self.run.clicks)}
-        return {
-            ball.frame: ball
-            for ball in self.run.balls
-            if ball.state == "followed" or ball.frame in sure
-        }
 
 
 @dataclass(frozen=True)
@@ -189,7 +149,7 @@ def list_runs(store: Store, recording_id: int) -> list[StoredRun]:
     """
     with store.read() as session:
         sha256 = need_recording(session, recording_id).sha256
-        return [_of_row(row, sha256) for row in list_run_rows(session, recording_id)]
+        return [run_of_row(row, sha256) for row in list_run_rows(session, recording_id)]
 
 
 def get_run(store: Store, recording_id: int, run_id: int) -> StoredRun:
@@ -206,7 +166,7 @@ def _need(session: Session, recording_id: int, run_id: int) -> StoredRun:
     row = find_run(session, run_id)
     if row is None or row.recording_id != recording_id:
         raise NotFoundError(f"recording {recording_id} has no ball run {run_id}")
-    return _of_row(row, need_recording(session, recording_id).sha256)
+    return run_of_row(row, need_recording(session, recording_id).sha256)
 
 
 def add_run(
@@ -233,7 +193,7 @@ def add_run(
             dataset_id=recording.dataset_id,
             recording_id=recording_id,
             sha256=recording.sha256,
-            **_values(run),
+            **run_columns(run),
         )
         found = _need(session, recording_id, number)
         _note(session, actor, "ball followed", found)
@@ -265,7 +225,7 @@ def mend_run(
         _require_open(before, if_match)
         run = before.run.mended(new)
         kept = [frame for frame in before.confirmed if frame in {ball.frame for ball in run.balls}]
-        values = {**_values(run), "confirmed": canonical(kept)}
+        values = {**run_columns(run), "confirmed": canonical(kept)}
         found = _change(session, before, actor, "ball followed anew", **values)
         session.respond(found)
     return found
@@ -452,64 +412,3 @@ def _change(session: Session, run: StoredRun, actor: str, did: str, **values: An
 def _note(session: Session, actor: str, did: str, run: StoredRun) -> None:
     what = {"recording": run.recording, "run": run.id, "first": run.run.first, "last": run.run.last}
     add_audit_event(session, actor, did, run.dataset_id, **what)
-
-
-def _values(run: BallRun) -> dict[str, Any]:
-    return {"first": run.first, "last": run.last, "body": pack(run_to_json(run))}
-
-
-def run_to_json(run: BallRun) -> Json:
-    """A run as columns: the same place is the same frame."""
-    columns = {
-        name: [round(float(getattr(ball, name)), digits) for ball in run.balls]
-        for name, digits in _COLUMNS.items()
-    }
-    return {
-        "clicks": [asdict(click) for click in run.clicks],
-        "before": run.before,
-        "after": run.after,
-        "frame": [ball.frame for ball in run.balls],
-        **columns,
-        "state": "".join(ball.state[0] for ball in run.balls),
-    }
-
-
-_COLUMNS = {"x": 3, "y": 3, "diameter": 3, "sigma_px": 3, "confidence": 3}
-_STATES = {"f": "followed", "u": "uncertain"}
-
-
-def run_from_json(value: Mapping[str, Any]) -> BallRun:
-    """Back from ``run_to_json``.
-
-    Raises:
-        DamagedError: It is not what was written.
-    """
-    with as_written():
-        rows = zip(
-            value["frame"],
-            *(value[name] for name in _COLUMNS),
-            (_STATES[letter] for letter in value["state"]),
-            strict=True,
-        )
-        return BallRun(
-            tuple(BallClick(**click) for click in value["clicks"]),
-            tuple(FollowedBall(*row) for row in rows),
-            value["before"],
-            value["after"],
-        )
-
-
-def _of_row(row: Any, sha256: str | None) -> StoredRun:
-    return StoredRun(
-        id=int(row.id),
-        dataset_id=int(row.dataset_id),
-        recording=int(row.recording_id),
-        run=run_from_json(unpack(row.body)),
-        confirmed=tuple(parse(row.confirmed)),
-        accepted_by=row.accepted_by,
-        stale=row.sha256 != sha256,
-        groups=parse(row.groups),
-        actor=row.actor,
-        created=row.created,
-        etag=f'"{digest([row.id, row.revision, row.created])[:16]}"',
-    )

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from app.config import Settings
 from app.db.store import Store
 from app.features.recordings.index import index_place, read_index_at
-from app.features.recordings.link_values import ShotLink
+from app.features.recordings.link_values import LinkedShot, ShotLink
 from app.features.recordings.links import need_link, shot_seconds, step_of
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.video.repeats import blended, repeated
@@ -59,6 +60,16 @@ def linked_frames(store: Store, link: ShotLink) -> LinkedFrames:
         tuple(link.replay.first + int(frame) for frame in np.flatnonzero(mark)) for mark in marks
     )
     return LinkedFrames(link.live.first, tuple(nearest), tuple(off), repeats, blends)
+
+
+def unsound_frames(settings: Settings, sha256: str, shot: LinkedShot) -> set[int]:
+    """Frames of a shot that show the one before once more, or a mix of those beside them.
+
+    Raises:
+        ConflictError: The index is gone, or of an older version.
+    """
+    marks = _marks(index_place(settings, sha256), shot.first, shot.last)
+    return {shot.first + int(at) for at in np.flatnonzero(np.logical_or(*marks))}
 
 
 def nearest_frames(

@@ -7,7 +7,6 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from app.features.jobs.queries import Job
-from app.features.recordings.link_ball import request_ball_link
 from app.features.recordings.link_frames import LinkedFrames, linked_frames
 from app.features.recordings.link_schemas import (
     BallLinkRequest,
@@ -21,6 +20,7 @@ from app.features.recordings.link_suggestions import suggest_live
 from app.features.recordings.link_values import ShotLink, links_csv
 from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
 from app.features.recordings.routes import CSV_FILE
+from app.features.tracks.link_ball import request_ball_link
 from app.finite import MAX_ID
 from app.http.conflicts import current_state
 from app.http.cursor import paged

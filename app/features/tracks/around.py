@@ -13,6 +13,7 @@ from app.features.tracks.codec import TrackInputs, make_track
 from app.features.tracks.findings import groups_by_frame
 from app.features.tracks.making import read_records
 from app.features.tracks.queries import find_row, list_rows, match_groups, place_of_group
+from app.features.tracks.run_measurements import followed_observations, followed_runs
 from app.features.tracks.service import TrackDetail
 from app.features.tracks.stored import Track, stored_track
 from app.features.tracks.stretches import frame_of, gather_stretches
@@ -53,7 +54,8 @@ def tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
             return []
         head = read_dataset_head(session, place.dataset_id)
         groups = match_groups(session, head.id, [place.match]).get(place.match, [])
-        return [TrackOfGroup(stored_track(row, head.policy, groups), frame) for row in rows]
+        runs = followed_runs(session, head.id).get(place.match, ())
+        return [TrackOfGroup(stored_track(row, head.policy, groups, runs), frame) for row in rows]
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,8 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
             raise NotFoundError(f"there is no track {track_id}")
         head = read_dataset_head(session, int(row.dataset_id))
         groups = match_groups(session, head.id, [row.match]).get(row.match, [])
-        track = stored_track(row, head.policy, groups)
+        runs = followed_runs(session, head.id).get(row.match, [])
+        track = stored_track(row, head.policy, groups, runs)
         if frame is None:
             worst = track.summary.worst
             frame = track.first if worst is None else worst
@@ -100,8 +103,16 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
         last = min(track.last, frame + AROUND + _MARGIN)
         near = groups_by_frame(groups, first, last)
         records = list(read_records(session, list(near.values())))
+        close = {row.match: [run for run in runs if run.first <= last and first <= run.last]}
+        followed = {
+            match: [one for one in items if first <= one.frame <= last]
+            for match, items in followed_observations(
+                session, store.settings, close, head.policy
+            ).items()
+        }
     # One stretch, however far apart its groups are.
-    stretches = gather_stretches(records, head.policy, {track.match: [(track.first, track.last)]})
+    shots = {track.match: [(track.first, track.last)]}
+    stretches = gather_stretches(records, head.policy, shots, followed)
     if not stretches:
         return Around(frame, TrackDetail(track, *_nothing(track, first, last), near))
     corrections = (item for item in track.corrections if first <= item.frame <= last)

@@ -17,6 +17,7 @@ from app.features.tracks.codec import (
     make_track,
     track_from_json,
 )
+from app.features.tracks.run_measurements import FollowedObservation
 from app.features.tracks.stretches import (
     RATE,
     Shots,
@@ -65,6 +66,7 @@ class TrackSource:
         policy: Says how noisy clicks and cameras are.
         shots: Of its recordings.
         known: What is stored of stretches, or frozen.
+        followed: Balls of accepted runs, by match.
         frozen: Whether it is a frozen version's tracks that are known: they are written as they are, and
             no others.
         everything: Whether rejected groups and tracks take part.
@@ -80,6 +82,7 @@ class TrackSource:
     everything: bool = False
     try_only: bool = False
     facts: list[dict[str, Any]] = field(default_factory=list)
+    followed: Mapping[str, Sequence[FollowedObservation]] = field(default_factory=dict)
 
     def records(self, records: Iterable[ExportRecord]) -> Iterator[TrackRecord]:
         """The tracks of groups, in the order of their keys.
@@ -88,7 +91,7 @@ class TrackSource:
             InputError: No groups follow each other in time, or no stretch has a track; with the reasons.
         """
         taken = (item for item in records if self.everything or item.verdict != "rejected")
-        stretches = gather_stretches(taken, self.policy, self.shots)
+        stretches = gather_stretches(taken, self.policy, self.shots, self.followed)
         require_stretch(self.dataset, stretches)
         if self.try_only:
             return

@@ -37,6 +37,7 @@ from app.features.tracks.queries import (
     recording_shots,
     update_track,
 )
+from app.features.tracks.run_measurements import followed_observations, followed_runs
 from app.features.tracks.stored import (
     UNJUDGED,
     TrackSummary,
@@ -50,9 +51,9 @@ from app.features.tracks.stretches import (
     instant_of,
     require_stretch,
     stored_as,
-    unused_sentence,
 )
 from app.formats.export_record import ExportRecord
+from app.plural import plural
 from app.progress import ReportProgress
 from app.tracking.ball_track import BallTrack
 
@@ -94,6 +95,13 @@ def make_tracks(
         found = read_dataset_head(session, dataset)
         shots = recording_shots(session, found.id)
         groups = match_groups(session, found.id, matches)
+        runs = followed_runs(session, found.id)
+        followed = followed_observations(
+            session,
+            store.settings,
+            {match: items for match, items in runs.items() if match in groups},
+            found.policy,
+        )
         timed = {name: items for name, items in groups.items() if _says_time(session, items)}
         total, done = sum(map(len, timed.values())), 0
         stretches: list[Stretch] = []
@@ -104,11 +112,13 @@ def make_tracks(
                 if len(records) % BATCH == 0:
                     progress(done + len(records), total)
             done += len(items)
-            stretches += gather_stretches(records, found.policy, shots)
+            stretches += gather_stretches(records, found.policy, shots, followed)
         stored = stored_as(stretches, list_rows(session, found.id))
     require_stretch(found.name, stretches)
     for tracked, stretch in enumerate(stretches, 1):
-        stamp = track_stamp(found.policy, groups[stretch.match], stretch)
+        stamp = track_stamp(
+            found.policy, groups[stretch.match], stretch, runs.get(stretch.match, ())
+        )
         is_new, reason = _make(store, found, stretch, stored.get(stretch.key), stamp, actor)
         made.made += is_new
         made.unchanged += not is_new
@@ -190,6 +200,12 @@ def _computed(
         "first": stretch.first,
         "last": stretch.last,
     }
+
+
+def unused_sentence(unused: Mapping[str, int]) -> str | None:
+    """Which balls took no part, a sentence; None: all did."""
+    parts = [f"{plural(count, 'ball')} ({reason})" for reason, count in sorted(unused.items())]
+    return f"Not measured: {', '.join(parts)}." if parts else None
 
 
 def _said(session: Session, dataset: DatasetHead, stretch: Stretch, own: Any | None) -> str:

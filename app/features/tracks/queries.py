@@ -13,7 +13,7 @@ from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.groups.insert_queries import next_id
 from app.features.queue.tables import QueueModel
-from app.features.recordings.tables import RecordingModel
+from app.features.recordings.tables import BallRunModel, RecordingModel
 from app.features.tracks.tables import TrackModel
 
 _LARGE = ("inputs", "body", "patches")
@@ -61,6 +61,25 @@ def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[i
             row.name: [(shot["first"], shot["last"]) for shot in parse(row.shots)]
             for row in session.execute(statement)
         }
+
+
+def accepted_run_rows(session: Session, dataset_id: int) -> Sequence[Any]:
+    """The accepted ball runs of a dataset whose video is still the same, with ``name`` and ``video`` (sha256) of
+    their recordings."""
+    run, recording = BallRunModel, RecordingModel
+    statement = (
+        select(
+            *run.__table__.columns, recording.name.label("name"), recording.sha256.label("video")
+        )
+        .join(recording, recording.id == run.recording_id)
+        .where(
+            run.dataset_id == dataset_id,
+            run.accepted_by.is_not(None),
+            run.sha256 == recording.sha256,
+        )
+        .order_by(run.id)
+    )
+    return session.execute(statement).all()
 
 
 def place_of_group(session: Session, group_id: int) -> Any | None:

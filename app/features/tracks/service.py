@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 from app.canonical import canonical
+from app.config import Settings
 from app.db.json_columns import Json, pack, parse, unpack
 from app.db.session import Session, now
 from app.db.store import Store
@@ -40,6 +41,7 @@ from app.features.tracks.queries import (
     recording_shots,
     update_track,
 )
+from app.features.tracks.run_measurements import followed_observations, followed_runs
 from app.features.tracks.stored import UNJUDGED, corrections_of, stored_track, summary_of
 from app.features.tracks.stored import Track as Track
 from app.features.tracks.stored import TrackSummary as TrackSummary
@@ -90,7 +92,11 @@ def list_tracks(store: Store, dataset: str | int) -> list[Track]:
         found = read_dataset_head(session, dataset)
         rows = list_rows(session, found.id)
         groups = match_groups(session, found.id, {row.match for row in rows}) if rows else {}
-        return [stored_track(row, found.policy, groups.get(row.match, ())) for row in rows]
+        runs = followed_runs(session, found.id) if rows else {}
+        return [
+            stored_track(row, found.policy, groups.get(row.match, ()), runs.get(row.match, ()))
+            for row in rows
+        ]
 
 
 def get_track(store: Store, track_id: int) -> Track:
@@ -174,9 +180,11 @@ def accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
     was computed from (``codec.frozen_track``)."""
     rows = [row for row in list_rows(session, dataset.id) if row.verdict == "accepted"]
     groups = match_groups(session, dataset.id, {row.match for row in rows}) if rows else {}
+    runs = followed_runs(session, dataset.id) if rows else {}
     found = {}
     for row in rows:
-        track = stored_track(row, dataset.policy, groups.get(row.match, ()))
+        of_match = groups.get(row.match, ()), runs.get(row.match, ())
+        track = stored_track(row, dataset.policy, *of_match)
         if track.stale:
             continue
         whole, ball = _ball(read_bodies(session, [row.id])[row.id], track.corrections)
@@ -186,6 +194,7 @@ def accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
 
 def track_source(
     session: Session,
+    settings: Settings,
     dataset_id: int,
     dataset: str,
     policy: Policy,
@@ -195,6 +204,7 @@ def track_source(
 
     Args:
         session: Any session.
+        settings: Say where indexes and cameras of recordings lie.
         dataset_id: Of the dataset.
         dataset: Its name.
         policy: Says how noisy clicks and cameras are.
@@ -215,7 +225,8 @@ def track_source(
         track = None if body is None else _ball(body, said)[1]
         place = row.key, row.match, row.first, row.last
         known.append(KnownTrack(*place, row.digest, track, row.verdict, said))
-    return TrackSource(dataset, policy, shots, known)
+    followed = followed_observations(session, settings, followed_runs(session, dataset_id), policy)
+    return TrackSource(dataset, policy, shots, known, followed=followed)
 
 
 def _read(session: Session, track_id: int) -> tuple[Track, list[TrackGroup]]:
@@ -224,7 +235,8 @@ def _read(session: Session, track_id: int) -> tuple[Track, list[TrackGroup]]:
         raise NotFoundError(f"there is no track {track_id}")
     found = read_dataset_head(session, int(row.dataset_id))
     groups = match_groups(session, found.id, [row.match]).get(row.match, [])
-    return stored_track(row, found.policy, groups), groups
+    runs = followed_runs(session, found.id).get(row.match, ())
+    return stored_track(row, found.policy, groups, runs), groups
 
 
 def _ball(body: TrackBody, said: tuple[Correction, ...]) -> tuple[TrackInputs, BallTrack]:

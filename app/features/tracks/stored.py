@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -12,6 +12,7 @@ from app.db.json_columns import as_written, parse
 from app.features.groups.digest import digest
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
 from app.features.tracks.queries import TrackGroup
+from app.features.tracks.run_measurements import FollowedRun, followed_states
 from app.features.tracks.stretches import StoredStretch, frame_of
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
@@ -113,8 +114,10 @@ def summary_of(track: BallTrack, like: TrackSummary) -> TrackSummary:
     )
 
 
-def stored_track(row: Any, policy: Policy, groups: Iterable[TrackGroup]) -> Track:
-    """A row of the table without what is large, with the groups of its match."""
+def stored_track(
+    row: Any, policy: Policy, groups: Iterable[TrackGroup], runs: Sequence[FollowedRun] = ()
+) -> Track:
+    """A row of the table without what is large, with the groups and accepted ball runs of its match."""
     with as_written():
         summary = TrackSummary(**parse(row.summary))
     return Track(
@@ -125,7 +128,7 @@ def stored_track(row: Any, policy: Policy, groups: Iterable[TrackGroup]) -> Trac
         match=row.match,
         first=row.first,
         last=row.last,
-        stale=row.stamp != track_stamp(policy, groups, row),
+        stale=row.stamp != track_stamp(policy, groups, row, runs),
         verdict=row.verdict,
         note=row.note,
         judged_by=row.judged_by,
@@ -145,13 +148,19 @@ def corrections_of(row: Any) -> tuple[Correction, ...]:
         return corrections_from_json(parse(row.corrections))
 
 
-def track_stamp(policy: Policy, groups: Iterable[TrackGroup], place: StoredStretch) -> str:
+def track_stamp(
+    policy: Policy,
+    groups: Iterable[TrackGroup],
+    place: StoredStretch,
+    runs: Sequence[FollowedRun] = (),
+) -> str:
     """A digest of what a stretch's track depends on, without computing it.
 
     Args:
         policy: Of the dataset.
         groups: Of the match.
         place: The stretch: of a rig all groups of the match, of a recording those of its frames.
+        runs: Accepted ball runs that show the ball of the match.
     """
     whole = place.key == place.match
     states = [
@@ -160,4 +169,6 @@ def track_stamp(policy: Policy, groups: Iterable[TrackGroup], place: StoredStret
         if (frame := frame_of(group.key)) is not None
         and (whole or place.first <= frame <= place.last)
     ]
-    return digest([TRACK_VERSION, SOLVER_VERSION, policy.hash, states])
+    followed = followed_states(runs, place.first, place.last)
+    said = [followed] if followed else []
+    return digest([TRACK_VERSION, SOLVER_VERSION, policy.hash, states, *said])

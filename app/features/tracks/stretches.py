@@ -15,10 +15,10 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from app.errors import InputError
+from app.features.tracks.run_measurements import FollowedObservation, linked_view
 from app.formats.export_record import ExportRecord
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
@@ -157,7 +157,10 @@ class _Match:
 
 
 def gather_stretches(
-    records: Iterable[ExportRecord], policy: Policy, shots: Shots | None = None
+    records: Iterable[ExportRecord],
+    policy: Policy,
+    shots: Shots | None = None,
+    followed: Mapping[str, Sequence[FollowedObservation]] | None = None,
 ) -> list[Stretch]:
     """The stretches of groups, by match and time; groups that say no time are in none.
 
@@ -165,6 +168,8 @@ def gather_stretches(
         records: Groups with their solutions, in any order.
         policy: Says how noisy clicks and cameras are.
         shots: Of recordings, where they are known.
+        followed: Balls of accepted runs in frames that are of no group, by match: of the frames of a stretch,
+            and beyond its groups of those of its shot.
     """
     matches: dict[str, _Match] = {}
     known: dict[bytes, Camera] = {}
@@ -180,12 +185,14 @@ def gather_stretches(
         match.rows.sort(key=lambda row: row.instant.frame)
         of_match = (shots or {}).get(name)
         for rows in _parts(match, of_match):
-            key = name
+            key, beside = name, list[FollowedObservation]()
             if match.recorded:
                 first, last = rows[0].instant.frame, rows[-1].instant.frame
                 first, last = _shot_at(first, of_match) or (first, last)
                 key = f"{name} {first}-{last}"
-            stretches.append(_stretch(key, name, rows, match, policy))
+                every = (followed or {}).get(name, ())
+                beside = [one for one in every if first <= one.frame <= last]
+            stretches.append(_stretch(key, name, rows, beside, match, policy))
     return stretches
 
 
@@ -265,7 +272,7 @@ def view_name(view: View) -> str:
     found = _taken_from(view)
     if "name" not in found:
         return view.key
-    return f"{found['name']} link {found['link']}" if "link" in found else str(found["name"])
+    return linked_view(found["name"], found["link"]) if "link" in found else str(found["name"])
 
 
 def _later(view: View) -> float:
@@ -312,9 +319,17 @@ def _shot_at(frame: int, shots: Sequence[tuple[int, int]] | None) -> tuple[int, 
     return next((shot for shot in shots or () if shot[0] <= frame <= shot[1]), None)
 
 
-def _stretch(key: str, name: str, rows: Sequence[_Row], match: _Match, policy: Policy) -> Stretch:
-    numbers = np.array([row.instant.frame for row in rows])
-    seconds = np.array([row.instant.time for row in rows])
+def _stretch(
+    key: str,
+    name: str,
+    rows: Sequence[_Row],
+    beside: Sequence[FollowedObservation],
+    match: _Match,
+    policy: Policy,
+) -> Stretch:
+    shown = {one.frame: one.frame_time for one in beside}
+    shown |= {row.instant.frame: row.instant.time for row in rows}
+    numbers, seconds = (np.array(column) for column in zip(*sorted(shown.items()), strict=True))
     count = int(numbers[-1] - numbers[0]) + 1
     if count > MOST_FRAMES:
         raise InputError(
@@ -327,6 +342,8 @@ def _stretch(key: str, name: str, rows: Sequence[_Row], match: _Match, policy: P
     for row in rows:
         for view, camera in row.cameras.items():
             cameras.setdefault(view, {})[row.instant.frame] = camera
+    for one in beside:
+        cameras.setdefault(one.view, {}).setdefault(one.frame, one.ball.camera)
     return Stretch(
         key=key,
         match=name,
@@ -335,24 +352,31 @@ def _stretch(key: str, name: str, rows: Sequence[_Row], match: _Match, policy: P
         # Time stamps of frames without a group lie between those of their neighbours.
         times=np.interp(frames, numbers, seconds),
         pitch=rows[0].pitch,
-        measurements=_measurements(rows, policy),
+        measurements=_measurements(rows, beside, policy),
         groups={row.instant.frame: row.instant.key for row in rows},
         cameras=cameras,
         unused={reason: number for reason, number in unused.items() if number},
     )
 
 
-def _measurements(rows: Sequence[_Row], policy: Policy) -> BallMeasurements:
-    found = [(row, name, time, item) for row in rows for name, time, item in row.observations]
-    observations = [item for *_, item in found]
-    points = np.array([_rough(item, row.point) for row, _, _, item in found]).reshape(-1, 3)
+def _measurements(
+    rows: Sequence[_Row], beside: Sequence[FollowedObservation], policy: Policy
+) -> BallMeasurements:
+    found = [
+        (row.instant.frame, name, time, item, row.point)
+        for row in rows
+        for name, time, item in row.observations
+    ]
+    found += [(one.frame, one.view, one.time, one.ball, None) for one in beside]
+    observations = [item for *_, item, _ in found]
+    points = np.array([_rough(item, place) for *_, item, place in found]).reshape(-1, 3)
     spread = ray_covariances(observations, points, policy) if found else np.zeros((0, 2, 2))
     sizes = np.array([item.diameter_px or np.nan for item in observations])
     share = np.hypot(policy.box_sigma_share * sizes, policy.click_sigma_px)
     return BallMeasurements(
-        np.array([row.instant.frame for row, *_ in found], dtype=np.int64),
-        np.array([time for _, _, time, _ in found], dtype=float),
-        tuple(name for _, name, _, _ in found),
+        np.array([frame for frame, *_ in found], dtype=np.int64),
+        np.array([time for _, _, time, *_ in found], dtype=float),
+        tuple(name for _, name, *_ in found),
         np.array([[*item.center] for item in observations], dtype=float).reshape(-1, 2),
         np.sqrt(np.trace(spread, axis1=1, axis2=2) / 2),
         tuple(item.camera for item in observations),
@@ -371,9 +395,3 @@ def _rough(item: BallObservation, place: tuple[float, float, float] | None) -> F
     down = ray[2]
     depth = (-_ROUGH_HEIGHT_M - position[2]) / down if down > 1e-3 else np.inf
     return np.asarray(position + ray * (depth if 0 < depth < 300 else _ROUGH_DEPTH_M))
-
-
-def unused_sentence(unused: Mapping[str, int]) -> str | None:
-    """Which balls took no part, a sentence; None: all did."""
-    parts = [f"{plural(count, 'ball')} ({reason})" for reason, count in sorted(unused.items())]
-    return f"Not measured: {', '.join(parts)}." if parts else None

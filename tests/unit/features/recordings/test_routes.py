@@ -22,7 +22,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.policy import TOUCHLINE
 from tests.cameras import looking
 from tests.films import Join, KnownShot, join, rendered, write_film
-from tests.unit.features.recordings.conftest import FRAMES
+from tests.unit.features.conftest import FRAMES
 from tests.videos import HEIGHT, WIDTH, number_of, write_video
 from touchline.errors import DataError
 

@@ -7,6 +7,7 @@ import pytest
 
 from app.errors import InputError
 from app.features.tracks.codec import TrackInputs, make_track
+from app.features.tracks.making import unused_sentence
 from app.features.tracks.stretches import (
     RATE,
     Stretch,
@@ -14,7 +15,6 @@ from app.features.tracks.stretches import (
     instant_of,
     require_stretch,
     stored_as,
-    unused_sentence,
 )
 from app.formats.export_record import ExportRecord
 from app.soccer.annotation import BallAnnotation, Extras

@@ -18,10 +18,10 @@ from app.db.session import now
 from app.db.store import Store
 from app.features.datasets.service import read_dataset_head
 from app.features.recordings.camera_tracking import Tracked, save_cameras
-from app.features.recordings.link_ball import _of_groups, ball_places
 from app.features.recordings.links import get_link
 from app.features.recordings.service import get_recording
 from app.features.tracks.codec import TrackInputs, inputs_to_json, track_to_json
+from app.features.tracks.link_ball import _of_groups, ball_places
 from app.features.tracks.queries import insert_track
 from app.features.tracks.stored import TrackSummary, track_stamp
 from app.geometry.arrays import FloatArray

@@ -1,0 +1,118 @@
+"""Ball runs as they are stored: from a row of the database to a value, and as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from app.db.json_columns import Json, as_written, pack, parse, unpack
+from app.features.groups.digest import digest
+from app.tracking.ball_run import BallClick, BallRun, FollowedBall
+
+_COLUMNS = {"x": 3, "y": 3, "diameter": 3, "sigma_px": 3, "confidence": 3}
+_STATES = {"f": "followed", "u": "uncertain"}
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run as it stands.
+
+    Attributes:
+        run: Its frames.
+        confirmed: Uncertain frames that a person said are right.
+        accepted_by: Who accepted it; None: nobody.
+        stale: Whether the video is another one by now.
+        groups: What accepting did: views that got the ball (``placed``), and that had one already (``kept``).
+    """
+
+    id: int
+    dataset_id: int
+    recording: int
+    run: BallRun
+    confirmed: tuple[int, ...]
+    accepted_by: str | None
+    stale: bool
+    groups: Mapping[str, int]
+    actor: str
+    created: str
+    etag: str
+
+    @property
+    def name(self) -> str:
+        """What balls that come from it say they come from."""
+        return f"ball run {self.id}"
+
+    @property
+    def trusted(self) -> dict[int, FollowedBall]:
+        """The balls that accepting it stands for, by frame: all but uncertain ones that nobody confirmed."""
+        sure = {*self.confirmed, *(click.frame for click in self.run.clicks)}
+        return {
+            ball.frame: ball
+            for ball in self.run.balls
+            if ball.state == "followed" or ball.frame in sure
+        }
+
+
+def run_of_row(row: Any, sha256: str | None) -> StoredRun:
+    """The run of a row.
+
+    Args:
+        row: Of the table.
+        sha256: Of its recording's video as it is now.
+    """
+    return StoredRun(
+        id=int(row.id),
+        dataset_id=int(row.dataset_id),
+        recording=int(row.recording_id),
+        run=run_from_json(unpack(row.body)),
+        confirmed=tuple(parse(row.confirmed)),
+        accepted_by=row.accepted_by,
+        stale=row.sha256 != sha256,
+        groups=parse(row.groups),
+        actor=row.actor,
+        created=row.created,
+        etag=f'"{digest([row.id, row.revision, row.created])[:16]}"',
+    )
+
+
+def run_columns(run: BallRun) -> dict[str, Any]:
+    """The columns of the table that hold a run."""
+    return {"first": run.first, "last": run.last, "body": pack(run_to_json(run))}
+
+
+def run_to_json(run: BallRun) -> Json:
+    """A run as columns: the same place is the same frame."""
+    columns = {
+        name: [round(float(getattr(ball, name)), digits) for ball in run.balls]
+        for name, digits in _COLUMNS.items()
+    }
+    return {
+        "clicks": [asdict(click) for click in run.clicks],
+        "before": run.before,
+        "after": run.after,
+        "frame": [ball.frame for ball in run.balls],
+        **columns,
+        "state": "".join(ball.state[0] for ball in run.balls),
+    }
+
+
+def run_from_json(value: Mapping[str, Any]) -> BallRun:
+    """Back from ``run_to_json``.
+
+    Raises:
+        DamagedError: It is not what was written.
+    """
+    with as_written():
+        rows = zip(
+            value["frame"],
+            *(value[name] for name in _COLUMNS),
+            (_STATES[letter] for letter in value["state"]),
+            strict=True,
+        )
+        return BallRun(
+            tuple(BallClick(**click) for click in value["clicks"]),
+            tuple(FollowedBall(*row) for row in rows),
+            value["before"],
+            value["after"],
+        )
