@@ -139,21 +139,22 @@ def arc_points(kinds, shapes):
 
 @compiled
 def unpack_camera(parameters, half_diagonal):
-    """Rotation row by row, position, focal length, kappa / half_diagonal^2 and its unit."""
+    """Rotation row by row, position, focal length, kappa / half_diagonal^2 and its unit.
+
+    A tuple: kernels count who holds an array each time that they hand it on.
+    """
     sp, cp = np.sin(parameters[0]), np.cos(parameters[0])
     st, ct = np.sin(parameters[1]), np.cos(parameters[1])
     sr, cr = np.sin(parameters[2]), np.cos(parameters[2])
-    camera = np.empty(21)
     # R = Rz(-roll) Rx(-tilt) Rz(-pan)
-    camera[0], camera[1], camera[2] = cr * cp - sr * ct * sp, cr * sp + sr * ct * cp, sr * st
-    camera[3], camera[4], camera[5] = -sr * cp - cr * ct * sp, -sr * sp + cr * ct * cp, cr * st
-    camera[6], camera[7], camera[8] = st * sp, -st * cp, ct
-    camera[9:12] = parameters[3:6]
-    camera[12] = np.exp(parameters[6])
-    camera[13] = parameters[7] / (half_diagonal * half_diagonal)
-    camera[14] = 1.0 / (half_diagonal * half_diagonal)
-    camera[15], camera[16], camera[17], camera[18], camera[19], camera[20] = sp, cp, st, ct, sr, cr
-    return camera
+    return (
+        cr * cp - sr * ct * sp, cr * sp + sr * ct * cp, sr * st,
+        -sr * cp - cr * ct * sp, -sr * sp + cr * ct * cp, cr * st,
+        st * sp, -st * cp, ct,
+        parameters[3], parameters[4], parameters[5],
+        np.exp(parameters[6]), parameters[7] / (half_diagonal * half_diagonal),
+        1.0 / (half_diagonal * half_diagonal), sp, cp, st, ct, sr, cr,
+    )  # fmt: skip
 
 
 @compiled
@@ -359,17 +360,8 @@ def nearest_on_arc(camera, shapes, m, samples, shares, pixel_x, pixel_y, place):
 
 
 @compiled
-def write_residual(camera, place, inside, pixel, offset, jacobian):
-    """Writes the offset of one image point from one place of space, and its derivatives."""
-    write_residual_row(
-        camera, place, inside, pixel[0], pixel[1],
-        offset.reshape((1, 2)), jacobian.reshape((1, 2, 8)), 0,
-    )  # fmt: skip
-
-
-@compiled
 def write_residual_row(camera, place, inside, pixel_x, pixel_y, offsets, jacobians, n):
-    """``write_residual`` into row ``n`` of many."""
+    """Writes the offset of an image point from a place of space, and its derivatives, as row ``n``."""
     dx, dy, dz = place[0] - camera[9], place[1] - camera[10], place[2] - camera[11]
     ux, uy, uz = rotate_to_camera(camera, dx, dy, dz)
     focal, kappa = camera[12], camera[13]
@@ -436,22 +428,16 @@ def write_derivative_row(camera, dx, dy, dz, derivatives, n):
         derivatives, n, 1, sr * lifted, cr * lifted, -lowered, focal, nx, ny, uz, dxx, dxy, dyy
     )
     _pixel_derivative_of_motion(derivatives, n, 2, uy, -ux, 0.0, focal, nx, ny, uz, dxx, dxy, dyy)
-    for k in range(3, 6):
-        _pixel_derivative_of_motion(
-            derivatives,
-            n,
-            k,
-            -camera[k - 3],
-            -camera[k],
-            -camera[k + 3],
-            focal,
-            nx,
-            ny,
-            uz,
-            dxx,
-            dxy,
-            dyy,
-        )
+    r = camera
+    _pixel_derivative_of_motion(
+        derivatives, n, 3, -r[0], -r[3], -r[6], focal, nx, ny, uz, dxx, dxy, dyy
+    )
+    _pixel_derivative_of_motion(
+        derivatives, n, 4, -r[1], -r[4], -r[7], focal, nx, ny, uz, dxx, dxy, dyy
+    )
+    _pixel_derivative_of_motion(
+        derivatives, n, 5, -r[2], -r[5], -r[8], focal, nx, ny, uz, dxx, dxy, dyy
+    )
     derivatives[n, 0, 6], derivatives[n, 1, 6] = dxx * px + dxy * py, dxy * px + dyy * py
     rho2 = px * px + py * py
     share = rho2 * unit * (1 + kappa * rho2)

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray
-from app.paint.grass_colour import grass_colour
 from app.paint.ridge_kernels import ridge_strength, thin_ridges
 
 Image = npt.NDArray[np.uint8]
@@ -81,25 +80,28 @@ def _scaled(places: npt.NDArray[np.int64], size: int, small: int) -> npt.NDArray
 
 def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Strength:
     """As ``line_strength``, for a picture in which lengths are ``unit`` times those above."""
-    grass = np.empty(inside.shape, np.uint8)
-    grass_colour(image, grass)
     # Paint is bright in all channels; shirts and boards rarely are.
     red, green, blue = cv2.split(image)
     level = cv2.GaussianBlur(cv2.min(red, cv2.min(green, blue)).astype(np.float32), (0, 0), BLUR_PX)
     strength = np.empty(inside.shape, np.float32)
     across = np.empty(inside.shape, np.uint8)
     side = max(SIDE_PX * unit, 3.0)
-    ridge_strength(level, grass, inside, side, strength, across)
+    ridge_strength(level, image, inside, side, LEAST_STRENGTH, strength, across)
     limit = max(_percentile(strength, inside), LEAST_STRENGTH)
-    strong = (strength > limit).astype(np.uint8)
-    thin = np.empty(inside.shape, np.uint8)
+    strong = strength > limit
+    thin = np.empty(inside.shape, np.bool_)
     thin_ridges(strength, across, strong, thin)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(strong, connectivity=8)
-    lengths = np.bincount(labels[thin > 0], minlength=count)
+    count, labels = cv2.connectedComponents(strong.view(np.uint8), connectivity=8)
+    crest = np.flatnonzero(thin)
+    pieces = labels.ravel()[crest]
+    lengths = np.bincount(pieces, minlength=count)
+    areas = np.bincount(labels.ravel()[np.flatnonzero(strong)], minlength=count)
     line = lengths >= LEAST_LENGTH_PX * unit
-    line &= stats[:, cv2.CC_STAT_AREA] <= np.maximum(BROADEST_PX * unit, 3.5) * lengths
-    line[0] = False
-    return np.where(line[labels] & (thin > 0), strength, np.float32(0.0))
+    line &= areas <= max(BROADEST_PX * unit, 3.5) * lengths
+    kept = crest[line[pieces]]
+    lines = np.zeros(inside.shape, np.float32)
+    lines.flat[kept] = strength.flat[kept]
+    return lines
 
 
 def _percentile(strength: npt.NDArray[np.float32], inside: npt.NDArray[np.uint8]) -> float:

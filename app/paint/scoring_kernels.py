@@ -13,7 +13,7 @@ from app.geometry.curve_residuals import (
     pitch_to_camera,
     radial_growth_factor,
     unpack_camera,
-    write_residual,
+    write_residual_row,
 )
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
@@ -24,42 +24,39 @@ HOPELESS = 0.8
 
 
 @compiled
-def nearest_place(camera, px, py, shapes, nearest, origin, cell, place):
-    """Writes the place on the nearest marking for a pixel without distortion: x, y, z, tangent.
+def nearest_place(camera, px, py, shapes, nearest, origin, cell):
+    """The place on the nearest marking for a pixel without distortion: x, y, z and its tangent.
 
-    Returns 1 where the place lies within its marking, 0 at an end, -1 where the pixel shows no
+    Before it 1 where the place lies within its marking, 0 at an end, -1 where the pixel shows no
     grass near the pitch.
     """
+    nowhere = -1, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     u, v = px / camera[12], py / camera[12]
     z = camera[2] * u + camera[5] * v + camera[8]
     if z < 1e-4:
-        return -1
+        return nowhere
     reach = -camera[11] / z
     x = camera[9] + reach * (camera[0] * u + camera[3] * v + camera[6])
     y = camera[10] + reach * (camera[1] * u + camera[4] * v + camera[7])
     across, down = (x - origin[0]) / cell, (y - origin[1]) / cell
     # As floats: NaN and what is too large for an integer fail here.
     if not (0 <= across < nearest.shape[1] and 0 <= down < nearest.shape[0]):
-        return -1
-    column, row = int(across), int(down)
-    shape = shapes[nearest[row, column]]
-    place[2] = place[5] = 0.0
-    if shape[0] == 1.0:
-        dx, dy = x - shape[1], y - shape[2]
+        return nowhere
+    m = nearest[int(down), int(across)]
+    left, top = shapes[m, 1], shapes[m, 2]
+    if shapes[m, 0] == 1.0:
+        dx, dy = x - left, y - top
         far = np.sqrt(dx * dx + dy * dy) + 1e-9
         dx, dy = dx / far, dy / far
-        place[0], place[1] = shape[1] + shape[3] * dx, shape[2] + shape[3] * dy
-        place[3], place[4] = -dy, dx
-        return 1
-    dx, dy = shape[3] - shape[1], shape[4] - shape[2]
+        radius = shapes[m, 3]
+        return 1, (left + radius * dx, top + radius * dy, 0.0, -dy, dx, 0.0)
+    dx, dy = shapes[m, 3] - left, shapes[m, 4] - top
     length = np.sqrt(dx * dx + dy * dy)
     dx, dy = dx / length, dy / length
-    along = (x - shape[1]) * dx + (y - shape[2]) * dy
+    along = (x - left) * dx + (y - top) * dy
     inside = 1 if 0.0 <= along <= length else 0
     along = min(max(along, 0.0), length)
-    place[0], place[1] = shape[1] + along * dx, shape[2] + along * dy
-    place[3], place[4] = dx, dy
-    return inside
+    return inside, (left + along * dx, top + along * dy, 0.0, dx, dy, 0.0)
 
 
 @compiled
@@ -83,13 +80,12 @@ def offset_from(camera, place, inside, px, py):
 @compiled
 def unexplained(parameters, points, shapes, nearest, origin, cell, reach, half_diagonal, cost):
     """Writes the mean truncated distance of the paint to the nearest marking, 0 to 1."""
-    place = np.empty(6)
     for b in range(len(parameters)):
         camera = unpack_camera(parameters[b], half_diagonal)
         total = 0.0
         for n in range(len(points)):
             px, py = ideal_pixel(camera, points[n, 0], points[n, 1])
-            inside = nearest_place(camera, px, py, shapes, nearest, origin, cell, place)
+            inside, place = nearest_place(camera, px, py, shapes, nearest, origin, cell)
             if inside < 0:
                 total += 1.0
             else:
@@ -153,8 +149,7 @@ def refine(
     One damped Gauss-Newton step for each of ``scales`` (pixels) with Geman-McClure weights; the
     nearest places are found anew each time. Shapes of mean (B, 8), sigma (8,).
     """
-    place = np.empty(6)
-    offset, jacobian = np.empty(2), np.empty((2, 8))
+    offset, jacobian = np.empty((1, 2)), np.empty((1, 2, 8))
     H, g = np.empty((8, 8)), np.empty(8)
     for b in range(len(parameters)):
         for scale in scales:
@@ -167,19 +162,22 @@ def refine(
                 H[k, k] = weight
             for n in range(len(points)):
                 px, py = ideal_pixel(camera, points[n, 0], points[n, 1])
-                inside = nearest_place(camera, px, py, shapes, nearest, origin, cell, place)
+                inside, place = nearest_place(camera, px, py, shapes, nearest, origin, cell)
                 if inside < 0 or offset_from(camera, place, inside, px, py) > 3.0 * scale:
                     continue
-                write_residual(camera, place, inside == 1, points[n], offset, jacobian)
-                squared = offset[0] * offset[0] + offset[1] * offset[1]
+                write_residual_row(
+                    camera, place, inside == 1, points[n, 0], points[n, 1], offset, jacobian, 0
+                )
+                squared = offset[0, 0] * offset[0, 0] + offset[0, 1] * offset[0, 1]
                 root = 1.0 / (1.0 + squared / (scale * scale))
                 w = root * root
                 for row in range(2 - inside):
+                    # Whole rows, though the lower half alone counts: they are added eight at once.
                     for i in range(8):
-                        wj = w * jacobian[row, i]
-                        g[i] += wj * offset[row]
-                        for k in range(i + 1):
-                            H[i, k] += wj * jacobian[row, k]
+                        wj = w * jacobian[0, row, i]
+                        g[i] += wj * offset[0, row]
+                        for k in range(8):
+                            H[i, k] += wj * jacobian[0, row, k]
             descend(H, g, parameters[b])
 
 

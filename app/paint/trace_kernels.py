@@ -12,10 +12,10 @@ from app.geometry.curve_residuals import (
     NEAR,
     distort_step,
     pitch_to_camera,
-    projection_derivatives,
     radial_growth_factor,
     rotate_to_camera,
     unpack_camera,
+    write_derivative_row,
 )
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
@@ -47,8 +47,8 @@ def trace_markings(
         rows: Result: derivative of the place along the normal by the parameters, shape (N, 8).
     """
     camera = unpack_camera(parameters, half_diagonal)
-    derivatives = np.empty((2, 8))
-    place = np.empty(6)
+    x0, y0 = principal[0], principal[1]
+    derivatives = np.empty((1, 2, 8))
     count = 0
     for m in range(len(kinds)):
         if not chosen[m]:
@@ -62,8 +62,8 @@ def trace_markings(
         carried = 0.5 * spacing
         last_x, last_y, was_seen = 0.0, 0.0, False
         for k in range(steps + 1):
-            at_share(kinds[m], shape, k / steps, place)
-            x, y, seen = _pixel(camera, principal, place)
+            place = at_share(kinds[m], shape, k / steps)
+            x, y, seen = _pixel(camera, x0, y0, place[0], place[1], place[2])
             # Far outside nothing is followed; the margin keeps steps that enter the picture.
             seen = seen and -width < x < 2 * width and -height < y < 2 * height
             if seen and was_seen:
@@ -71,9 +71,9 @@ def trace_markings(
                 at = spacing - carried
                 while at <= apart:
                     share = (k - 1 + at / apart) / steps
-                    at_share(kinds[m], shape, share, place)
+                    place = at_share(kinds[m], shape, share)
                     if _write(
-                        camera, principal, place, width, height, m, count, derivatives,
+                        camera, x0, y0, place, width, height, m, count, derivatives,
                         places, pixels, normals, widths, marking, rows,
                     ):  # fmt: skip
                         count += 1
@@ -88,27 +88,27 @@ def trace_markings(
 
 
 @compiled
-def at_share(kind, shape, share, place):
-    """Writes the place of a curve at a share of its length, and the direction along it."""
+def at_share(kind, shape, share):
+    """The place of a curve at a share of its length, and the direction along it, six numbers."""
     if kind == SEGMENT:
-        for i in range(3):
-            along = shape[3 + i] - shape[i]
-            place[i], place[3 + i] = shape[i] + share * along, along
-        return
+        ax, ay, az = shape[3] - shape[0], shape[4] - shape[1], shape[5] - shape[2]
+        return shape[0] + share * ax, shape[1] + share * ay, shape[2] + share * az, ax, ay, az
     angle = shape[3] + share * (shape[4] - shape[3])
-    sine, cosine = np.sin(angle), np.cos(angle)
-    place[0], place[1], place[2] = shape[0] + shape[2] * cosine, shape[1] + shape[2] * sine, 0.0
-    place[3], place[4], place[5] = -shape[2] * sine, shape[2] * cosine, 0.0
+    sine, cosine, radius = np.sin(angle), np.cos(angle), shape[2]
+    return (
+        shape[0] + radius * cosine, shape[1] + radius * sine, 0.0,
+        -radius * sine, radius * cosine, 0.0,
+    )  # fmt: skip
 
 
 @compiled
-def _pixel(camera, principal, place):
-    x, y, z = pitch_to_camera(camera, place[0], place[1], place[2])
+def _pixel(camera, x0, y0, x, y, z):
+    x, y, z = pitch_to_camera(camera, x, y, z)
     if z < NEAR:
         return 0.0, 0.0, False
     px, py = camera[12] * x / z, camera[12] * y / z
     growth = radial_growth_factor(camera[13] * (px * px + py * py))
-    return principal[0] + px * growth, principal[1] + py * growth, True
+    return x0 + px * growth, y0 + py * growth, True
 
 
 @compiled
@@ -126,11 +126,11 @@ def _direction(camera, place, vx, vy):
 
 @compiled
 def _write(
-    camera, principal, place, width, height, m, n, derivatives,
+    camera, x0, y0, place, width, height, m, n, derivatives,
     places, pixels, normals, widths, marking, rows,
 ):  # fmt: skip
     """Writes one place; False where it lies outside the picture."""
-    x, y, seen = _pixel(camera, principal, place)
+    x, y, seen = _pixel(camera, x0, y0, place[0], place[1], place[2])
     if not (seen and 0 <= x <= width - 1 and 0 <= y <= height - 1):
         return False
     length = np.sqrt(place[3] ** 2 + place[4] ** 2)
@@ -141,24 +141,21 @@ def _write(
         return False
     nx, ny = -gy / size, gx / size
     half = 0.5 * PAINT_WIDTH_M
-    left, right = np.empty(6), np.empty(6)
-    left[:], right[:] = place, place
-    left[0], left[1] = place[0] - half * ty, place[1] + half * tx
-    right[0], right[1] = place[0] + half * ty, place[1] - half * tx
-    lx, ly, left_seen = _pixel(camera, principal, left)
-    rx, ry, right_seen = _pixel(camera, principal, right)
+    ax, ay = half * ty, half * tx
+    lx, ly, left_seen = _pixel(camera, x0, y0, place[0] - ax, place[1] + ay, place[2])
+    rx, ry, right_seen = _pixel(camera, x0, y0, place[0] + ax, place[1] - ay, place[2])
     if not (left_seen and right_seen):
         return False
     across = abs(nx * (lx - rx) + ny * (ly - ry))
     # The middle between both edges as seen is not quite the image of the middle.
     middle = nx * (0.5 * (lx + rx) - x) + ny * (0.5 * (ly + ry) - y)
     dx, dy, dz = place[0] - camera[9], place[1] - camera[10], place[2] - camera[11]
-    projection_derivatives(camera, dx, dy, dz, derivatives)
+    write_derivative_row(camera, dx, dy, dz, derivatives, 0)
     places[n, 0], places[n, 1], places[n, 2] = place[0], place[1], place[2]
     pixels[n, 0], pixels[n, 1] = x + middle * nx, y + middle * ny
     normals[n, 0], normals[n, 1] = nx, ny
     widths[n] = across
     marking[n] = m
     for k in range(8):
-        rows[n, k] = nx * derivatives[0, k] + ny * derivatives[1, k]
+        rows[n, k] = nx * derivatives[0, 0, k] + ny * derivatives[0, 1, k]
     return True

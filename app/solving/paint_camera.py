@@ -25,6 +25,7 @@ from app.soccer.paint_evidence import PaintEvidence
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.main_position import MAIN_MEAN, STADIUM, is_main_position
 from app.solving.observations import pitch_curves, principal_point
+from app.solving.paint_kernels import step_to_paint
 from app.solving.paint_noise import PaintNoise, PaintOffsets, marking_weights, paint_noise
 from app.solving.paint_terms import pitch_terms
 from app.solving.resect import ResectionProblem
@@ -93,13 +94,11 @@ class PaintProblem:
             information = information + self.information
             pull = pull + self.information @ (self.first - parameters)
         base = marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2
-        moved: FloatArray = np.zeros(PARAMETERS)
-        for _ in range(INNER_STEPS):
-            weight = base * self.robust(seen.offsets - seen.jacobian @ moved, seen.sigmas, strict)
-            normal = (seen.jacobian * weight[:, None]).T @ seen.jacobian + information
-            normal[np.diag_indices(PARAMETERS)] *= 1 + DAMPING
-            right = seen.jacobian.T @ (weight * seen.offsets) + pull
-            moved = np.asarray(np.linalg.solve(normal, right))
+        moved: FloatArray = np.empty(PARAMETERS)
+        step_to_paint(
+            seen.offsets, seen.sigmas, base, seen.jacobian, information, pull, INNER_STEPS, DAMPING,
+            strict, ROBUST_PX * self.unit, STRICT_SIGMAS, STRICT_PX * self.unit, moved,
+        )  # fmt: skip
         return moved
 
     def robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:

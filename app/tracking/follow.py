@@ -41,6 +41,7 @@ TRACKED: Outcome = "tracked"
 BRIDGED: Outcome = "bridged"
 LOST: Outcome = "lost"
 OUTCOMES = (TRACKED, BRIDGED, LOST)
+NO_CAMERA = "there is no camera to follow"
 
 GRID = (6, 4)
 ANGLE_SIGMA = np.radians(4.0)
@@ -167,28 +168,25 @@ class Follower:
             found = replace(found, covariance=covariance)
         return self._now(found)
 
-    def step(
-        self, picture: Picture, match: BackgroundMatches | None, may_propose: bool = True
-    ) -> TrackedFrame:
+    def step(self, picture: Picture, match: BackgroundMatches | None) -> TrackedFrame:
         """The frame of the next frame.
 
         Args:
             picture: The frame.
             match: From the frame before; None where nothing moves together.
-            may_propose: Whether a camera is proposed where none can be followed.
         """
         found = self._followed(picture, match)
         if match is None:
             # What is shown now is another picture than the one that was tried.
             self.tried = None
         if found.outcome is TRACKED and found.seen is not None:
-            if may_propose and self._is_patchy(found):
+            if self._is_patchy(found):
                 again = self.propose(picture, PATCHY_EVERY)
                 least = CLEARLY * found.seen.product
                 if again is not None and again.seen is not None and again.seen.product > least:
                     found = again
             return self._now(found)
-        if may_propose and (found.outcome is LOST or found.age >= PROPOSED_AFTER):
+        if found.outcome is LOST or found.age >= PROPOSED_AFTER:
             again = self.propose(picture)
             if again is not None:
                 return self._now(again)
@@ -221,7 +219,7 @@ class Follower:
         last = self.last
         nothing = TrackedFrame(picture.number, picture.time, LOST)
         if last is None or last.camera is None:
-            return replace(nothing, reason="there is no camera to follow")
+            return replace(nothing, reason=NO_CAMERA)
         if match is None:
             return replace(nothing, reason="the background cannot be followed: a cut, or a blur")
         half = picture.reading.half_diagonal

@@ -22,8 +22,8 @@ from app.geometry.resection import (
     TILT,
     camera_from_parameters,
     parameters_from_camera,
-    projection_jacobians,
 )
+from app.tracking.motion_kernels import turn_to_points
 
 Grey = npt.NDArray[np.uint8]
 
@@ -127,22 +127,9 @@ def rotate_camera(
     points = camera.position + FAR_M * camera.rays(match.here)
     seen = np.isfinite(points).all(axis=1)
     points, there = points[seen], match.there[seen]
-    parameters = start.copy()
-    apart = np.full(len(points), np.inf)
-    halves = np.full(len(points), half_diagonal)
-    for _ in range(ROUNDS):
-        now = camera_from_parameters(parameters, camera.principal_point, half_diagonal)
-        rest = there - now.project(points)
-        rest[~np.isfinite(rest)] = 1e3
-        apart = np.hypot(*rest.T)
-        weight = 1 / (1 + (apart / max(ROBUST_PX, float(np.median(apart)))) ** 2)
-        rows = projection_jacobians(np.tile(parameters, (len(points), 1)), points, halves)
-        rows = rows[:, :, AIM]
-        normal = np.einsum("n,nij,nik->jk", weight, rows, rows)
-        right = np.einsum("n,nij,ni->j", weight, rows, rest)
-        step = np.linalg.solve(normal, right)
-        parameters[AIM] += step
-        if np.abs(step).max() < 1e-6:
-            break
+    parameters, apart = start.copy(), np.empty(len(points))
+    turn_to_points(
+        parameters, points, there - camera.principal_point, half_diagonal, ROUNDS, ROBUST_PX, apart
+    )
     moved = camera_from_parameters(parameters, camera.principal_point, half_diagonal)
     return moved, float(np.median(apart))

@@ -52,9 +52,13 @@ def read_frame(frame: Frame) -> Picture:
     paint = line_like(image, field)
     for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
         paint[border] = paint[:, border] = False
-    grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
     reading = read_picture(image, field)
-    return Picture(frame.number, frame.time, image, grey, field, paint, reading)
+    return Picture(frame.number, frame.time, image, grey_of(frame), field, paint, reading)
+
+
+def grey_of(frame: Frame) -> Grey:
+    """A frame as its motion is seen, shape (H, W)."""
+    return np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), np.uint8)
 
 
 def read_frames(frames: Iterable[Frame]) -> Iterator[Picture]:

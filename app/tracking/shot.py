@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -20,9 +21,17 @@ from app.soccer.paint_evidence import NO_PAINT
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.clip import Clip
-from app.tracking.follow import BRIDGED, LOST, MOST_BRIDGED, TRACKED, Follower, TrackedFrame
+from app.tracking.follow import (
+    BRIDGED,
+    LOST,
+    MOST_BRIDGED,
+    NO_CAMERA,
+    TRACKED,
+    Follower,
+    TrackedFrame,
+)
 from app.tracking.motion import BackgroundMatches, match_background, rotate_camera
-from app.tracking.picture import Picture, read_frame, read_frames
+from app.tracking.picture import Picture, grey_of, read_frame, read_frames
 
 TRIALS, ASKED = 2, 4
 """Likely cameras that are followed where none is certain, and frames in which each is asked for again."""
@@ -146,18 +155,24 @@ def _follow_on(
     """Every frame from the one before, and who followed them."""
     follower = Follower(pitch, policy, known=[item.camera for item in given.values()])
     shot = Shot([], [])
-    before: Picture | None = None
-    first = min(given, default=0)
-    for picture in read_frames(clip.frames()):
-        match = None if before is None else match_background(before.grey, picture.grey)
+    frames, before = clip.frames(), None
+    for frame in islice(frames, min(given, default=0)):
+        # They are followed backwards, and their paint is read then.
+        grey = grey_of(frame)
+        shot.matches.append(None if before is None else match_background(before, grey))
+        shot.frames.append(TrackedFrame(frame.number, frame.time, LOST, reason=NO_CAMERA))
+        before = grey
+        if tell is not None:
+            tell(len(shot.frames))
+    for picture in read_frames(frames):
+        match = None if before is None else match_background(before, picture.grey)
         shot.matches.append(match)
         key = given.get(picture.number)
         if key is not None:
             shot.frames.append(follower.start(picture, key.camera, key.covariance))
         else:
-            may_propose = picture.number >= first
-            shot.frames.append(follower.step(picture, match, may_propose))
-        before = picture
+            shot.frames.append(follower.step(picture, match))
+        before = picture.grey
         if tell is not None:
             tell(len(shot.frames))
     return shot, follower

@@ -178,6 +178,8 @@ class _Shot:
         self._problem = PaintProblem.of(ResectionProblem.of(size, policy), self.parameters[0], None)
         self._sights = [self._sight(frame) for frame in frames]
         self._shifts: dict[int, FloatArray] = {}
+        self._seen_from: FloatArray | None = None
+        self._kept: list[PaintOffsets | None] = []
         # Without paint an annotated frame is where its lines say.
         self.given = {
             place: (self.parameters[place].copy(), np.linalg.inv(frame.covariance))
@@ -204,7 +206,7 @@ class _Shot:
         other._shifts = {place: shown.shift_of(each) for place, each in self.painted().items()}
         other.shared = np.zeros(SHARED)
         other.shared[:3], other.shared[6] = shown.position, self.shared[6]
-        other.given, other._noise = {}, 1.0
+        other.given, other._noise, other._seen_from = {}, 1.0, None
         return other
 
     def _row(self, frame: TrackedFrame) -> FloatArray:
@@ -246,7 +248,14 @@ class _Shot:
             if sight is not None
         }
 
-    def _seen(self, place: int) -> PaintOffsets | None:
+    def _seen(self) -> list[PaintOffsets | None]:
+        """The paint of each frame beside its markings, worked out once for cameras that stay."""
+        if self._seen_from is not self.parameters:
+            self._seen_from = self.parameters
+            self._kept = [self._offsets(place) for place in range(len(self.parameters))]
+        return self._kept
+
+    def _offsets(self, place: int) -> PaintOffsets | None:
         sight = self._sights[place]
         if sight is None:
             return None
@@ -266,14 +275,13 @@ class _Shot:
 
     def error_px(self, place: int) -> float | None:
         """Median distance of the paint of a frame, pixels; None where it has none."""
-        seen = self._seen(place)
+        seen = self._seen()[place]
         return None if seen is None else float(np.median(np.abs(seen.offsets)))
 
     def _equations(self) -> ShotEquations:
         count = len(self.parameters)
         equations = ShotEquations(count)
-        for place in range(count):
-            seen = self._seen(place)
+        for place, seen in enumerate(self._seen()):
             if seen is not None:
                 weighted = seen.jacobian * self._weights(seen)[:, None]
                 equations.diagonal[place] += weighted.T @ seen.jacobian
@@ -342,17 +350,13 @@ class _Shot:
             self.parameters = self.parameters + step
             self.shared = self.shared + shared
             moved = [
-                np.abs(seen.jacobian @ step[place]).max(initial=0.0)
-                for place in range(len(step))
-                if (seen := self._seen(place)) is not None
+                np.abs(seen.jacobian @ own).max(initial=0.0)
+                for own, seen in zip(step, self._seen(), strict=True)
+                if seen is not None
             ]
             if max(moved) < SETTLED_PX:
                 break
-        rest = [
-            (seen.offsets / seen.sigmas)
-            for place in range(len(self.parameters))
-            if (seen := self._seen(place)) is not None
-        ]
+        rest = [seen.offsets / seen.sigmas for seen in self._seen() if seen is not None]
         # Of a normal distribution the median distance is 0.6745 standard deviations.
         self._noise = max(1.0, float(np.median(np.abs(np.concatenate(rest))) / 0.6745) ** 2)
 
@@ -361,7 +365,7 @@ class _Shot:
         equations = self._equations()
         terms = np.zeros((len(self.parameters), PARAMETERS, TERMS))
         for place, frame in self.painted().items():
-            seen = self._seen(place)
+            seen = self._seen()[place]
             assert seen is not None
             grass = grass_of(frame, self._size)
             own = all_terms(grass, seen.marking, seen.jacobian, self._pitch)
