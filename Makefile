@@ -63,7 +63,7 @@ test: setup chromium postgresql readers moto
 	@$(MAKE) --no-print-directory -j2 QUICK=$(QUICK) test-python test-browser
 	@echo "Every test has passed."
 
-# The same and what is slow and broad (`BROAD` in tests/conftest.py): torture in its short form, every upgrade, wheels, generated
+# The same and what is slow and broad (tests/broad.txt): torture in its short form, every upgrade, wheels, generated
 # clients, a cluster, the twins on PostgreSQL, hostile requests to every operation; and late pages. For every night.
 test-all: setup chromium postgresql generators readers moto
 	@$(BIN)/python -m tests.compiled

@@ -185,7 +185,7 @@ def run() -> None:
         # What stands for bytes of the command line that are no UTF-8.
         if "surrogates" not in error.reason:
             raise
-        print_error(f"{quoted(error.object, SHOWN)} has letters that are no text in UTF-8")
+        print_error(f"{quoted(error.object, SHOWN)} contains bytes that are not UTF-8 text")
         sys.exit(1)
     except RuntimeError as error:
         # numba's words when it finds no folder to write to; it has no class of its own for them.

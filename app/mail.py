@@ -219,7 +219,7 @@ def checked_address(text: str, *, pointer: str | None = None) -> str:
     address = text.strip()
     if len(address) > LONGEST_ADDRESS or not _ADDRESS.fullmatch(address):
         raise InputError(
-            f"{quoted(text)} is no mail address",
+            f"{quoted(text)} is not an email address",
             hint="Write it as anna@example.org, in plain letters, without a name or brackets.",
             pointer=pointer,
         )

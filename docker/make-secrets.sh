@@ -11,7 +11,7 @@ owner=${OWNER:-10001:10001}
 days=3650
 
 if [ -e "$folder" ]; then
-    echo "$folder is there already. What it holds is in use: delete it only with the volumes of the database and the store." >&2
+    echo "$folder already exists. What it holds is in use: delete it only with the volumes of the database and the store." >&2
     exit 1
 fi
 made=$(mktemp -d "$folder.XXXXXX")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from pathlib import Path
 
 import pytest
 from httpx._config import DEFAULT_TIMEOUT_CONFIG
@@ -19,49 +20,8 @@ make_once()
 if sys.platform == "linux":
     start_loaded(lambda: nursery().children)
 
-BROAD = (
-    "[postgresql",
-    "tests/e2e/test_access.py",
-    "tests/e2e/test_access_states.py",
-    "tests/e2e/test_broadcast.py",
-    "tests/e2e/test_forms_",
-    "tests/e2e/test_help.py::TestPractice",
-    "tests/e2e/test_look.py",
-    "tests/e2e/test_margins.py",
-    "tests/e2e/test_phone.py",
-    "tests/e2e/test_queue.py::TestFarJumps",
-    "tests/e2e/test_team_sessions.py::TestSessions::test_every_page_before",
-    "tests/evaluation/test_detector_loop.py::TestDetect",
-    "tests/integration/test_cluster.py",
-    "tests/integration/test_events.py::TestEvents::test_a_command_is_heard",
-    "tests/integration/test_examples.py::TestPeoplesWork",
-    "tests/integration/test_generated_clients.py",
-    "tests/integration/test_installation.py",
-    "tests/integration/test_interrupted.py",
-    "tests/integration/test_openapi.py::TestOperations",
-    "tests/integration/test_sample_recording.py",
-    "tests/integration/test_stopping.py::TestIndexing",
-    "tests/integration/test_torture.py",
-    "tests/integration/test_tutorial.py",
-    "tests/integration/test_web_processes.py::TestMetrics",
-    "tests/real/test_ball_track.py",
-    "tests/real/test_calibration.py::TestGoals",
-    "tests/real/test_issia.py::TestPeople",
-    "tests/real/test_link.py",
-    "tests/real/test_matches.py",
-    "tests/real/test_paint.py::test_accepted_proposals",
-    "tests/real/test_rig.py",
-    "tests/real/test_shots.py",
-    "tests/real/test_track.py",
-    "tests/real/test_versions.py",
-    "tests/security/test_gold.py::TestGold",
-    "tests/unit/db/test_migrate.py::TestOldHomes",
-    "tests/unit/features/practice/test_recording.py::test_each_lesson",
-    "tests/unit/features/integrity/test_upgrades.py",
-    "tests/unit/http/test_web_processes.py::TestServeWith",
-)
-"""What `make test` leaves to `make test-all`, by parts of the names of tests: slow, broad, or the same once more on
-another database."""
+BROAD = Path(__file__).with_name("broad.txt")
+"""What `make test` leaves to `make test-all`, by parts of the names of tests."""
 YOUNG = 50_000
 """New objects before the collector looks at them: seventy times as many as by default."""
 
@@ -77,6 +37,17 @@ def _require_alike(
 ) -> None:
     """What only later rows of a statement have is dropped without a word."""
     assert all(row.keys() == rows[0].keys() for row in rows), "rows of one statement are not alike"
+
+
+def broad_lines() -> list[str]:
+    """The lines of `BROAD` that name tests."""
+    lines = BROAD.read_text().splitlines()
+    return [line for line in lines if line and not line.startswith("#")]
+
+
+def names(line: str, test: str) -> bool:
+    """Whether a line names a test: each of its parts is in the name."""
+    return all(part in test for part in line.split(" * "))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -95,9 +66,10 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what is broad where that is asked for, and what is about the file of SQLite where there is none."""
     if config.getoption("--quick"):
-        broad = [item for item in items if any(part in item.nodeid for part in BROAD)]
-        config.hook.pytest_deselected(items=broad)
-        items[:] = [item for item in items if item not in set(broad)]
+        lines = broad_lines()
+        broad = {item for item in items if any(names(line, item.nodeid) for line in lines)}
+        config.hook.pytest_deselected(items=list(broad))
+        items[:] = [item for item in items if item not in broad]
     for item in items if cluster is not None else ():
         if (mark := item.get_closest_marker(MARK)) is not None:
             item.add_marker(pytest.mark.skip(reason=f"of SQLite alone: {mark.args[0]}"))

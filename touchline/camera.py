@@ -89,7 +89,7 @@ class Camera:
                 lens=document.get("lens") or BROWN_CONRADY,
             )
         except (KeyError, TypeError, ValueError) as error:
-            raise CameraError(f"this is no camera of SoccerNet's JSON ({error!r})") from None
+            raise CameraError(f"this is not a camera in SoccerNet's JSON ({error!r})") from None
 
     @cached_property
     def K(self) -> FloatArray:

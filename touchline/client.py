@@ -249,7 +249,7 @@ class Client:
 
         Raises:
             DataError: The file cannot be read or changes meanwhile; HashError: the server has another.
-            JobError: It is no video that can be read.
+            JobError: It is not a video that can be read.
         """
         file = Path(path)
         upload = self.upload(file, in_parts=True, sent=sent)

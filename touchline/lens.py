@@ -55,7 +55,7 @@ def lens_of(name: str, coefficients: Sequence[float]) -> Lens:
     if COEFFICIENTS.get(name) != len(numbers):
         known = ", ".join(f"{lens} ({count})" for lens, count in COEFFICIENTS.items())
         raise CameraError(
-            f'"{name}" with {len(numbers)} coefficients is no lens that is known',
+            f'"{name}" with {len(numbers)} coefficients is not a known lens',
             f"There are {known}.",
         )
     if name == BROWN_CONRADY:

@@ -129,7 +129,7 @@ class View:
                 if turn is not None:
                     picture = picture.transpose(image.Transpose[turn])
         except (OSError, ValueError, image.DecompressionBombError) as error:
-            raise DataError(f"the frame of {self.key} is no picture ({error})") from None
+            raise DataError(f"the frame of {self.key} is not a picture ({error})") from None
         if resize and picture.size != (self.width, self.height):
             # Pillow resizes areas of pixels, which is the rule of ``Camera.scaled``.
             picture = picture.resize((self.width, self.height), image.Resampling.BILINEAR)

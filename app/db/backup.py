@@ -154,7 +154,7 @@ def read_manifest(backup: zipfile.ZipFile) -> BackupManifest:
         return BackupManifest(**values)
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(
-            f"{backup.filename} is no backup of Touchline: its manifest.json is missing or unknown"
+            f"{backup.filename} is not a backup of Touchline: its manifest.json is missing or unknown"
         ) from error
 
 
@@ -231,7 +231,7 @@ def _anchor_without_installation(session: Session) -> Anchor:
 
 def _require_free_place(out: Path, replace: bool) -> None:
     if out.exists() and not replace:
-        raise InputError(f"{out} is there already", hint="Name a file that does not exist yet.")
+        raise InputError(f"{out} already exists", hint="Name a file that does not exist yet.")
     if not out.parent.is_dir():
         raise InputError(f"there is no folder {out.parent}")
 

@@ -193,7 +193,7 @@ def installation_key(settings: Settings, name: str) -> bytes:
         raise refused(path, error) from error
     if len(key) != _BYTES:
         raise DamagedError(
-            f"{path} is no key: it has {len(key)} bytes, not {_BYTES}",
+            f"{path} is not a key: it has {len(key)} bytes, not {_BYTES}",
             hint="Put the file back from a copy. Deleted, it is made anew; what it was for ends then.",
         )
     return key

@@ -118,7 +118,7 @@ class FrameNames:
         """Why ``find_number`` found nothing, in words."""
         if _number(text) in self._numbered:
             return "is the number of several frames of the dataset; name the picture or the camera, too"
-        return "is no number in the name of a picture of the dataset"
+        return "is not a number that the name of a picture of the dataset has"
 
     def examples(self, most: int = 3) -> list[str]:
         """How some frames of the dataset are called."""
@@ -132,8 +132,8 @@ class FrameNames:
         if self._lookup(name) == _SEVERAL:
             return "fits several frames of the dataset; name its match, too"
         if _without_ending(name).rsplit("/", 1)[-1] in self._index:
-            return "is no frame of the dataset: its folders name none of the matches"
-        return "is no frame of the dataset"
+            return "is not a frame of the dataset: its folders name none of the matches"
+        return "is not a frame of the dataset"
 
     def of_station(self, name: str) -> tuple[int, ...]:
         """Ids of all frames of a camera of a rig: a static one, or views of one match called alike."""

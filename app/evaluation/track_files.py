@@ -129,7 +129,7 @@ def _instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
     if frame is None and time is None:
         raise FieldError("frame", "is missing, and so is time_s")
     if frame is not None and not 0 <= frame < _MOST_FRAME:
-        raise FieldError("frame", f"is {frame}, which is no number of a frame")
+        raise FieldError("frame", f"is {frame}, which is not the number of a frame")
     return frame, time
 
 

@@ -140,7 +140,7 @@ def _candidates(output: FloatArray, category: int) -> tuple[FloatArray, FloatArr
         return rows[:, :4], np.where(rows[:, 5] == category, rows[:, 4], -1.0)
     if rows.shape[0] < 5 + category:
         raise InputError(
-            f"the model has {max(rows.shape[0] - 4, 0)} classes, and the ball is number {category}",
+            f"the model has {max(rows.shape[0] - 4, 0)} classes, so the ball cannot be class {category}",
             pointer="/category",
         )
     center, half = rows[:2].T, rows[2:4].T / 2

@@ -166,7 +166,7 @@ def _read_array(
             raise ValueError("holds values that are not numbers")
         numbers = math.prod(shape)
         if numbers * kind.itemsize != item.file_size - file.tell():
-            raise ValueError("holds an array of another size than it says")
+            raise ValueError("holds an array whose size differs from the size that it declares")
         if numbers > MOST_CAMERAS * _NUMBERS[name]:
             raise _too_many_cameras_error(path, name, f"holds {numbers:,} numbers")
         body = file.read()

@@ -160,7 +160,7 @@ def _parse_rotation(value: Any) -> FloatArray:
     left, _, right = np.linalg.svd(matrix)
     nearest: FloatArray = left @ right
     if np.abs(nearest - matrix).max() > MAX_SKEWNESS:
-        raise ValueError("is no rotation: its rows are not perpendicular unit vectors")
+        raise ValueError("is not a rotation: its rows are not perpendicular unit vectors")
     if np.linalg.det(nearest) < 0:
         raise ValueError("is a mirror image and no rotation: its determinant is -1")
     return nearest
@@ -168,7 +168,7 @@ def _parse_rotation(value: Any) -> FloatArray:
 
 def _normalize_camera_matrix(matrix: FloatArray) -> FloatArray:
     if matrix[2, 2] == 0 or np.abs([*matrix[2, :2], matrix[1, 0]]).max() > 1e-9:
-        raise ValueError("is no camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
+        raise ValueError("is not a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]]")
     scaled: FloatArray = matrix / matrix[2, 2]
     if min(scaled[0, 0], scaled[1, 1]) <= 0:
         raise ValueError("has a focal length that is not positive")

@@ -178,7 +178,7 @@ class _LabelledSequence:
             name = categories.find(item.get("category_id"))
             if name is None:
                 shown = str(item.get("category_id"))[:40]
-                problem = f"is {shown}, which is no category; kept without its meaning"
+                problem = f"is {shown}, which is not a category; kept without its meaning"
                 self._report.note(self.path, where, "category_id", problem)
             if name == PITCH:
                 self._add_lines(image, item, image.size, where)

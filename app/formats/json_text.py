@@ -33,7 +33,7 @@ def describe_document(value: Any) -> str:
     """
     if holds_homography(value):
         return (
-            "holds a homography: it maps the grass alone and is no camera (no focal length, no height). "
+            "holds a homography: it maps the grass alone and is not a camera (no focal length, no height). "
             "Write K, R and t, or SoccerNet's camera JSON"
         )
     if isinstance(value, list):

@@ -74,12 +74,12 @@ def _require_free_output(out: Path) -> None:
         if out.is_dir():
             raise InputError(f"{out} is a folder, not a zip file")
         if os.path.lexists(out) and not _is_earlier_zip(out):
-            raise occupied_output_error(f"{out} is there already and is no earlier export")
+            raise occupied_output_error(f"{out} already exists and is not an earlier export")
         return
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; name a folder or a file that ends in .zip")
     if out.is_dir() and any(out.iterdir()) and not _is_earlier_export(out):
-        raise occupied_output_error(f"{out} holds other files and is no earlier export")
+        raise occupied_output_error(f"{out} holds other files and is not an earlier export")
 
 
 def occupied_output_error(sentence: str) -> InputError:

@@ -98,7 +98,7 @@ def require_absent(out: StoredPath) -> None:
     require_free_output(out)
     with suppress(NotFoundError):
         out.store.head(out.key)
-        raise occupied_output_error(f"{out} is there already")
+        raise occupied_output_error(f"{out} already exists")
 
 
 def require_free_output(out: StoredPath) -> None:
@@ -117,7 +117,7 @@ def require_free_output(out: StoredPath) -> None:
         raise InputError(f"name a folder or a zip in the store, such as {out}league.zip")
     is_ours = _is_earlier_zip(out) if _is_zip(out) else _is_earlier_export(out)
     if not is_ours:
-        raise occupied_output_error(f"{out} is there already and is no earlier export")
+        raise occupied_output_error(f"{out} already exists and is not an earlier export")
 
 
 def _is_zip(out: StoredPath) -> bool:

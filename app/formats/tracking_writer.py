@@ -25,7 +25,7 @@ def write_tracab(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
 
     Centimetres from the centre spot, x along the pitch, y across it away from the main stand, height
     up; speed in metres a second. Frames in gaps are left out: the format has no missing ball. It has
-    nobody in possession either, so that ``H`` stands there. A rate that is no whole number is rounded.
+    nobody in possession either, so that ``H`` stands there. A rate that is not a whole number is rounded.
 
     Returns:
         Counts: ``tracks``, ``frames`` and ``balls``.

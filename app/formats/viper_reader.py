@@ -255,7 +255,7 @@ class _ViperFileReader:
             side = 0
         if not 1 <= side <= _MAX_SIDE:
             self._report.note(
-                self._shown, name, "value", f"{quoted(text, 40)} is no size; left out"
+                self._shown, name, "value", f"{quoted(text, 40)} is not a size; left out"
             )
             return
         size = self.tracks[-1].size or ImageSize(0, 0)

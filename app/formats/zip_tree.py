@@ -162,7 +162,7 @@ class ZipTree:
         if kind not in (0, stat.S_IFREG):
             return "is a link or device, not a plain file"
         if member.flag_bits & UNREADABLE:
-            return "has a name that is no text, so it cannot be read"
+            return "has a name that is not text, so it cannot be read"
         if folded[name.casefold()] > 1:
             return "is there more than once, or under names that differ in case alone"
         if member.file_size > _RATIO_FLOOR and (

@@ -129,7 +129,7 @@ def _refuse_constant(name: str) -> NoReturn:
 def _object_without_repeated_names(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object whose names differ: of two equal ones, readers disagree which counts."""
     if len(pairs) > MAX_NAMES:
-        raise BodyError(400, f"an object of the body has more than {MAX_NAMES} names")
+        raise BodyError(400, f"a JSON object of the body has more than {MAX_NAMES} keys")
     if any(len(name) > MAX_NAME for name, _ in pairs):
         raise BodyError(400, f"a name in the body has more than {MAX_NAME} characters")
     found = dict(pairs)

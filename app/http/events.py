@@ -184,7 +184,7 @@ class Events:
     def require_room(self) -> None:
         """Raise OverloadedError where as many listen as may, or the server stops; waits for nothing."""
         if len(self._feeds) >= MAX_FEEDS or self._closing.is_set():
-            raise OverloadedError("too many windows listen for events")
+            raise OverloadedError("too many browser windows and scripts listen for events")
 
     def subscribe(
         self,

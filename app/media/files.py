@@ -184,7 +184,7 @@ def video_times(
 
     Raises:
         NotFoundError: The video is not there.
-        ImageError: It is no video that can be read.
+        ImageError: It is not a video that can be read.
         TooLargeError: It is larger than the limits, in pixels or frames.
     """
     _require_contained(media, settings)
@@ -201,13 +201,13 @@ def video_length(media: Media) -> int:
 
     Raises:
         NotFoundError: The video is not there.
-        ImageError: It is no video that can be read.
+        ImageError: It is not a video that can be read.
     """
     path = Path(media.path)
     _require_regular_file(path)
     with open_video(path) as video:
         if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
+            raise ImageError(f"{path.name} is not a video that can be read")
         return int(video.get(cv2.CAP_PROP_FRAME_COUNT))
 
 
@@ -393,7 +393,7 @@ def _video_header(path: Path) -> ImageHeader:
     _require_regular_file(path)
     with open_video(path) as video:
         if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
+            raise ImageError(f"{path.name} is not a video that can be read")
         return ImageHeader(
             "video",
             int(video.get(cv2.CAP_PROP_FRAME_WIDTH)),

@@ -118,7 +118,7 @@ def _open_archive(path: _Place) -> zipfile.ZipFile:
     try:
         return open_zip(path)
     except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
-        raise ImageError(f"{path.name} is no complete zip archive") from error
+        raise ImageError(f"{path.name} is not a complete zip archive") from error
     except OSError as error:
         raise StorageError(f"{path.name} cannot be read") from error
 

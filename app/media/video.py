@@ -95,7 +95,7 @@ def make_index(
         tell: Called every now and then with how many frames are decoded; what it raises ends it.
 
     Raises:
-        ImageError: It is no video that can be read.
+        ImageError: It is not a video that can be read.
         TooLargeError: It has more frames than ``MAX_FRAMES``.
     """
     times = _decode_times(path, tell)
@@ -143,7 +143,7 @@ def frame_at(path: Path, number: int, times: Times) -> Any:
         times: Index of the video.
 
     Raises:
-        ImageError: It is no video that can be read.
+        ImageError: It is not a video that can be read.
     """
     with closing(FrameReader(path, times)) as reader:
         return reader.read(number)
@@ -179,7 +179,7 @@ class FrameReader:
             number: From 0, below ``len(times)``.
 
         Raises:
-            ImageError: It is no video that can be read.
+            ImageError: It is not a video that can be read.
         """
         self._sought = None
         if self._video is not None and self._next <= number <= self._next + _MARGINS[0]:
@@ -206,7 +206,7 @@ class FrameReader:
             Whether ``read`` finds it at once now, or has to open the video anew.
 
         Raises:
-            ImageError: It is no video that can be read.
+            ImageError: It is not a video that can be read.
         """
         near = self._video is not None and self._next <= number <= self._next + _MARGINS[0]
         if self._sought != number and not near:
@@ -286,7 +286,7 @@ class FrameReader:
 def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
     with open_video(path) as video:
         if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
+            raise ImageError(f"{path.name} is not a video that can be read")
         yield video
 
 

@@ -496,7 +496,7 @@ def why_unsure(ranked: Sequence[RankedCamera]) -> str | None:
     is_well_known = is_known and supported >= WELL_SUPPORTED
     least, least_sum = LEAST_KNOWN if is_well_known else (LEAST_SCORE, LEAST_SUM)
     if best.score < least or best.score + lead < least_sum:
-        return "much of what looks like paint is no marking of the best camera"
+        return "much of what looks like paint does not fit a marking of the best camera"
     return None
 
 

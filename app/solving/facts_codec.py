@@ -103,7 +103,7 @@ def _scatter_columns(
         arrays[name][target] = numbers[:, at:end].reshape(len(target), *shape)
         at = end
     if at != length:
-        raise ValueError("there are more numbers than the columns hold")
+        raise ValueError("there are more numbers than the columns can store")
 
 
 def _column_owner(name: str) -> str:

@@ -69,7 +69,7 @@ def work_at(url: str | None, token_file: Path | None, command: str | None) -> No
 
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.username:
-        raise InputError(f"{url} is no address of a server", hint="Write https://NAME.")
+        raise InputError(f"{url} is not the address of a server", hint="Write https://NAME.")
     if parts.scheme == "http" and not is_local(parts.hostname):
         raise InputError(
             f"{url} is not encrypted: a token must not travel in the clear",
@@ -178,7 +178,7 @@ def _command_error(server: ServerPlace, error: Exception) -> ReviewError:
     said_nothing = getattr(error, "status", None) == 0
     if said_nothing and ("certificate" in message.lower() or "ssl" in message.lower()):
         return InputError(
-            f"{server.url} cannot prove its identity: {message}",
+            f"{server.url} has a TLS certificate that cannot be verified: {message}",
             hint="Is the address right? A certificate of your own goes into SSL_CERT_FILE.",
         )
     if said_nothing:

@@ -64,7 +64,7 @@ class Clip:
             index: Of the file; None: it is decoded for its times.
 
         Raises:
-            ImageError: It is no video that can be read, or it is too small to follow a line in.
+            ImageError: It is not a video that can be read, or it is too small to follow a line in.
         """
         index = index or index_times(path)
         _, image = next(read_frames(path, index, [first]))

@@ -37,7 +37,7 @@ def read_frames(
 
     Raises:
         NotFoundError: There is no frame of such a number.
-        ImageError: The file is no video that can be read any more, or another one by now.
+        ImageError: The file is not a video that can be read any more, or another one by now.
     """
     with closing(RecordingReader(path, index, kept_bytes=0)) as reader:
         for number in numbers:

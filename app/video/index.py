@@ -221,7 +221,9 @@ def _opened(file: BinaryIO, name: str) -> Iterator[Any]:
     except InputError:
         raise
     except Exception as error:
-        raise InputError(f"{name} is no index of a recording, or damaged; make it again") from error
+        raise InputError(
+            f"{name} is not the index of a recording, or is damaged; index the recording again"
+        ) from error
 
 
 def _index(arrays: Any, name: str, measured: Measured) -> RecordingIndex:
@@ -229,7 +231,7 @@ def _index(arrays: Any, name: str, measured: Measured) -> RecordingIndex:
     pts: npt.NDArray[Any] = arrays["pts"]
     keys: npt.NDArray[Any] = arrays["keys"]
     if head.pop("version") != VERSION:
-        raise InputError(f"{name} is an index of another version; make it again")
+        raise InputError(f"{name} is an index of another version; index the recording again")
     if not pts.dtype == keys.dtype == np.int64:
         raise ValueError("another shape")
     for pair in ("pixel_aspect", "time_base"):

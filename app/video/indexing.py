@@ -46,7 +46,7 @@ def index_recording(
             are (None: not known); what it raises ends it.
 
     Raises:
-        ImageError: It is no video that can be read, or a part of its file is missing.
+        ImageError: It is not a video that can be read, or a part of its file is missing.
         TooLargeError: Its frames are larger than the limits, or too many.
     """
     _require_whole(path)
@@ -58,7 +58,7 @@ def index_times(path: Path) -> RecordingIndex:
     frames exactly. Decodes it all, in this process.
 
     Raises:
-        ImageError: It is no video that can be read.
+        ImageError: It is not a video that can be read.
         TooLargeError: It has too many frames.
     """
     return _index(path, ("", path.stat().st_size if path.is_file() else 0), None, None)
@@ -76,7 +76,7 @@ def _index(
     times, intra, damaged = list[float](), list[bool](), 0
     with open_video(path) as video:
         if not video.isOpened():
-            raise ImageError(f"{path.name} is no video that can be read")
+            raise ImageError(f"{path.name} is not a video that can be read")
         coded = _coded_size(video)
         if settings is not None:
             check_size(ImageHeader("video", *coded), settings, path.name)

@@ -202,7 +202,7 @@ def shots_of_indexed(
         progress: Called with how many shots were looked at.
 
     Raises:
-        ImageError: The file is no video that can be read any more, or another one by now.
+        ImageError: The file is not a video that can be read any more, or another one by now.
     """
     with closing(RecordingReader(path, index, kept_bytes=0)) as reader:
 

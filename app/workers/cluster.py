@@ -112,7 +112,7 @@ def read_place(address: str, keys: Path | None) -> SchedulerPlace:
         whole = False
     if not whole or parts.username or parts.path not in ("", "/") or parts.query:
         raise InputError(
-            f"{address} is no address of a scheduler",
+            f"{address} is not the address of a scheduler",
             hint="Write tcp://127.0.0.1:8786, or tls://HOST:PORT for another machine.",
         )
     if parts.scheme == "tcp":
@@ -389,7 +389,7 @@ def _explained_error(error: BaseException) -> BaseException:
 
     if isinstance(error, KilledWorker):
         return ClusterError(
-            "several workers ended over one task, most likely for want of memory",
+            "several workers ended while they ran the same task, probably because they ran out of memory",
             hint="Give them more memory, or solve without the cluster.",
         )
     return error

@@ -38,7 +38,7 @@ export async function undoDismissal(action) {
 	if (submitDismissal(action.finding, !action.dismissed)) {
 		tookBack(action);
 		announce(action.dismissed ? 'Finding reopened.' : 'Finding dismissed again.');
-	} else complain(`The finding of group ${action.number} stays as it is.`);
+	} else complain(`The finding of group ${action.number} was not changed.`);
 }
 
 /** Do again what was taken back. @param {DismissalDone} action */

@@ -58,7 +58,7 @@ export function placeExpected(view) {
 	submit(placeBall(view, expected));
 	focusView(view.letter);
 	selected.value = { kind: 'ball', view: view.key };
-	announce(`Ball of ${view.letter} placed where the other views see it. It confirms nothing until you move it.`);
+	announce(`Ball of ${view.letter} placed where the other views see it. It does not count as a measurement until you move it.`);
 	return true;
 }
 

@@ -60,7 +60,7 @@ async function show(view, items, by) {
 	if (drawing.value) endDrawing();
 	selected.value = null;
 	otherInstant.value = next ? { view: view.id, offset, label: next.label, image: next.image } : null;
-	announce(next ? `View ${view.letter}, ${next.label}: view only.` : `View ${view.letter} at its own instant.`);
+	announce(next ? `View ${view.letter} shows ${next.label}. It can only be looked at.` : `View ${view.letter} shows its own frame again.`);
 }
 
 /** Show the view's own frame again. */

@@ -140,7 +140,7 @@ function marksIn(view) {
 /** What is not seen is not accepted. */
 function isHidden() {
 	if (boxes.value && !overlaysHidden.value) return false;
-	complain(`Predictions are hidden. ${boxes.value ? 'H' : 'B'} shows what you would accept.`);
+	complain(`Predictions are hidden. Press ${boxes.value ? 'H' : 'B'} to see what you would accept.`);
 	return true;
 }
 

@@ -82,8 +82,8 @@ async function ask(state, abort) {
 
 /** Why there is no proposal for a view. @param {ViewJson} view */
 function whyNone(view) {
-	if (!waitsForLines(view, groupDocument.value?.solution ?? null)) return `View ${view.letter} has a camera already.`;
-	const looked = `No lines are proposed for view ${view.letter} yet. “Propose lines” on the result card searches this picture; the page Statistics searches all pictures.`;
+	if (!waitsForLines(view, groupDocument.value?.solution ?? null)) return `View ${view.letter} already has a camera.`;
+	const looked = `No lines are proposed for view ${view.letter} yet. “Propose lines” on the result card searches this picture; “Propose lines” on the Statistics page searches all pictures.`;
 	return view.station.shared ? `${looked} For a static camera, the proposal is shown at the first view with a picture, perhaps in another group.` : looked;
 }
 

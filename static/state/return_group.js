@@ -67,7 +67,7 @@ export function askReturn() {
 			says: `${one.person} sees the reason, can change this annotation, and submits it again. If others annotated the group too, nothing is decided until then.`,
 			send: async (reason) => {
 				take.value = await postAnnotationReturn(one.group, reason);
-				announce(`Returned to ${one.person}.`);
+				announce(`The annotation was returned to ${one.person}.`);
 			},
 		};
 	} else if (held?.submittedBy) {
@@ -76,7 +76,7 @@ export function askReturn() {
 			kind: 'back', person, says: `${person} sees the reason and gets this group next; you go to your next group.`,
 			send: async (reason) => {
 				await postReturn(held.batch, held.group, reason);
-				announce(`Returned to ${person}.`);
+				announce(`The annotation was returned to ${person}.`);
 				await nextOfBatch();
 				// Who stays would have open what the annotator gets next.
 				if (currentId() === held.group) navigate('/work');

@@ -173,7 +173,7 @@ export function ImagePanel({ picture, area, sizes }) {
 			data-included=${view.included}
 			tabindex="0"
 			style=${{ gridArea: area }}
-			aria-label=${`View ${letter}, ${view.label}. I to walk through its objects.`}
+			aria-label=${`View ${letter}, ${view.label}. Press I to step through its objects.`}
 			onFocus=${() => focusView(letter)}
 			onDblClick=${maximise}
 		>

@@ -107,7 +107,7 @@ function PolicyField({ kept, change }) {
 			<select class="field" id="import-policy" disabled=${kept} title=${kept ? 'This dataset exists already and keeps its policy' : ''} onChange=${withValue(change)}>
 				${POLICIES.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
 			</select>
-			<small>${kept ? 'This dataset exists already and keeps its policy. Change it on the page Policy.' : 'The thresholds of the new dataset, and whether cameras come from the paint of its pictures. It can be changed later.'}</small>
+			<small>${kept ? 'This dataset already exists and keeps its policy. Change it on the Policy page.' : 'The thresholds of the new dataset, and whether cameras come from the paint of its pictures. It can be changed later.'}</small>
 		</div>
 	`;
 }

@@ -71,7 +71,7 @@ function Own({ noise }) {
 	if (!stations.length && !people.length && !used.length) return null;
 	const [now, shown] = [unlike(used), unlike(factors)];
 	return html`
-		<p class="note">${now ? `Sigma uses separate noise for ${now}.` : 'Sigma uses the same noise for all balls.'}
+		<p class="note">${now ? `The sigma of a ball is computed with separate noise for ${now}.` : 'The sigma of every ball is computed with the same noise.'}
 			${noise.is_new ? (shown ? ` The estimates differ from the dataset for ${shown}.` : ' The estimates show no differences.') : ''}</p>`;
 }
 

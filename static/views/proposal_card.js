@@ -45,7 +45,7 @@ function Row({ picture: { view }, item }) {
 export function ProposalCard({ pictures }) {
 	return html`
 		<section class="card proposals" aria-label="Proposed lines">
-			<h2 title="Violet and dashed: proposed from the paint. They are not used until a person accepts them."><${Term} word="proposal">Proposed lines<//></h2>
+			<h2 title="Lines that Touchline found in the picture: violet and dashed. They are not used until a person accepts them."><${Term} word="proposal">Proposed lines<//></h2>
 			<ul class="proposals__views">
 				${pictures.map((picture) => (picture.proposal ? html`<${Row} key=${picture.view.key} picture=${picture} item=${picture.proposal.item} />` : null))}
 			</ul>

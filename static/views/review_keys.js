@@ -138,14 +138,14 @@ function takeBall() {
 	const view = viewInHand();
 	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
 	if (predicted || !view || view.balls.length > 0) acceptInHand();
-	else if (!placeExpected(view)) announce(`The other views do not agree on one place for the ball of ${view.letter}: draw it with N.`);
+	else if (!placeExpected(view)) announce(`The other views disagree about the place of the ball in view ${view.letter}. Press N to draw it.`);
 }
 
 /** Make the group of the view in hand, too. */
 function useView() {
 	const view = group.value?.views.find(({ letter }) => letter === focused.value);
 	if (!view) return;
-	if (view.included) announce(`View ${view.letter} is used already.`);
+	if (view.included) announce(`View ${view.letter} is already used for the 3D ball.`);
 	else submit({ kind: 'include', view: view.key, included: true });
 }
 
@@ -259,7 +259,7 @@ const VIEW = [
 	},
 	{
 		keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View',
-		run: () => { cycleGain(); announce(`Error lines × ${gain.value}.`); },
+		run: () => { cycleGain(); announce(`Error lines are drawn ${gain.value} times as long.`); },
 	},
 	{
 		keys: ['Shift+w'], label: 'Error lines to the paint in the pictures, or to the annotated points', group: 'View',

@@ -107,7 +107,7 @@ function StatisticsOf({ one }) {
 			<${NoiseCard} dataset=${one.id}>
 				${(/** @type {NoiseJson} */ noise) => (noise.advice.length === 0 ? null : html`
 					<p class="note">
-						${isNews(noise) ? html`The policy’s noise does not match this data: <a class="link" href=${pageAddress(one.name, 'policy')}>use the estimates</a> on the page Policy.` : 'The policy’s noise matches this data.'}</p>`)}
+						${isNews(noise) ? html`The policy’s noise does not match this data: <a class="link" href=${pageAddress(one.name, 'policy')}>use the estimates</a> on the Policy page.` : 'The policy’s noise matches this data.'}</p>`)}
 			<//>
 			<${Pitches} dataset=${one.id} />
 			<${Pictures} dataset=${one.id} />

@@ -31,7 +31,7 @@ export function SwapAsk({ group }) {
 		{ keys: ['m'], label: 'Swap the focused view anyway', group: 'Edit', run: () => swap(view) },
 	], [view, named]));
 	if (!view) return null;
-	const title = named && named !== view ? `The finding is about view ${named.letter}, not ${view.letter}.` : `Swap left and right in ${view.letter}?`;
+	const title = named && named !== view ? `The finding is about view ${named.letter}, not ${view.letter}.` : `Swap left and right of all lines in view ${view.letter}?`;
 	return html`
 		<section class="ask" aria-label=${title}>
 			<p class="ask__title">${title} <kbd>Esc</kbd></p>

@@ -120,7 +120,7 @@ function Ask({ group }) {
 	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} suggested=${suggestedReason(group.solution)} />`;
 	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
 	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
-	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with it?" button="Reject" />`;
+	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with this group?" button="Reject" />`;
 	if (asking.value === 'pin') return html`<${PinForm} />`;
 	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;
 	if (asking.value !== 'override') return null;

@@ -117,7 +117,7 @@ class TestAdding:
         cv2.imwrite(str(tmp_path / "a.png"), next(pictures()))
         page = open_page("/recordings")
         page.set_input_files("#import-file", tmp_path / "a.png")
-        expect(page.get_by_role("alert")).to_contain_text("a.png is no video")
+        expect(page.get_by_role("alert")).to_contain_text("a.png is not a video")
         page.goto("/import")
         page.set_input_files("#import-file", film)
         expect(page.get_by_role("alert")).to_contain_text("Add it on the page Recordings")

@@ -85,6 +85,7 @@ def test_nothing_tells_anybody_else_what_somebody_annotates(team: Apart) -> None
 
 def test_its_person_and_the_leads_see_it_and_no_list_has_it(team: Apart) -> None:
     copy = begun(team, "berta")
+    begun(team, "anna")
     at = f"/groups/{copy['id']}"
     assert [team.ask(name, "GET", at).status_code for name in ("berta", "lea", "anna")] == [
         200,

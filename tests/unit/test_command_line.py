@@ -177,7 +177,7 @@ class TestNames:
 
     def test_one_that_is_no_text_is_said_so(self, run: Run) -> None:
         code, _, err = run("findings", "--dataset", "a\udcff")
-        assert (code, err) == (1, '"a\\udcff" has letters that are no text in UTF-8\n')
+        assert (code, err) == (1, '"a\\udcff" contains bytes that are not UTF-8 text\n')
 
     @pytest.mark.parametrize(
         "error",

@@ -250,7 +250,7 @@ class TestSecrets:
         before = (secrets / "database_url").read_text()
         with pytest.raises(subprocess.CalledProcessError) as caught:
             make_secrets(secrets)
-        assert b"is there already" in caught.value.stderr
+        assert b"already exists" in caught.value.stderr
         assert (secrets / "database_url").read_text() == before
         assert [path.name for path in secrets.parent.iterdir()] == [secrets.name]
 

@@ -183,7 +183,7 @@ class TestReadMailServer:
             ({"smtp_from": None}, "without TOUCHLINE_SMTP_FROM"),
             (
                 {"smtp_from": "Touchline <box@example.org>"},
-                "TOUCHLINE_SMTP_FROM: .* no mail address",
+                "TOUCHLINE_SMTP_FROM: .* not an email address",
             ),
             ({"smtp_user": "box"}, "one without the other"),
             ({"smtp_password": "x"}, "one without the other"),
@@ -241,5 +241,5 @@ class TestCheckedAddress:
         if said.strip() == "anna@example.org":
             assert checked_address(said) == "anna@example.org"
         else:
-            with pytest.raises(InputError, match="is no mail address"):
+            with pytest.raises(InputError, match="is not an email address"):
                 checked_address(said)

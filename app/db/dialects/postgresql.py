@@ -239,7 +239,7 @@ class PostgreSQL:
             version = int(show("SHOW server_version_num").scalar_one()) // 10_000
             if version < MIN_SERVER:
                 raise StorageError(
-                    f"PostgreSQL {version} is too old", hint=f"Take {MIN_SERVER} or a newer one."
+                    f"PostgreSQL {version} is too old", hint=f"Use version {MIN_SERVER} or newer."
                 )
             if show("SHOW server_encoding").scalar_one() != "UTF8":
                 raise StorageError(

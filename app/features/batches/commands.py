@@ -198,5 +198,5 @@ def _day(text: str | None) -> date | None:
         return None if text is None else date.fromisoformat(text)
     except ValueError:
         raise typer.BadParameter(
-            f'"{text}" is no day; write it as 2026-12-24', param_hint="--due"
+            f'"{text}" is not a day; write it as 2026-12-24', param_hint="--due"
         ) from None

@@ -210,7 +210,7 @@ class Leases:
             _require_given(session, batch, group, worker)
             row = _group(session, batch, group)
             if Part.ANNOTATOR not in worker.parts(batch):
-                raise ConflictError(f'you are no annotator of the batch "{batch.name}"')
+                raise ConflictError(f'you are not an annotator of the batch "{batch.name}"')
             others = row.submitted is not None and row.submitted_by != worker.name
             if row.settled is not None or others:
                 by = row.submitted_by or "somebody"
@@ -350,7 +350,8 @@ def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
     parts = worker.parts(batch)
     if not parts:
         raise ConflictError(
-            f'the batch "{batch.name}" is given to others', hint="A lead can give it to you."
+            f'the batch "{batch.name}" is assigned to other people',
+            hint="A lead can assign it to you.",
         )
     return parts
 

@@ -456,7 +456,7 @@ def _no_groups_error(found: Sequence[int]) -> InputError:
 
 def _no_tracks_error(found: Sequence[int]) -> InputError:
     if not found:
-        return InputError("no track is named", pointer="/tracks")
+        return InputError("the list of tracks is empty", pointer="/tracks")
     return InputError(
         "every one of these tracks is in an open batch already",
         hint="Assign them anyway, or choose other tracks.",

@@ -121,7 +121,7 @@ def _read_track_rows(source: Path) -> dict[int, dict[str, Any]]:
         return {int(row["frame"]): row for row in rows}
     except (ValueError, LookupError, TypeError) as error:
         raise DatasetFormatError(
-            str(path), None, "frames", "is no list of tracked frames"
+            str(path), None, "frames", "is not a list of tracked frames"
         ) from error
 
 

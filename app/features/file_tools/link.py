@@ -97,7 +97,7 @@ def _link_values(made: TimeMap) -> dict[str, Any]:
 def _read_view(folder: Path, report: Report) -> BallRays:
     """The rays of the ball of one folder."""
     if not folder.is_dir():
-        raise InputError(f"{folder} is no folder of camera files and {BALL_FILE}")
+        raise InputError(f"{folder} is not a folder of camera files and {BALL_FILE}")
     cameras = by_frame(read_cameras(folder, report))
     if not cameras:
         raise report.refusal(f"{folder} holds no camera_<frame>.json")
@@ -153,7 +153,7 @@ def read_ball(
         try:
             frame, time, x, y = (_parse_number(row, column, name, line) for column in _COLUMNS)
             if not frame.is_integer():
-                raise DatasetFormatError(name, f"line {line}", "frame", "is no whole number")
+                raise DatasetFormatError(name, f"line {line}", "frame", "is not a whole number")
             if frame in frames:
                 raise DatasetFormatError(
                     str(path), f"line {line}", "frame", f"{frame:.0f} stands there a second time"

@@ -38,7 +38,7 @@ def shots_file(
         What ``shots.json`` holds.
 
     Raises:
-        ImageError: It is no video that can be read, or damaged.
+        ImageError: It is not a video that can be read, or damaged.
         TooLargeError: It is larger than the limits, or needs more than the process may use.
         InputError: ``out`` cannot hold the result.
     """

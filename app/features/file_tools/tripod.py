@@ -89,8 +89,8 @@ def _named(file: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """The camera of each frame, as ``calibrate --matches`` reads matches."""
     if not file.is_file():
         raise InputError(
-            f'"{file}" is neither {ONE} nor a file',
-            hint="The file has columns frame and match, or is a JSON object of them.",
+            f'"{file}" is not {ONE}, and there is no such file',
+            hint="Give a CSV file with the columns frame and match, or a JSON object of frame names and matches.",
         )
     named = read_matches(file)
     if not any(row["frame"] in named for row in rows):

@@ -110,7 +110,7 @@ class LinesEdit(BaseModel):
         for marking in self.not_visible:
             if marking not in self.lines or self.lines[marking]:
                 raise ValueError(
-                    f"`not_visible` names {marking}, which needs null under `lines` then"
+                    f"`not_visible` contains {marking}, so {marking} must be null under `lines`"
                 )
         return self
 

@@ -76,7 +76,9 @@ def read_merge_header(tree: FileTree) -> MergeHeader:
     """
     shown = tree.shown(HEAD)
     if HEAD not in tree.names():
-        raise DatasetFormatError(shown, None, None, "is missing; this is no export as touchline")
+        raise DatasetFormatError(
+            shown, None, None, "is missing; this is not an export in the format touchline"
+        )
     value = read_json(tree.read_bytes(HEAD), shown)
     if not isinstance(value, dict) or value.get("format") != FORMAT:
         raise DatasetFormatError(shown, None, "format", f'is not "{FORMAT}"')

@@ -176,7 +176,7 @@ def start_with(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
 
     Raises:
         InputError: There is no such start.
-        NotFoundError: It is no gold group.
+        NotFoundError: It is not a gold group.
     """
     check_start(start)
     with store.write() as session:
@@ -310,7 +310,7 @@ def _require_gold(session: Session, group_id: int) -> tuple[int, GoldGroup]:
     if row is None and group_dataset(session, group_id) is None:
         raise NotFoundError.group(group_id)
     if row is None:
-        raise NotFoundError(f"group {group_id} is no gold group")
+        raise NotFoundError(f"group {group_id} is not a gold group")
     return row.dataset_id, _gold_with_truth(session, row)[0]
 
 

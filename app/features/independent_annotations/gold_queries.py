@@ -58,7 +58,7 @@ def gold_start(session: Session, group_id: int) -> str:
 
 def common_start(session: Session, dataset_id: int) -> str | None:
     """What everybody begins with in batches that mix the gold groups of a dataset in: that which
-    leaves least of those that its gold groups have; None where there is no gold group."""
+    leaves least of those that its gold groups have; None where there is not a gold group."""
     mine = GoldModel.dataset_id == dataset_id
     found = session.scalars(select(GoldModel.start).where(mine).distinct())
     return max(found, key=(IMPORTED, WITHOUT_BALLS, BARE).index, default=None)

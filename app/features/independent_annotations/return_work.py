@@ -36,8 +36,8 @@ def return_annotation(
     checked = checked_reason(reason)
     if not checked:
         raise InputError(
-            "an annotation goes back with a reason",
-            hint="Say in a sentence what its person shall change.",
+            "a reason is required to return an annotation",
+            hint="Say in a sentence what its annotator should change.",
             pointer="/reason",
         )
     with store.write() as session:

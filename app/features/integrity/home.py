@@ -127,10 +127,10 @@ def _check_settings(settings: Settings) -> Check:
     unknown = sorted(name for name in os.environ if name.startswith(_PREFIX) and name not in known)
     gone = [str(folder) for folder in settings.import_folders if not folder.is_dir()]
     if unknown:
-        sentence = f"{', '.join(unknown)} is no setting, and is not heeded"
+        sentence = f"{', '.join(unknown)} is not a setting and is ignored"
         return Check("settings", False, sentence, "app/config.py lists all; correct or unset it.")
     if gone:
-        sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is no folder"
+        sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is not a folder"
         return Check("settings", False, sentence, "Make the folder, or take it out.")
     return Check("settings", True, f"home {settings.home}")
 

@@ -85,7 +85,7 @@ def _acceptance_sentence(result: Json) -> str:
 
 def _practice_sentence(result: Json) -> str:
     groups = plural(result["groups"], "practice group")
-    return f"{groups} made." if result["made"] else f"The {groups} were there already."
+    return f"{groups} made." if result["made"] else f"The {groups} already exist."
 
 
 def _rig_adjustment_sentence(result: Json) -> str:

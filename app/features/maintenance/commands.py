@@ -53,4 +53,4 @@ def _parse_time(text: str | None, option: str) -> datetime | None:
     try:
         return datetime.fromisoformat(text).astimezone()
     except (ValueError, OverflowError):
-        raise typer.BadParameter(f'{option} "{text}" is no time, such as {WHEN}') from None
+        raise typer.BadParameter(f'{option} "{text}" is not a time such as {WHEN}') from None

@@ -239,7 +239,10 @@ def _require_free_name_and_count(names: Sequence[str], name: str) -> None:
     if name in names:
         raise ConflictError(f"you have a token {name} already", hint="End it, or choose a name.")
     if len(names) >= MOST:
-        raise ConflictError(f"you have {MOST} tokens already", hint="End some of them first.")
+        raise ConflictError(
+            f"you already have {MOST} tokens, the most that one person may have",
+            hint="Revoke some of them first.",
+        )
 
 
 def _scopes_of_row(row: Any) -> tuple[Scope, ...]:

@@ -31,7 +31,7 @@ def _parse_role(text: str) -> Role:
         return Role(text.strip().lower())
     except ValueError:
         known = ", ".join(Role)
-        raise typer.BadParameter(f'"{text}" is no role; there are {known}') from None
+        raise typer.BadParameter(f'"{text}" is not a role; the roles are {known}') from None
 
 
 @commands.command()

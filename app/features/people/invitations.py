@@ -240,8 +240,8 @@ def _checked_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, 
         role = Role(one.role.strip().lower())
     except ValueError:
         known = ", ".join(Role)
-        problem = f"{quoted(one.role)} is no role" if one.role.strip() else "the role is missing"
-        raise InputError(f"{problem}; there are {known}") from None
+        problem = f"{quoted(one.role)} is not a role" if one.role.strip() else "the role is missing"
+        raise InputError(f"{problem}; the roles are {known}") from None
     return name, role, checked_address(one.email) if one.email else None
 
 

@@ -256,7 +256,7 @@ class Provider:
             )
             claims.validate(int(self._clock().timestamp()), LEEWAY_SECONDS)
             if not isinstance(claims["sub"], str) or not 0 < len(claims["sub"]) <= 255:
-                raise ValueError("the subject is no text")
+                raise ValueError("the subject is not text")
         except ConflictError:
             raise
         except (

@@ -294,13 +294,13 @@ class SignOn:
             name = checked_name(self.rules.name_for(claims))
         except InputError:
             raise NotLoggedInError(
-                f"{self.rules.label} gives you no name that can be one here",
+                f"{self.rules.label} gives you a name that Touchline cannot use",
                 hint=self._unknown_account_hint(),
             ) from None
         if person_by_name(session, name) is not None:
             # It may be the same person, and it may not: a name shows nothing.
             raise NotLoggedInError(
-                f"there is a {name} here already, not linked with this account",
+                f"there is already a user {name} who is not linked with this account",
                 hint=(
                     "If that is you: log in another way and link the account under Account, or ask "
                     "an admin for a link."

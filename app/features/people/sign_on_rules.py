@@ -108,7 +108,7 @@ def origin_of(address: str) -> str:
     host = parts.hostname or ""
     secure = parts.scheme == "https" or (parts.scheme == "http" and host in LOOPBACK)
     if not secure or not host or parts.username is not None or not address.isprintable():
-        raise ValueError(f"{address[:200]!r} is no address with TLS")
+        raise ValueError(f"{address[:200]!r} is not an address with TLS")
     return f"{parts.scheme}://{host}:{parts.port or _PORTS[parts.scheme]}"
 
 

@@ -50,7 +50,7 @@ def policy_from_yaml(text: str) -> Policy:
         # ValueError: a scalar that looks like a date and is none.
         raise InputError(f"this is not a policy in YAML: {_place(error)}") from error
     except RecursionError as error:
-        raise InputError("this is not a policy in YAML: it is nested too deep") from error
+        raise InputError("this is not a policy in YAML: it is nested too deeply") from error
     if not isinstance(value, dict):
         raise InputError("a policy in YAML consists of lines `name: value`")
     name = value.pop("name", CUSTOM)
@@ -214,7 +214,7 @@ class _PlainLoader(yaml.SafeLoader):
             raise self._refused("references are not allowed")
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise self._refused("it is nested too deep")
+            raise self._refused("it is nested too deeply")
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
         return node

@@ -236,7 +236,7 @@ def read_lesson(settings: Settings, state: GroupState) -> PracticeLesson:
     truths = _truths(settings)
     practised = state.dataset == DATASET or state.dataset.startswith(f"{DATASET} ")
     if not practised or truths is None or state.key not in truths:
-        raise NotFoundError(f"group {state.id} is no practice group")
+        raise NotFoundError(f"group {state.id} is not a practice group")
     return _lesson(state, truths)
 
 

@@ -143,7 +143,7 @@ class EvaluationRequest:
     def check(self) -> None:
         """Raise InputError where it says something impossible."""
         if self.predictions is None and self.careful is None:
-            raise InputError("there is nothing to evaluate", pointer="/predictions")
+            raise InputError("there are no predictions to evaluate", pointer="/predictions")
         if self.boxes not in BOX_KINDS:
             raise InputError(
                 f"boxes must be one of {', '.join(BOX_KINDS)}, not {quoted(self.boxes)}",

@@ -91,7 +91,7 @@ class PredictionFiles:
         }
         unused = next((name for name, is_given in given.items() if is_given), None)
         if unused is not None and (self.path is None or not self.path.exists()):
-            there = "there is none" if self.path is None else f'"{self.path}" is no file'
+            there = "there is none" if self.path is None else f'"{self.path}" is not a file'
             raise InputError(f"--{unused} is for a file of boxes, and {there}")
         if self.cameras_size is not None and self.cameras is None:
             raise InputError("--cameras-size is the size of predicted cameras, and there are none")

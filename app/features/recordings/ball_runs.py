@@ -395,7 +395,7 @@ def _checked(run: StoredRun, frames: Sequence[int]) -> list[int]:
     for place, frame in enumerate(frames):
         if frame not in uncertain:
             raise InputError(
-                f"frame {frame} is no uncertain one of this ball run",
+                f"frame {frame} is not an uncertain frame of this ball run",
                 pointer=f"/confirmed/{place}",
             )
     return sorted(set(frames))

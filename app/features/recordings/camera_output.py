@@ -35,7 +35,7 @@ def camera_output(store: Store, found: ShotCameras, form: str) -> tuple[str, byt
     """
     frames = read_cameras(store.settings, found.digest)
     if all(frame.camera is None for frame in frames):
-        raise ConflictError("no frame of this stretch has a camera")
+        raise ConflictError("no frame of this shot has a camera")
     title = f"{get_recording(store, found.recording).name}_{found.first}-{found.last}"
     with TemporaryDirectory() as place:
         # Samples carry the name of their folder.

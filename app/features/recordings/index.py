@@ -58,7 +58,7 @@ def index_now(
         stop: Called every now and then; an error that it raises ends the process.
 
     Raises:
-        ImageError: It is no video that can be read, or a part of it is missing.
+        ImageError: It is not a video that can be read, or a part of it is missing.
         NotFoundError: The file is not there.
     """
     with store.read() as session:

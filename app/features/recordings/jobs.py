@@ -57,7 +57,7 @@ def request_recording(
         actor: Who wants it.
 
     Raises:
-        InputError: It is no file of a video's name, or the name of the dataset cannot be one.
+        InputError: It is not a video file by its name, or the name of the dataset cannot be one.
         NotFoundError: There is no such upload or file.
     """
     path = _path_of(settings, source)

@@ -196,7 +196,7 @@ def require_video(path: Path) -> Path:
     """
     if path.suffix.lower() not in VIDEO_SUFFIXES or not path.is_file():
         raise InputError(
-            f"{path.name} is no video ({', '.join(sorted(VIDEO_SUFFIXES))})",
+            f"{path.name} is not a video ({', '.join(sorted(VIDEO_SUFFIXES))})",
             hint="Name the file of the recording itself; a zip has to be unpacked first.",
         )
     return path

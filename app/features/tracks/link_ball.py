@@ -194,7 +194,8 @@ def link_by_ball(
         present = need_link(session, recording_id, link_id)
         if etag_of(present) != etag_of(row):
             raise ConflictError(
-                "somebody changed this link while the ball was looked at", hint="Start it again."
+                "somebody changed this link while its time map was computed",
+                hint="Start it again: it uses the link as it is now.",
             )
         residuals = residuals_of(made, given, live_times)
         if save_map(session, present, pairs, made, residuals):

@@ -115,7 +115,7 @@ def _is_unambiguous_address(text: str, parts: SplitResult) -> bool:
 
 def _address_error(text: str, pointer: str | None) -> InputError:
     return InputError(
-        f"{text[:100]!r} is no address that messages can be sent to",
+        f"{text[:100]!r} is not an address that messages can be sent to",
         hint="Like https://hooks.example.org/touchline: http or https, without user, # and dots.",
         pointer=pointer,
     )

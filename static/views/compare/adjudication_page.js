@@ -93,7 +93,7 @@ function Adjudication({ found }) {
 			says: `${mine ? 'You' : take.person} can change it and submit it again. Then the annotations are compared again; if all agree, no decision is needed.`,
 			send: async (reason) => {
 				await postReturnForCorrection(group.id, take.id, reason);
-				announce(`Returned to ${take.person}.`);
+				announce(`The annotation was returned to ${take.person}.`);
 				await goOn(group.dataset.name, group.id);
 			},
 		};

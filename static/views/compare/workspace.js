@@ -33,7 +33,7 @@ const KEYS = [
 	{ keys: ['h'], label: 'Hide or show all overlays', group: 'View', run: () => { overlaysHidden.value = !overlaysHidden.value; } },
 	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },
 	{ keys: ['b'], label: 'Ball boxes', group: 'View', run: () => { boxes.value = !boxes.value; } },
-	{ keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Error lines × ${gain.value}.`); } },
+	{ keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Error lines are drawn ${gain.value} times as long.`); } },
 	{ keys: ['z'], label: 'Zoom to the ball in all pictures; again: whole images', group: 'View', run: zoomIn },
 	{ keys: ['0'], label: 'Leave the zoom', group: 'View', run: fitAll },
 ];

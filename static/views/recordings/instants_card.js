@@ -26,7 +26,7 @@ function madeText({ new: made, changed, unchanged, linked_views: views, outside,
 		dry ? 'Nothing is kept yet. So it would be:' : '',
 		`${plural(made, 'group')} made.`,
 		changed ? `${plural(changed, 'group')} got views of replays.` : '',
-		unchanged ? `${plural(unchanged, 'frame')} ${unchanged === 1 ? 'was a group already and stays as it is' : 'were groups already and stay as they are'}.` : '',
+		unchanged ? `${plural(unchanged, 'frame')} ${unchanged === 1 ? 'was already a group and was not changed' : 'were already groups and were not changed'}.` : '',
 		views ? `${plural(views, 'view')} of linked replays.` : '',
 		outside ? `${plural(outside, 'view')} fewer, outside of a replay.` : '',
 	].filter(Boolean).join(' ');

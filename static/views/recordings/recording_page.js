@@ -100,7 +100,7 @@ function useInstants() {
 		turn: (frame) => setChosen((before) => {
 			const next = new Set(before);
 			if (!next.delete(frame)) next.add(frame);
-			announce(next.has(frame) ? `Frame ${frame} is chosen.` : `Frame ${frame} is not chosen any more.`);
+			announce(next.has(frame) ? `Frame ${frame} is chosen.` : `Frame ${frame} is no longer chosen.`);
 			return next;
 		}),
 		/** @param {number[]} frames */

@@ -52,7 +52,7 @@ export function ShotCard({ one, shots, at, change, remember }) {
 			<p>Frames ${shot.first} to ${shot.last}, ${ENTERED[shot.entered_by]}. ${shot.kept === null ? '' : shot.kept ? 'Kept.' : 'Dropped.'}</p>
 			<div class="film__kinds" role="group" aria-label="Kind">
 				${SHOT_KINDS.map(({ kind, letter, label }, index) => html`
-					<button key=${kind} class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${shot.kind === kind} onClick=${() => set({ kind }, `This shot: ${label}.`)}>
+					<button key=${kind} class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${shot.kind === kind} onClick=${() => set({ kind }, `The kind of this shot is now ${label}.`)}>
 						<span class="film__letter" data-kind=${kind} aria-hidden="true">${letter}</span>${label} <kbd>${index + 1}</kbd>
 					</button>`)}
 			</div>

@@ -59,7 +59,7 @@ export function VideoField({ dropped, over }) {
 	/** @param {PathFile[]} files */
 	function take(files) {
 		const [strange] = files.filter(({ path }) => !isVideo(path));
-		setError(strange ? `${strange.path} is no video: a recording is the file of one.` : '');
+		setError(strange ? `${strange.path} is not a video: a recording is made of a video file.` : '');
 		if (!strange) sendVideos(files.map(({ file }) => file));
 	}
 	useEffect(() => { dropped?.then(take); }, [dropped]);

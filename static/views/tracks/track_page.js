@@ -283,7 +283,7 @@ function Track({ track, setTrack }) {
 	/** @param {EventKind} kind @param {boolean} added */
 	const correct = (kind, added) => {
 		const frame = added ? at : (eventAt(frames?.events ?? [], at)?.frame ?? at);
-		send({ corrections: corrected(track.corrections, { frame, kind, added }) }, added ? `A ${kind} is added in frame ${frame}.` : `The ${kind} of frame ${frame} is removed.`);
+		send({ corrections: corrected(track.corrections, { frame, kind, added }) }, added ? `Added a ${kind} in frame ${frame}.` : `Removed the ${kind} of frame ${frame}.`);
 	};
 	const doing = useRef({ track, frames, at, player, judge, correct, switchView, goOn, zoom: (/** @type {number} */ by) => setWidth((before) => Math.min(Math.max(Math.round(before * by), 50), track.last - track.first + 1)) });
 	Object.assign(doing.current, { track, frames, at, player, judge, correct, goOn });

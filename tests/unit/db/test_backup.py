@@ -144,7 +144,7 @@ class TestBackUp:
 
     def test_never_replaces_a_file(self, own_store: Store, tmp_path: Path) -> None:
         (tmp_path / "b.zip").write_bytes(b"mine")
-        with pytest.raises(InputError, match="there already"):
+        with pytest.raises(InputError, match="already exists"):
             back_up(own_store.settings, tmp_path / "b.zip")
         assert (tmp_path / "b.zip").read_bytes() == b"mine"
 
@@ -153,7 +153,7 @@ class TestBackUp:
     ) -> None:
         out = tmp_path / "b.zip"
         monkeypatch.setattr("app.db.backup.verify_backup", lambda _: out.write_bytes(b"mine"))
-        with pytest.raises(InputError, match="there already"):
+        with pytest.raises(InputError, match="already exists"):
             back_up(own_store.settings, out)
         assert out.read_bytes() == b"mine"
 
@@ -249,5 +249,5 @@ class TestVerifyBackup:
     def test_another_zip_is_no_backup(self, tmp_path: Path) -> None:
         with closing(zipfile.ZipFile(tmp_path / "z.zip", "w")) as other:
             other.writestr("manifest.json", json.dumps({"format": "soccernet-v3"}))
-        with pytest.raises(InputError, match="no backup of Touchline"):
+        with pytest.raises(InputError, match="not a backup of Touchline"):
             verify_backup(tmp_path / "z.zip")

@@ -85,8 +85,10 @@ class TestFind:
     def test_a_frame_of_another_match_is_not_the_one_of_that_number(self, names) -> None:
         other = "league/2030-2031/2030-09-01 - 18-00 Fir 1 - 0 Oak/7_1.png"
         assert names.find(other) is None
-        assert names.why_not(other).startswith("is no frame of the dataset: its folders name none")
-        assert names.why_not("99.png") == "is no frame of the dataset"
+        assert names.why_not(other).startswith(
+            "is not a frame of the dataset: its folders name none"
+        )
+        assert names.why_not("99.png") == "is not a frame of the dataset"
 
     @pytest.mark.parametrize(
         "name",
@@ -163,7 +165,7 @@ class TestFindNumber:
 
     def test_says_why_there_is_none(self, pictures: FrameNames) -> None:
         assert "several frames" in pictures.why_not_number("7")
-        assert "is no number in the name" in pictures.why_not_number("99")
+        assert "is not a number that the name" in pictures.why_not_number("99")
 
     @pytest.mark.parametrize(
         ("name", "found"), [("0004.jpg", 1), ("other/0007.jpg", 4), ("0007.jpg", None)]

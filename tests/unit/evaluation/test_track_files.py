@@ -70,7 +70,7 @@ class TestReadTracks:
             ("1,0,1,2,ten", "z_m"),
             ("1,0,1,2,nan", "z_m"),
             (",,1,2,-1", "frame"),
-            ("-4,0,1,2,-1", "no number of a frame"),
+            ("-4,0,1,2,-1", "not the number of a frame"),
             ("1,0,1,2,-4000", "metres from the centre mark"),
             ("1,0,1,2,-1,-0.1", "not above zero"),
             ("5,0,1,2,-1", "has a ball already"),

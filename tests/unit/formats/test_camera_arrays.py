@@ -106,7 +106,7 @@ class TestCamerasOfArrays:
         with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
             archive.writestr("K.npy", buffer.getvalue())
         assert read_cameras(tmp_path, report) == {}
-        assert "another size than it says" in str(report.problems[0])
+        assert "differs from the size that it declares" in str(report.problems[0])
 
     def test_an_empty_array_that_says_to_be_endless_is_refused(
         self, tmp_path: Path, report: Report

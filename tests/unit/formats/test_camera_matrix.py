@@ -70,10 +70,10 @@ class TestCameraFromMatrices:
     @pytest.mark.parametrize(
         ("changes", "problem"),
         [
-            ({"R": [[1, 0, 0], [0, 1, 0], [0, 0.5, 1]]}, "R: is no rotation"),
+            ({"R": [[1, 0, 0], [0, 1, 0], [0, 0.5, 1]]}, "R: is not a rotation"),
             ({"R": (-np.array(R)).tolist()}, "R: is a mirror image"),
             ({"K": [[1800, 0, 640], [0, 1800, 360]]}, "K: has 6 numbers, not 9"),
-            ({"K": np.transpose(K).tolist()}, "K: is no camera matrix"),
+            ({"K": np.transpose(K).tolist()}, "K: is not a camera matrix"),
             ({"t": [T, T]}, "t: has 6 numbers, not 3: 2 poses"),
             ({"t": [float("nan"), 0, 1]}, "t: is nan, not a finite number"),
             ({"t": (1000 * np.array(T)).tolist()}, "metres are meant"),

@@ -122,7 +122,10 @@ class TestOutputTree:
     def test_a_folder_with_other_files_is_never_touched(self, tmp_path: Path) -> None:
         _export(tmp_path / "out")
         (tmp_path / "out" / "thesis.txt").write_text("mine")
-        with pytest.raises(InputError, match="is no earlier export"), output_tree(tmp_path / "out"):
+        with (
+            pytest.raises(InputError, match="is not an earlier export"),
+            output_tree(tmp_path / "out"),
+        ):
             raise AssertionError("not reached")
         assert (tmp_path / "out" / "thesis.txt").read_text() == "mine"
 
@@ -131,7 +134,7 @@ class TestOutputTree:
     )
     def test_a_foreign_manifest_does_not_make_an_export(self, tmp_path: Path, text: str) -> None:
         (tmp_path / "manifest.json").write_text(text)
-        with pytest.raises(InputError, match="is no earlier export"), output_tree(tmp_path):
+        with pytest.raises(InputError, match="is not an earlier export"), output_tree(tmp_path):
             raise AssertionError("not reached")
 
     @pytest.mark.parametrize("name", ["out", "out.zip"])
@@ -149,7 +152,7 @@ class TestOutputTree:
             with zipfile.ZipFile(out, "w") as archive:
                 for file, text in content.items():
                     archive.writestr(file, text)
-        with pytest.raises(InputError, match="is no earlier export"), output_tree(out):
+        with pytest.raises(InputError, match="is not an earlier export"), output_tree(out):
             raise AssertionError("not reached")
 
     def test_others_may_read_what_was_published(self, tmp_path: Path) -> None:
@@ -174,7 +177,7 @@ class TestOutputTree:
             with zipfile.ZipFile(out, "a") as archive:
                 archive.writestr("thesis.txt", "mine")
         before = out.read_bytes()
-        with pytest.raises(InputError, match="is no earlier export"), output_tree(out):
+        with pytest.raises(InputError, match="is not an earlier export"), output_tree(out):
             raise AssertionError("not reached")
         assert out.read_bytes() == before
 

@@ -288,7 +288,7 @@ class TestNamesThatAreNoText:
             assert tree.read_bytes("b/1.json") == b"one"
         (problem,) = report.problems
         assert problem.record == b"caf\xe9\xff.json".decode("cp437")
-        assert problem.problem == "has a name that is no text, so it cannot be read"
+        assert problem.problem == "has a name that is not text, so it cannot be read"
         assert guess_format(marked) == "sn-calibration"
 
     def test_one_of_them_inside_a_nested_zip_condemns_no_other_member(

@@ -208,7 +208,7 @@ class TestReadFrame:
         video.release()
         path = tmp_path / "cam1.mp4"
         path.write_text(f"ffconcat version 1.0\nfile {hidden.name}\n")
-        with pytest.raises(ImageError, match=r"cam1\.mp4 is no video that can be read"):
+        with pytest.raises(ImageError, match=r"cam1\.mp4 is not a video that can be read"):
             read_frame(Media(str(path), frame=1), None, False, settings)
 
     def test_a_video_that_grows_on_its_way_is_refused(self, tmp_path, settings) -> None:
@@ -346,7 +346,7 @@ class TestReadFrame:
 
     def test_a_truncated_archive_is_said(self, archive, settings) -> None:
         archive.write_bytes(archive.read_bytes()[:-30])
-        with pytest.raises(ImageError, match="no complete zip"):
+        with pytest.raises(ImageError, match="not a complete zip"):
             read_frame(Media(str(archive), "v3_frames/7.png"), None, False, settings)
 
     def test_a_damaged_member_is_said(self, archive, settings) -> None:

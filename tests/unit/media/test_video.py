@@ -156,7 +156,7 @@ class TestVideoTimes:
 
     def test_what_is_no_video_is_refused(self, tmp_path: Path, settings: Settings) -> None:
         (tmp_path / "cam1.mp4").write_bytes(b"no video")
-        with pytest.raises(ImageError, match="no video that can be read"):
+        with pytest.raises(ImageError, match="not a video that can be read"):
             video_times(Media(str(tmp_path / "cam1.mp4"), frame=0), settings)
 
 
@@ -268,7 +268,7 @@ class TestFramesOfTheServer:
         try:
             for waiting in (frames.ask_fetch(media), frames.ask_fetch(media)):
                 assert waiting is not None
-                with pytest.raises(ImageError, match="no video that can be read"):
+                with pytest.raises(ImageError, match="not a video that can be read"):
                     waiting.future.result(60)
         finally:
             frames.close()

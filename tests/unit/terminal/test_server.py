@@ -433,14 +433,17 @@ class TestRefusals:
     def test_tls_that_fails_is_told_as_such(self, place: Place) -> None:
         secure = place.url.replace("http://", "https://")
         done = CliRunner().invoke(app, ["--server", secure, "datasets", "list"])
-        assert "cannot prove its identity" in str(done.exception)
+        assert "has a TLS certificate that cannot be verified" in str(done.exception)
 
     def test_an_answer_that_only_sounds_like_it_is_told_as_it_is(self) -> None:
         server = ServerPlace("http://127.0.0.1:8000", None)
         said = RequestError("there is no dataset crossland", None, 404)
         assert _command_error(server, said).message == "there is no dataset crossland"
         broken = UnreachableError("the SSL handshake failed")
-        assert "cannot prove its identity" in _command_error(server, broken).message
+        assert (
+            "has a TLS certificate that cannot be verified"
+            in _command_error(server, broken).message
+        )
 
     @pytest.mark.parametrize("named", ["tables", "figures"])
     def test_no_name_of_a_server_leads_out_of_the_folder(self, tmp_path: Path, named: str) -> None:

@@ -123,7 +123,7 @@ def test_lines_of_a_frame_that_is_not_there_are_refused(film: Film, tmp_path: Pa
 def test_what_is_no_video_is_refused(tmp_path: Path):
     path = tmp_path / "clip.mp4"
     path.write_bytes(b"no video")
-    with pytest.raises(ImageError, match=r"clip\.mp4 is no video"):
+    with pytest.raises(ImageError, match=r"clip\.mp4 is not a video"):
         track_clip(path, {})
 
 

@@ -82,7 +82,7 @@ class TestPlaylists:
             path.write_text(text)
             with nobody_opens(file), pytest.raises(ImageError) as caught:
                 index_recording(path, settings)
-        assert caught.value.message == f"{name} is no video that can be read"
+        assert caught.value.message == f"{name} is not a video that can be read"
 
     @pytest.mark.parametrize("name", ["film_%d.mp4", "concat:a.mp4|b.mp4", "pipe:0.mp4"])
     def test_a_name_that_says_something_to_the_decoder_is_a_name(

@@ -94,7 +94,7 @@ class TestBytes:
         if damage == "version":
             monkeypatch.setattr("app.video.index.VERSION", 0)
         made = {"empty": b"", "text": b"no index", "half": data[: len(data) // 2]}.get(damage, data)
-        with pytest.raises(InputError, match=r"recording\.idx.*make it again"):
+        with pytest.raises(InputError, match=r"recording\.idx.*index the recording again"):
             index_from_bytes(made, "recording.idx")
 
     def test_times_alone_are_read_from_a_file_that_is_whole(
@@ -106,5 +106,5 @@ class TestBytes:
         assert (read_index_seconds(path) == index.seconds).all()
         place = data.index(b"measured.npy") + 200
         path.write_bytes(data[:place] + bytes([data[place] ^ 255]) + data[place + 1 :])
-        with pytest.raises(InputError, match="make it again"):
+        with pytest.raises(InputError, match="index the recording again"):
             read_index_seconds(path)

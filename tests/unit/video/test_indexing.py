@@ -142,8 +142,8 @@ class TestDamagedFiles:
         ("how", "said"),
         [
             ("empty", "is empty"),
-            ("text", "is no video that can be read"),
-            ("noise", "is no video that can be read"),
+            ("text", "is not a video that can be read"),
+            ("noise", "is not a video that can be read"),
             ("head alone", "is cut off: 40 of its 44 bytes are there"),
             ("half of an mp4", "is cut off: .* bytes are there"),
             ("half of an avi", "is cut off: .* bytes are there"),
@@ -176,5 +176,5 @@ class TestDamagedFiles:
         other = write_video(tmp_path / "other.mp4", "mp4v", 5)
         path = tmp_path / "list.mp4"
         path.write_text(f"ffconcat version 1.0\nfile '{other}'\n")
-        with pytest.raises(ImageError, match="no video that can be read"):
+        with pytest.raises(ImageError, match="not a video that can be read"):
             index_recording(path, settings)

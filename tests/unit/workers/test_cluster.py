@@ -86,7 +86,7 @@ class TestReadPlace:
         ],
     )
     def test_what_is_no_address_is_said(self, address: str) -> None:
-        with pytest.raises(InputError, match="is no address of a scheduler"):
+        with pytest.raises(InputError, match="is not the address of a scheduler"):
             read_place(address, None)
 
     def test_a_key_is_for_its_owner_alone(self, tmp_path: Path) -> None:

@@ -257,7 +257,7 @@ class TestLeases:
         assert (review.group, review.part) == (groups[0], Part.REVIEWER)
         with pytest.raises(ConflictError):
             leases.submit(batch, groups[1], BO, actor="bo")
-        with pytest.raises(ConflictError, match="given to others"):
+        with pytest.raises(ConflictError, match="assigned to other people"):
             leases.next(batch, CY)
         with pytest.raises(NotFoundError):
             leases.take(batch, 99, BO)

@@ -150,7 +150,7 @@ def test_the_worker_process_reads_clip_and_lines_and_says_what_is_wrong(
     assert code == 1 and "the lines of frame 0 make no camera" in err
     clip.write_bytes(b"RIFF")
     code, _, err = touchline("track", clip, tmp_path / "out")
-    assert code == 1 and "clip.avi is no video that can be read" in err
+    assert code == 1 and "clip.avi is not a video that can be read" in err
     assert not (tmp_path / "out").exists()
 
 

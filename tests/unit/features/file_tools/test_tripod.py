@@ -88,7 +88,7 @@ def test_nothing_changes_where_nothing_is_said_or_shown(frames: list[DrawnFrame]
 
 
 def test_a_file_that_is_none_or_names_no_frame_is_refused(frames: list[DrawnFrame], tmp_path: Path):
-    with pytest.raises(InputError, match=r'"two" is neither one nor a file'):
+    with pytest.raises(InputError, match=r'"two" is not one, and there is no such file'):
         share_tripods(frames, "two", rows_of(frames), tmp_path)
     file = tmp_path / "cameras.json"
     file.write_text(json.dumps({"a": "main"}))

@@ -150,7 +150,7 @@ class TestShapes:
     ) -> None:
         (tmp_path / "cam1.mp4").write_bytes(b"no video")
         (remark,) = remarks_of(group_of(Media(str(tmp_path / "cam1.mp4"), frame=0)))
-        assert "view north: cam1.mp4 is no video that can be read." in remark
+        assert "view north: cam1.mp4 is not a video that can be read." in remark
 
     def test_a_picture_that_cannot_be_read_is_not_compared(
         self, remarks_of: Remarks, tmp_path: Path

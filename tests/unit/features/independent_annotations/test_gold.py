@@ -83,7 +83,7 @@ class TestStartWith:
             assert gold_truth(session, state.id) == truth
 
     def test_of_an_ordinary_group_there_is_nothing_to_begin_with(self, store, state) -> None:
-        with pytest.raises(NotFoundError, match="no gold group"):
+        with pytest.raises(NotFoundError, match="not a gold group"):
             start_with(store, state.id, "bare", actor="lea")
         with pytest.raises(NotFoundError, match="there is no group 99"):
             start_with(store, 99, "bare", actor="lea")

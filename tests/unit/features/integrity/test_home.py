@@ -101,7 +101,7 @@ class TestExamineHome:
         self, settings: Settings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setenv("TOUCHLINE_UPLOAD_DAY", "3")
-        assert "TOUCHLINE_UPLOAD_DAY is no setting" in faults(settings)["settings"].sentence
+        assert "TOUCHLINE_UPLOAD_DAY is not a setting" in faults(settings)["settings"].sentence
 
     def test_an_import_folder_that_is_gone_is_named(self, settings: Settings) -> None:
         gone = settings.model_copy(update={"import_folders": [Path("/nowhere/at/all")]})

@@ -59,7 +59,7 @@ RESULTS = [
         "3 views of 2 groups have a ball from predictions; 1 view refused.",
     ),
     ("practice", {"groups": 8, "made": True}, "8 practice groups made."),
-    ("practice", {"groups": 8, "made": False}, "The 8 practice groups were there already."),
+    ("practice", {"groups": 8, "made": False}, "The 8 practice groups already exist."),
     ("rig", {"cameras": [1, 2], "accepted": None}, "An adjustment of 2 cameras is proposed."),
     (
         "rig",

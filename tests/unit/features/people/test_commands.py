@@ -105,7 +105,7 @@ class TestUsers:
         assert "1 possible, 1 refused" in dry.stdout
         assert json.loads(run("users", "list", "--json").stdout) == []
         done = run("users", "invite-many", str(file))
-        assert '"boss" is no role' in done.stdout
+        assert '"boss" is not a role' in done.stdout
         links.use_link(store, token_in(done.stdout), SECRET)
         assert found(Logins(store), "anna").role is Role.LEAD
 

@@ -73,11 +73,11 @@ class TestInviteMany:
         assert problems[0] == NO_MAIL
         assert problems[1] == ""
         assert problems[2] == (
-            '"boss" is no role; there are none, viewer, annotator, reviewer, lead, admin'
+            '"boss" is not a role; the roles are none, viewer, annotator, reviewer, lead, admin'
         )
         assert "cannot be the name of a person" in problems[3]
         assert problems[4] == "anna stands in row 1, too"
-        assert problems[5] == '"dora at home" is no mail address'
+        assert problems[5] == '"dora at home" is not an email address'
         assert problems[6].startswith("the role is missing")
         assert names(store) == ["anna", "ben"]
         assert [person.role for person in list_people(store)] == [Role.LEAD, Role.ANNOTATOR]
@@ -167,7 +167,7 @@ class TestPost:
 
 class TestInviteOne:
     def test_an_address_that_is_none_makes_nobody(self, store: Store) -> None:
-        with pytest.raises(InputError, match="is no mail address") as caught:
+        with pytest.raises(InputError, match="is not an email address") as caught:
             invite_one(
                 store, "anna", Role.VIEWER, "anna", LinkMailer(None, None, URL), actor="local"
             )

@@ -31,7 +31,7 @@ class TestImportVideo:
         notes.write_text("x")
         film = write_video(tmp_path / "one.mp4", "mp4v", 30)
         code, _, complaint = touchline("import", "video", film, notes, "--dataset", "cup")
-        assert (code, "notes.txt is no video" in complaint) == (1, True)
+        assert (code, "notes.txt is not a video" in complaint) == (1, True)
         assert "cup" not in touchline("datasets", "list")[1]
 
     def test_options_of_other_formats_are_refused(self, tmp_path: Path, touchline: Run) -> None:

@@ -78,7 +78,7 @@ class TestAddRecording:
 
     @pytest.mark.parametrize(
         ("content", "problem"),
-        [(b"", "final.mp4 is empty"), (b"no video at all", "is no video that can be read")],
+        [(b"", "final.mp4 is empty"), (b"no video at all", "is not a video that can be read")],
     )
     def test_what_is_no_video_is_one_message(
         self, api, film: Path, finished: Finished, content: bytes, problem: str

@@ -140,7 +140,7 @@ class TestRequireVideo:
     def test_what_is_no_file_of_a_video_is_refused(self, tmp_path: Path, name: str) -> None:
         (tmp_path / "films").mkdir()
         (tmp_path / "notes.txt").write_text("x")
-        with pytest.raises(InputError, match="is no video"):
+        with pytest.raises(InputError, match="is not a video"):
             require_video(tmp_path / name)
 
 

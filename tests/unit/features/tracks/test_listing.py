@@ -126,7 +126,7 @@ class TestBatchesOfTracks:
             ({"verdicts": 2}, "one verdict on each"),
             ({"gold_every": 5}, "no gold groups"),
             ({"query": "status:accepted"}, "has no query"),
-            ({"tracks": []}, "no track is named"),
+            ({"tracks": []}, "the list of tracks is empty"),
             ({"tracks": [999]}, "track 999 is not of this dataset"),
         ],
     )
