@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
+from app.tracking.ball_run import UNSEEN_PX
 
 Image = npt.NDArray[np.uint8]
 Grey = npt.NDArray[np.uint8]
@@ -288,3 +289,34 @@ def find_ball(
         return None
     colour = BallColour.of(image, spot.x, spot.y, spot.diameter)
     return fit_disc(colour.grey(image), spot.x, spot.y, spot.diameter) or spot, colour
+
+
+def find_like(grey: Grey, x: float, y: float, diameter: float) -> BallSpot:
+    """The ball at a click by how it looks elsewhere: what looks like it there, else the click itself.
+
+    Args:
+        grey: From ``BallColour.grey`` of a frame that shows it well, shape (H, W).
+        x, y: Where somebody clicked, pixels.
+        diameter: About how large it is, pixels.
+    """
+    click = BallSpot(x, y, diameter, UNSEEN_PX, 0.0, 1.0)
+    template = disc(round(diameter * 4) / 4)
+    near = int(np.ceil(max(3.0, 0.5 * diameter)))
+    reach = template.shape[0] // 2 + near
+    left, top = round(x) - reach, round(y) - reach
+    if left < 0 or top < 0 or left + 2 * reach >= grey.shape[1] or top + 2 * reach >= grey.shape[0]:
+        return click
+    alike, contrast = likeness(
+        grey[top : top + 2 * reach + 1, left : left + 2 * reach + 1], template
+    )
+    rows, columns = np.mgrid[: alike.shape[0], : alike.shape[1]]
+    away = np.hypot(columns - near, rows - near)
+    score = alike * np.clip(contrast / 0.5, 0, 1) * np.exp(-0.5 * (away / near) ** 2)
+    row, column = np.unravel_index(int(np.argmax(score)), score.shape)
+    if score[row, column] < LEAST_LIKE:
+        return click
+    place = round(x) + int(column) - near, round(y) + int(row) - near
+    spot = fit_disc(grey, *place, diameter)
+    if spot is None or np.hypot(spot.x - x, spot.y - y) > near:
+        return click
+    return spot

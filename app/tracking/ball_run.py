@@ -13,6 +13,8 @@ from app.geometry.camera import Camera
 
 State = Literal["followed", "uncertain"]
 End = Literal["lost", "left", "limit"]
+UNSEEN_PX = 2.0
+"""Standard deviation of a centre that a person clicked where nothing looks like a ball."""
 SAME = 0.5
 """Diameters within which two places are those of one ball."""
 
@@ -58,11 +60,14 @@ class FollowHints:
         cameras: They say how the background moves, and how large a ball is.
         places: Where the ball is predicted.
         detected: Candidates of a detector; they take part with their score, as others do.
+        seen: The same ball in another frame, where a person clicked it: how it looks. A click that mends is the ball
+            wherever it is; None: a click is refused where nothing looks like a ball.
     """
 
     cameras: Mapping[int, Camera] = field(default_factory=dict)
     places: Mapping[int, PredictedPlace] = field(default_factory=dict)
     detected: Mapping[int, Sequence[DetectedBall]] = field(default_factory=dict)
+    seen: FollowedBall | None = None
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,13 @@ class BallRun:
     def count(self, state: State) -> int:
         """How many frames are in a state."""
         return sum(ball.state == state for ball in self.balls)
+
+    def surest(self, near: int) -> FollowedBall | None:
+        """The clicked ball that is seen best, of those seen as well the one nearest to a frame."""
+        clicked = {click.frame for click in self.clicks}
+        mine = [ball for ball in self.balls if ball.frame in clicked]
+        fitted = [ball for ball in mine if ball.sigma_px < UNSEEN_PX]
+        return min(fitted or mine, key=lambda ball: abs(ball.frame - near), default=None)
 
     def mended(self, new: BallRun) -> BallRun:
         """The run with what one more click says.

@@ -53,7 +53,7 @@ PLAIN_WORDS = """
     submit suggested suggestions summary surface swap synloc tab table tall team term terminal text threads
     threshold ticks time tokens tools trace tracing track tracking transfer transitions tree trees triangulate tries tripod truth types
     undo undrawn upload v3 v3d video viewport viewports virtual visibility wal walk warm web what when window words
-    work worker workspace write writer zip making predicted constraints correct filter intervals measurements
+    work worker workspace write writer zip making predicted constraints correct filter intervals measurements hints
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be

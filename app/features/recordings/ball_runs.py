@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,13 +26,12 @@ from app.features.recordings.ball_run_queries import (
     find_run,
     insert_run,
     list_run_rows,
-    predicted_in,
     update_run,
 )
 from app.features.recordings.ball_run_values import StoredRun as StoredRun
 from app.features.recordings.ball_run_values import run_columns, run_of_row
 from app.features.recordings.camera_queries import views_of_video
-from app.features.recordings.cameras import cameras_at
+from app.features.recordings.follow_hints import follow_hints
 from app.features.recordings.index import read_index
 from app.features.recordings.service import Recording, get_recording, need_recording
 from app.features.recordings.shots import get_shots
@@ -40,7 +39,7 @@ from app.media.frames import refused_picture
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.tracking.ball_follow import follow_ball
-from app.tracking.ball_run import BallClick, BallRun, DetectedBall, FollowedBall, FollowHints
+from app.tracking.ball_run import BallClick, BallRun, FollowedBall, FollowHints
 from app.video.frames import Image, RecordingReader
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
@@ -185,7 +184,7 @@ def add_run(
         ConflictError: The recording cannot be read.
         InputError: The frame is outside of the recording, or nothing near the click looks like a ball.
     """
-    recording, run = _followed(store, follower, recording_id, click)
+    recording, run = _followed(store, follower, recording_id, click, None)
     with store.write() as session:
         number = insert_run(
             session,
@@ -219,7 +218,8 @@ def mend_run(
     """
     before = get_run(store, recording_id, run_id)
     _require_open(before, if_match)
-    _, new = _followed(store, follower, recording_id, click)
+    seen = before.run.surest(click.frame)
+    _, new = _followed(store, follower, recording_id, click, seen)
     with store.write() as session:
         before = _need(session, recording_id, run_id)
         _require_open(before, if_match)
@@ -295,8 +295,13 @@ def remove_run(store: Store, recording_id: int, run_id: int, *, actor: str) -> N
 
 
 def _followed(
-    store: Store, follower: BallFollower, recording_id: int, click: BallClick
+    store: Store,
+    follower: BallFollower,
+    recording_id: int,
+    click: BallClick,
+    seen: FollowedBall | None,
 ) -> tuple[Recording, BallRun]:
+    """A recording, and what a click in it is followed to; ``seen`` is the same ball in another frame."""
     shots = get_shots(store, recording_id)
     recording = shots.recording
     recording.require_readable()
@@ -309,35 +314,14 @@ def _followed(
     inside = (one for one in shots.items if one.first <= click.frame <= one.last)
     shot = next(((one.first, one.last) for one in inside), (click.frame, click.frame))
     around = range(max(shot[0], click.frame - EACH_WAY), min(shot[1], click.frame + EACH_WAY) + 1)
-    run = follower.follow(recording, click, shot, _hints(store, recording, around))
+    hints = replace(follow_hints(store, recording, around), seen=seen)
+    run = follower.follow(recording, click, shot, hints)
     if run is None:
         raise InputError(
             f"nothing near ({click.x:.0f}, {click.y:.0f}) in frame {click.frame} looks like a ball",
             hint="Click its middle, in a frame where nobody hides it.",
         )
     return recording, run
-
-
-def _hints(store: Store, recording: Recording, frames: range) -> FollowHints:
-    """Cameras over time of frames, and what detectors say of those that are groups."""
-    cameras = {
-        number: one.camera
-        for number, one in cameras_at(store, recording, frames).items()
-        if one.camera is not None
-    }
-    with store.read() as session:
-        shown = views_of_video(session, recording.dataset_id, recording.require_readable())
-        rows = predicted_in(session, [view for view in shown if view.number in frames])
-    detected = {
-        number: tuple(
-            DetectedBall(
-                row.x + row.width / 2, row.y + row.height / 2, (row.width + row.height) / 2, row.score
-            )
-            for row in boxes
-        )
-        for number, boxes in rows.items()
-    }  # fmt: skip
-    return FollowHints(cameras, {}, detected)
 
 
 def _place(

@@ -111,7 +111,7 @@ class TestFollowBall:
         def wall(picture: Image, _: int) -> None:
             picture[:, 200:] = GROUND[100:340, 200:420]
 
-        run = Film(straight(), before=wall).followed(5)
+        run = Film(straight(66), before=wall).followed(5)
         assert run.after == "lost"
         assert run.last < 33
 
@@ -156,3 +156,27 @@ class TestExpectedDiameter:
 
     def test_the_sky_says_nothing(self) -> None:
         assert expected_diameter(MAIN, 640, -4000) is None
+
+
+class TestMending:
+    """Another click of a run whose ball is known by its looks."""
+
+    def test_a_click_on_a_ball_that_nobody_sees_is_the_ball_and_followed_from_there(self) -> None:
+        def wall(picture: Image, number: int) -> None:
+            if 20 <= number < 26:
+                x, y = straight()[number].round().astype(int)
+                picture[y - 12 : y + 13, x - 12 : x + 13] = (130, 40, 50)
+
+        film = Film(straight(), before=wall)
+        first = film.followed(5).balls[5]
+        x, y = film.way[22]
+        around = range(21, -1, -1), range(23, FRAMES)
+        refused = follow_ball(film.read, BallClick(22, x, y), *around)
+        assert refused is None
+        run = follow_ball(film.read, BallClick(22, x, y), *around, FollowHints(seen=first))
+        assert run is not None
+        by_frame = {ball.frame: ball for ball in run.balls}
+        assert (by_frame[22].x, by_frame[22].y, by_frame[22].sigma_px) == (x, y, 2.0)
+        found = [number for number, ball in by_frame.items() if ball.state == "followed"]
+        assert {10, 30, 40} <= set(found)
+        assert np.median(film.off(run)) < 0.5

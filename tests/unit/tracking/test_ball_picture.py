@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.tracking.ball_picture import BallColour, disc, find_ball, fit_disc, likeness
+from app.tracking.ball_picture import BallColour, disc, find_ball, find_like, fit_disc, likeness
 from tests.drawn_balls import drawn, grass
 
 PLACES = [(60.0, 50.0), (60.37, 50.0), (60.5, 49.5), (59.81, 50.24)]
@@ -70,3 +70,19 @@ class TestLikeness:
         reach = template.shape[0] // 2
         assert (column + reach, row + reach) == (60, 50)
         assert alike.max() > 0.9 and abs(contrast[row, column] - 1) < 0.2
+
+
+class TestFindLike:
+    """A click that mends: the ball looks as in another frame, or is where the person says."""
+
+    PICTURE = drawn([(60.3, 50.6, 8.0)])
+    GREY = BallColour.of(PICTURE, 60.3, 50.6, 8.0).grey(drawn([(40.4, 30.2, 8.0)], seed=4))
+
+    def test_a_click_beside_it_snaps_to_its_centre(self) -> None:
+        spot = find_like(self.GREY, 42.0, 29.0, 8.0)
+        assert np.hypot(spot.x - 40.4, spot.y - 30.2) < 0.4 and spot.sigma_px < 1.0
+
+    def test_where_nothing_looks_like_it_the_click_counts(self) -> None:
+        for x, y in ((90.0, 70.0), (1.0, 1.0)):
+            spot = find_like(self.GREY, x, y, 8.0)
+            assert (spot.x, spot.y, spot.diameter, spot.sigma_px) == (x, y, 8.0, 2.0)

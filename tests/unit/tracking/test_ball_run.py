@@ -48,3 +48,13 @@ class TestMended:
         found = run(5, range(10)).mended(run(5, range(3, 9), x=30.0))
         assert [click.x for click in found.clicks] == [80.0]
         assert places(found) == dict.fromkeys(range(3, 9), 30.0)
+
+
+class TestSurest:
+    def test_it_is_the_nearest_click_that_was_seen(self) -> None:
+        found = run(5, range(40)).mended(run(20, range(18, 23)))
+        assert [found.surest(near).frame for near in (0, 14, 39)] == [5, 20, 20]  # type: ignore[union-attr]
+        unseen = FollowedBall(30, 300.0, 50.0, 8.0, 2.0, 1.0, "followed")
+        blind = BallRun((BallClick(30, 300.0, 50.0),), (unseen,), "lost", "lost")
+        assert found.mended(blind).surest(39).frame == 20  # type: ignore[union-attr]
+        assert blind.surest(0) == unseen

@@ -12,7 +12,8 @@ import pytest
 from app.db.store import Store
 from app.features.groups.replay import replay
 from app.features.groups.state_snapshot import read_state_snapshot
-from app.features.recordings.ball_runs import _hints, get_run
+from app.features.recordings.ball_runs import get_run
+from app.features.recordings.follow_hints import follow_hints
 from app.features.recordings.queries import update_recording
 from app.features.recordings.service import get_recording
 from tests.drawn_balls import FRAMES, WALL, place, write_film
@@ -199,6 +200,6 @@ class TestAccept:
         body = {"name": "seen", "format": "csv", "upload": sent.json()["id"]}
         made = api.post("/api/v1/datasets/cup/predictions", json=body)
         assert made.status_code == 201, made.text
-        hints = _hints(store, get_recording(store, 1), range(FRAMES))
+        hints = follow_hints(store, get_recording(store, 1), range(FRAMES))
         (one,) = hints.detected[8]
         assert (one.x, one.y, one.diameter, one.score) == (108.5, 66.5, 9.0, 0.8)
