@@ -4,6 +4,16 @@
 import { idempotencyKey, queryText, request } from './client.js';
 
 /** @import {JobJson} from './jobs.js' */
+/** @import {PitchSizeJson} from './match_estimates.js' */
+
+/**
+ * @typedef {object} ShownPitchJson
+ * @property {number | null} length metres; null where it is not shown, like width
+ * @property {number | null} width
+ * @property {{length: number | null, width: number | null}} sigma standard deviations
+ * @property {number} frames it rests on
+ * @property {PitchSizeJson | null} other the size, where it certainly is not that of the match
+ */
 
 /**
  * What became of the frames of a shot.
@@ -18,7 +28,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {number[]} annotated frames whose lines were known
  * @property {number[]} unusable frames with too few lines
  * @property {boolean} turned whether a person turned them by half a turn of the pitch
- * @property {{other: {length: number, width: number} | null} | null} pitch that its frames show together; `other` where it certainly is not that of the match
+ * @property {ShownPitchJson | null} pitch that its frames show together
  */
 /**
  * @typedef {object} ShotCamerasJson

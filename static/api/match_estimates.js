@@ -25,7 +25,7 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
 
 /** @typedef {{etag: string, items: MatchPitchJson[]}} PitchesJson */
 
-/** @param {number} dataset @param {AbortSignal} [signal] @returns {Promise<PitchesJson>} */
+/** @param {number | string} dataset its id or name @param {AbortSignal} [signal] @returns {Promise<PitchesJson>} */
 export async function getPitches(dataset, signal) {
 	const { json } = await requestTagged(`/datasets/${dataset}/pitches`, { signal });
 	return json;
@@ -36,7 +36,7 @@ export function estimatePitches(dataset) {
 	return request(`/datasets/${dataset}/pitches`, { method: 'POST', key: idempotencyKey() });
 }
 
-/** Give a match another pitch. @param {number} dataset @param {string} match @param {PitchSizeJson} size @param {string} etag @returns {Promise<JobJson>} */
+/** Give a match another pitch. @param {number | string} dataset its id or name @param {string} match @param {PitchSizeJson} size @param {string} etag @returns {Promise<JobJson>} */
 export function setPitch(dataset, match, { length, width }, etag) {
 	return request(`/datasets/${dataset}/pitches`, { method: 'PATCH', body: { match, length, width }, etag, key: idempotencyKey() });
 }

@@ -8,7 +8,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
@@ -213,3 +213,46 @@ def test_the_page_is_usable_by_everybody_and_fits(recording: int, open_page: Ope
     dialog = page.get_by_role("dialog")
     expect(dialog).to_contain_text("Track the camera of the shot")
     expect(dialog).to_contain_text("Next frames that are lost or bridged")
+
+
+def test_the_pitch_that_a_shot_shows_is_taken_for_its_match(
+    recording: int, open_page: OpenPage
+) -> None:
+    page = tracked(open_page, recording)
+    here = f"/api/v1/recordings/{recording}"
+    taken = page.request.post(f"{here}/groups", data={"frames": [0], "propose": False})
+    until(
+        page,
+        lambda: page.request.get(f"/api/v1/jobs/{taken.json()['id']}").json()["state"] == "done",
+    )
+
+    def other_pitch(route: Route) -> None:
+        """The film is drawn on 105 x 68 m: as if it was not."""
+        if route.request.method != "GET":
+            route.continue_()
+            return
+        answer = route.fetch()
+        cameras = answer.json()
+        sigma = {"length": 0.2, "width": None, "crown": 0.01, "inward": 0.01, "tripod": 0.1}
+        shown = {"length": 101.2, "width": None, "crown": 0.0, "inward": 0.0, "frames": 24}
+        shown |= {"sigma": sigma, "tripod": [0, 90, -20], "other": {"length": 101.2, "width": 68.0}}
+        for stretch in cameras["items"]:
+            stretch["summary"]["pitch"] = shown
+        route.fulfill(response=answer, json=cameras)
+
+    page.route(f"**{here}/cameras", other_pitch)
+    page.reload()
+    card = page.get_by_role("region", name="Cameras", exact=True)
+    expect(card).to_contain_text("length 101.2 ± 0.2 m, width unknown")
+    runs = page.request.get(f"{here}/cameras").json()["items"][0]["revision"]
+    card.get_by_role("button", name="Use 101.2 × 68 m for this match").click()
+
+    def tracked_again() -> bool:
+        return page.request.get(f"{here}/cameras").json()["items"][0]["revision"] > runs
+
+    until(page, tracked_again)
+    frames = page.request.get(f"{here}/cameras/0").json()
+    assert frames["pitch"] == [101.2, 68.0]
+    pitch = page.request.get("/api/v1/datasets/pans/pitches").json()["items"][0]
+    assert (pitch["length"], pitch["width"]) == (101.2, 68.0)
+    assert pitch["previous"] == {"length": 105.0, "width": 68.0}

@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 
 import { camerasFile } from '../../api/cameras.js';
 import { count, plural } from '../../lib/format.js';
+import { pitchSize, shownSize } from '../../lib/pitch_size.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 
@@ -37,7 +38,7 @@ export function CameraCard({ one, cameras }) {
 	const { stretch, job, error, busy, before } = cameras;
 	const fresh = stretch ? stretch.drawn.filter((frame) => !stretch.summary.annotated.includes(frame)) : [];
 	const useless = stretch?.summary.unusable ?? [];
-	const other = stretch?.summary.pitch?.other;
+	const shown = stretch?.summary.pitch;
 	return html`
 		<section class="card camera" aria-label="Cameras">
 			<h2>Cameras${stretch ? html`<span class="card__aside">frames ${stretch.first} to ${stretch.last}</span>` : null}</h2>
@@ -45,7 +46,9 @@ export function CameraCard({ one, cameras }) {
 			${stretch?.stale ? html`<p class="form__error">The video is another one since: track the shot again.</p>` : null}
 			${fresh.length ? html`<p role="status">${fresh.length === 1 ? `Frame ${fresh[0]} has` : `${plural(fresh.length, 'frame')} have`} lines since. Track again, and the shot follows them.</p>` : null}
 			${useless.length ? html`<p class="form__error">Frame ${useless.join(', ')} has too few lines for a camera, and was not used.</p>` : null}
-			${other ? html`<p role="status">Its frames show a pitch of ${other.length} × ${other.width} m. Give the match that size under Statistics, and track again.</p>` : null}
+			${shown?.other ? html`
+				<p role="status">Its frames show another pitch than the match has: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}.</p>
+				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Solves the groups of this match on that pitch, and tracks the shot again; Statistics restores the size before'} onClick=${cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
 			<p class="buttons">
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens its lines'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>

@@ -5,9 +5,11 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 
 import { getCameraStretches, getFrameCameras, postCameras, turnCameras } from '../../api/cameras.js';
 import { listen } from '../../api/events.js';
+import { getPitches, setPitch } from '../../api/match_estimates.js';
 import { postInstants } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { useKeys } from '../../lib/hooks.js';
+import { pitchSize } from '../../lib/pitch_size.js';
 import { useResource } from '../../lib/resource.js';
 import { address, navigate } from '../../lib/router.js';
 import { worstFrame, nextUntracked } from '../../state/cameras.js';
@@ -33,6 +35,7 @@ import { goTo, wanted } from '../../state/playback.js';
  * @property {() => void} track
  * @property {() => void} correct draw the lines of the frame on screen
  * @property {() => void} turnHalf to the other side of the pitch, or back
+ * @property {() => void} takePitch give the match the pitch that the frames show, and track again
  * @property {() => void} worst
  * @property {() => void} untracked
  * @property {() => void} turnBefore
@@ -73,6 +76,16 @@ export function useCameras(one, shot) {
 			list.reload();
 		});
 	}
+	function takePitch() {
+		const other = stretch?.summary.pitch?.other;
+		if (busy || !other) return;
+		attempt(getPitches(one.dataset).then(({ etag }) => setPitch(one.dataset, one.name, other, etag)), async (begun) => {
+			const over = await follow(begun, setJob);
+			if (over.state !== 'done') return;
+			announce(`The match is played on ${pitchSize(other)} now. Its cameras are tracked again on that pitch.`);
+			track();
+		});
+	}
 	function correct() {
 		if (busy) return;
 		attempt(postInstants(one.id, [frame], { propose: false, linked: false }), async (begun) => {
@@ -91,7 +104,7 @@ export function useCameras(one, shot) {
 		else goTo(place);
 	};
 	return {
-		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, correct, turnHalf,
+		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, correct, turnHalf, takePitch,
 		worst: () => jump(frames && worstFrame(frames), 'No frame is tracked.'),
 		untracked: () => jump(frames && nextUntracked(frames, wanted.value), frames ? 'Every frame is tracked.' : 'This shot has no cameras yet.'),
 		turnBefore: () => {
