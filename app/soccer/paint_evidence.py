@@ -66,6 +66,18 @@ class PaintEvidence:
 PROPOSAL_OUTCOMES: tuple[ProposalOutcome, ...] = get_args(ProposalOutcome)
 
 
+class TripodCamera(NamedTuple):
+    """The camera of a frame on the pitch that the frames of its tripod show together.
+
+    Attributes:
+        parameters: Of ``geometry.resection``, eight numbers.
+        covariance: Of them, 8 x 8, row by row.
+    """
+
+    parameters: tuple[float, ...]
+    covariance: tuple[float, ...]
+
+
 @dataclass(frozen=True)
 class PaintReading:
     """What was read of the paint in the picture of one view.
@@ -81,6 +93,8 @@ class PaintReading:
             None where nothing was measured.
         explained: The same of the paint that lies near a marking.
         people: Digest of the boxes in which nothing was believed; empty where there were none.
+        tripod: What the main cameras of its match know together (``solving.match_tripod``); None:
+            nothing, and what nobody knows of the pitch is in the covariance of its camera.
     """
 
     frame: str
@@ -90,6 +104,7 @@ class PaintReading:
     supported: float | None = None
     explained: float | None = None
     people: str = ""
+    tripod: TripodCamera | None = None
 
     @cached_property
     def text(self) -> str:
@@ -109,8 +124,8 @@ class PaintReading:
 
 
 def reading_to_json(reading: PaintReading) -> dict[str, Any]:
-    """As JSON; what was not measured is null, and ``people`` is there where somebody was."""
-    value = {
+    """As JSON; what was not measured is null, and ``people`` and ``tripod`` are there where there are any."""
+    value: dict[str, Any] = {
         "frame": reading.frame,
         "sought_for": reading.sought_for,
         "evidence": evidence_to_json(reading.evidence),
@@ -118,7 +133,11 @@ def reading_to_json(reading: PaintReading) -> dict[str, Any]:
         "supported": reading.supported,
         "explained": reading.explained,
     }
-    return {**value, "people": reading.people} if reading.people else value
+    if reading.people:
+        value["people"] = reading.people
+    if reading.tripod is not None:
+        value["tripod"] = [list(numbers) for numbers in reading.tripod]
+    return value
 
 
 def reading_from_json(value: Any) -> PaintReading:
@@ -140,9 +159,20 @@ def reading_from_json(value: Any) -> PaintReading:
             supported,
             explained,
             str(value.get("people", "")),
+            _tripod_from_json(value.get("tripod")),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"this is not a reading of paint: {error}") from error
+
+
+def _tripod_from_json(value: Any) -> TripodCamera | None:
+    if value is None:
+        return None
+    parameters, covariance = (tuple(map(float, numbers)) for numbers in value)
+    finite = all(map(math.isfinite, parameters + covariance))
+    if not finite or (len(parameters), len(covariance)) != (8, 64):
+        raise ValueError("a camera of a tripod has 8 numbers and 64 of their covariance")
+    return TripodCamera(parameters, covariance)
 
 
 def reading_from_text(text: str) -> PaintReading:

@@ -144,6 +144,18 @@ class CalibrationPolicy:
     inside the plan, as the Laws measure to outer edges. JaC asks for the inner edges and the plan
     in any case. Not in the ``repr``: ``calibration_key`` knows it where it is another."""
 
+    weighed: Literal["points", "markings"] = _threshold_field(
+        "points",
+        CALIBRATION,
+        "What weighs alike in a camera of clicks",
+        choices=("points", "markings"),
+        later=True,
+        shown=False,
+    )
+    """``points``: each one, as if they erred each by itself; ``markings``: those of a marking err together,
+    so that many of one say less than as many of several (``observations.SHARED_SHARE``). Not in the
+    ``repr``: ``calibration_key`` knows it where it is set."""
+
     def fitted(self, pitch: Pitch) -> Pitch:
         """A pitch with the goals and lines that are fitted."""
         return pitch.with_goal(self.goal)
@@ -278,8 +290,9 @@ def _values_without_later_defaults(policy: Policy | CalibrationPolicy) -> dict[s
 
 
 PAPER = Policy()
-CLICKED = CalibrationPolicy(goal="middle")
-"""How the commands without a dataset calibrate: as ``paper``, with goals where people click them."""
+CLICKED = CalibrationPolicy(goal="middle", weighed="markings")
+"""How the commands without a dataset calibrate: as ``paper``, with goals where people click them, and
+clicks of a marking as they err, together."""
 STRICT = Policy(name="strict", calibration=CLICKED, min_parallax_degrees=5.0, max_sigma_m=0.5)
 TOUCHLINE = Policy(
     name="touchline",

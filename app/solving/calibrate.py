@@ -50,6 +50,7 @@ from app.solving.resect import (
     ResectionProblem,
     measurement_count,
 )
+from app.solving.tripod_pitch import about_plan
 
 MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""
@@ -310,12 +311,17 @@ def calibrate_paint(
     found = solve_paint(problem, reading.evidence, policy.fitted(pitch))
     if found is None:
         return replace(clicked, paint=replace(fit, reason=PAINT_DISAGREES))
+    pitch_covariance = found.pitch
+    if reading.tripod is not None:
+        camera, spread = map(np.array, reading.tripod)
+        known_together = about_plan(found.parameters, camera, spread.reshape(8, 8))
+        pitch_covariance = known_together - found.covariance
     painted = replace(
         clicked,
         source="paint",
         camera=resection.camera(found.parameters),
         covariance=row_by_row(found.covariance),
-        pitch_covariance=row_by_row(found.pitch),
+        pitch_covariance=row_by_row(pitch_covariance),
         unobservable=_unobservable_parameters(found.covariance),
         paint=replace(fit, error_px=found.error_px),
     )
@@ -504,6 +510,8 @@ def _camera_key_parts(
     parts = [*map(repr, (version, station.size, pitch)), policy.spelling, repr(lines)]
     if policy.goal != "inner":
         parts.append(repr(("goal", policy.goal)))
+    if policy.weighed != "points":
+        parts.append(repr(("weighed", policy.weighed)))
     if station.given is not None and station.calibration == "given":
         parts.append(repr(station.given.parameters.tolist()))
         if station.given.is_wide:

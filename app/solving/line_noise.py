@@ -121,6 +121,7 @@ class _ScaledFit:
     sums: FloatArray
     totals: FloatArray
     size: IntArray
+    place: IntArray
 
     @staticmethod
     def of(
@@ -133,7 +134,9 @@ class _ScaledFit:
         sums = np.zeros((len(size), jacobian.shape[1]))
         np.add.at(sums, place, jacobian)
         totals = np.asarray(np.bincount(place, residuals), float)
-        return _ScaledFit(residuals, jacobian, prior / lengths**2, lengths, sums, totals, size)
+        return _ScaledFit(
+            residuals, jacobian, prior / lengths**2, lengths, sums, totals, size, place
+        )
 
     def evidence(self, shares: FloatArray) -> LineEvidence:
         """For each of the shares, shape (R,)."""
@@ -172,6 +175,7 @@ def line_noise(
     marking: IntArray,
     prior: FloatArray,
     known: LinePrior,
+    weights: FloatArray | None = None,
 ) -> LineNoise:
     """Noise of the clicks, and the covariance of a least-squares fit to them.
 
@@ -181,6 +185,7 @@ def line_noise(
         marking: Of each residual, shape (N,).
         prior: Information of the parameters' own prior, shape (n,), a diagonal.
         known: Of the noise, in the pixels of the residuals.
+        weights: Of the residuals' squares in the fit, but for the robust ones, shape (N,); None: alike.
 
     Raises:
         LinAlgError: A combination of parameters is not determined.
@@ -198,10 +203,13 @@ def line_noise(
     scatter = np.maximum(found.rest, 0.0) + SIGMA_FREEDOM * known.sigma_px**2
     variance = scatter / (freedom + SIGMA_FREEDOM) * student / (student - 2)
     variance = np.maximum(variance, known.floor_px**2)
-    shares, square = values[:, None, None], fit.jacobian.T @ fit.jacobian
-    inner = (1 - shares) * square + shares * (fit.sums.T @ fit.sums)
+    weighted = fit.jacobian if weights is None else fit.jacobian * weights[:, None]
+    sums = np.zeros_like(fit.sums)
+    np.add.at(sums, fit.place, weighted)
+    shares = values[:, None, None]
+    inner = (1 - shares) * (weighted.T @ weighted) + shares * (sums.T @ sums)
     middle = np.tensordot(weight * variance, inner, 1) + np.diag(fit.prior)
-    outer = np.linalg.inv(square + np.diag(fit.prior))
+    outer = np.linalg.inv(weighted.T @ fit.jacobian + np.diag(fit.prior))
     return LineNoise(
         variance=float(weight @ variance),
         share=float(weight @ values),

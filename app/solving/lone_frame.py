@@ -221,8 +221,16 @@ class _Frame:
         known = self.problem.noise
         known = replace(known, sigma_px=known.sigma_px / click, floor_px=known.floor_px / click)
         return line_noise(
-            rows.apart / click, rows.jacobian / click, rows.marking, self._prior(), known
+            rows.apart / click,
+            rows.jacobian / click,
+            rows.marking,
+            self._prior(),
+            known,
+            self._weights(rows),
         ).parameters
+
+    def _weights(self, rows: _Rows) -> FloatArray:
+        return self.problem.row_weights(self.observations, rows.marking)
 
     def _prior(self) -> FloatArray:
         prior = np.zeros(WIDTH)
@@ -238,8 +246,9 @@ class _Frame:
         free = rows.jacobian[:, :width]
         length = np.sqrt((free**2).sum(axis=0) + prior[:width])
         free = free / length
-        normal = free.T @ free + np.diag(prior[:width] / length**2)
-        right = free.T @ rows.apart + pull[:width] / length
+        weighted = free.T * self._weights(rows)
+        normal = weighted @ free + np.diag(prior[:width] / length**2)
+        right = weighted @ rows.apart + pull[:width] / length
         step = np.zeros(WIDTH)
         step[:width] = -np.linalg.solve(normal, right) / length
         return step
@@ -270,7 +279,8 @@ class _Frame:
             CLICK_SIGMA_PX * self.problem.unit,
             WIDE * self.problem.robust_scale_px * self.problem.unit,
         )
-        cost = 2 * (scale / click) ** 2 * (np.sqrt(1 + (rows.distance / scale) ** 2) - 1).sum()
+        robust = np.sqrt(1 + (rows.distance / scale) ** 2) - 1
+        cost = 2 * (scale / click) ** 2 * float(self.problem.weights(self.observations) @ robust)
         off = unknowns - np.append(np.zeros(KAPPA), [self.problem.distortion_mean, *np.zeros(5)])
         cost += (self._prior() * off**2).sum()
         return float(cost) if np.isfinite(cost) else np.inf

@@ -134,7 +134,8 @@ class _FittedFrame:
         unknowns = np.append(self.camera, warp)
         apart, jacobian = search.rows(unknowns)
         scale = self.problem.robust_scale_px * self.problem.unit
-        weighted = jacobian / np.sqrt(1 + (apart / scale) ** 2)[:, None]
+        weights = self.problem.weights(self.observations)
+        weighted = jacobian * (weights / np.sqrt(1 + (apart / scale) ** 2))[:, None]
         gradient, information = weighted.T @ apart, weighted.T @ jacobian
         prior = self.problem.prior()
         gradient[:PARAMETERS] += (self.camera - prior.mean) / prior.sigma**2

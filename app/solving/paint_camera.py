@@ -168,7 +168,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         None where the paint does not determine it, does not lie on the markings in the end, or
         moves the camera farther than its start allows.
     """
-    curve_points, sigmas = _curve_points(evidence, problem.resection.size)
+    curve_points, sigmas = curve_points_of(evidence, problem.resection.size)
     if not len(sigmas):
         return None
     parameters = problem.first
@@ -213,7 +213,7 @@ def offsets_of(
     return PaintOffsets(offsets[:, 0], sigmas, curve_points.curve, -jacobians[:, 0], radii)
 
 
-def _curve_points(evidence: PaintEvidence, size: ImageSize) -> tuple[CurvePoints, FloatArray]:
+def curve_points_of(evidence: PaintEvidence, size: ImageSize) -> tuple[CurvePoints, FloatArray]:
     """Places of paint by marking, pixels from the principal point, and their sigmas."""
     rows = [
         (index, *point)

@@ -180,6 +180,7 @@ class PictureProblem:
             self.observations.marking,
             prior,
             replace(known, sigma_px=known.sigma_px / click_px, floor_px=known.floor_px / click_px),
+            self.problem.weights(self.observations),
         )
         return noise.parameters
 
@@ -227,14 +228,15 @@ class PictureProblem:
         # The cost counts pixels, so a prior weighs as much as its clicks are noisy.
         information = np.append(camera.sigma, self.sigma / np.sqrt(variance)) ** -2
         information[KAPPA] *= variance
+        weights = self.problem.weights(self.observations)
 
         def one(unknowns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
             apart, jacobian = self.rows(unknowns)
             scale = self._scale
             root = np.sqrt(1 + (apart / scale) ** 2)
             off = unknowns - mean
-            cost = float(scale**2 * (root - 1).sum() + 0.5 * (information * off**2).sum())
-            weighted = jacobian / root[:, None]
+            cost = float(scale**2 * (weights @ (root - 1)) + 0.5 * (information * off**2).sum())
+            weighted = jacobian * (weights / root)[:, None]
             return (
                 cost,
                 weighted.T @ apart + information * off,

@@ -40,7 +40,12 @@ from app.solving.main_position import (
     PositionPrior,
     is_main_position,
 )
-from app.solving.observations import Observations, principal_point
+from app.solving.observations import (
+    SHARED_SHARE,
+    Observations,
+    principal_point,
+    weights_of_points,
+)
 from app.solving.starts import STANDS, starts_from_stands
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
@@ -133,6 +138,7 @@ class ResectionProblem:
         distortion_sigma: Its standard deviation.
         line_sigma_px: Noise of the clicks of the dataset at 960 x 540, where that is known.
         line_share: Of its variance, what the points of a marking have in common, if known.
+        fit_share: The same as the fit weighs points, whatever is known: noise moves no camera.
     """
 
     size: ImageSize
@@ -141,6 +147,7 @@ class ResectionProblem:
     distortion_sigma: float
     line_sigma_px: float | None = None
     line_share: float | None = None
+    fit_share: float = 0.0
 
     @staticmethod
     def of(size: ImageSize, policy: CalibrationPolicy) -> ResectionProblem:
@@ -152,6 +159,7 @@ class ResectionProblem:
             policy.distortion_sigma,
             policy.line_sigma_px,
             policy.line_share,
+            SHARED_SHARE if policy.weighed == "markings" else 0.0,
         )
 
     @property
@@ -255,7 +263,17 @@ class ResectionProblem:
         """Robust cost of the points alone, pixels squared."""
         scale = self.robust_scale_px * self.unit
         apart = self.distances(fit.parameters, observations)
-        return float((scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)).sum())
+        robust = scale**2 * (np.sqrt(1 + (apart / scale) ** 2) - 1)
+        return float(self.weights(observations) @ robust)
+
+    def weights(self, observations: Observations) -> FloatArray:
+        """Weight of each observed point in the fit, shape (N,)."""
+        return weights_of_points(observations.marking, self.fit_share)
+
+    def row_weights(self, observations: Observations, marking: IntArray) -> FloatArray:
+        """The same of rows as ``noise_rows`` has them, by the marking of each, shape (M,)."""
+        points = np.where(marking < 0, -1 - marking, np.arange(len(marking)))
+        return self.weights(observations)[points]
 
     def distances(self, parameters: FloatArray, observations: Observations) -> FloatArray:
         """Distance of each observed point to its marking, pixels, shape (N,)."""
@@ -275,7 +293,8 @@ class ResectionProblem:
         Raises:
             DegenerateGeometryError: The lines leave a combination of parameters open.
         """
-        return line_noise(*self.noise_rows(parameters, observations), self.noise)
+        rows = self.noise_rows(parameters, observations)
+        return line_noise(*rows, self.noise, self.row_weights(observations, rows[2]))
 
     def noise_rows(
         self, parameters: FloatArray, observations: Observations
@@ -340,7 +359,7 @@ class ResectionProblem:
         return fit_curves(
             starts,
             observations.curves,
-            observations.curve_points(),
+            observations.curve_points(self.fit_share),
             prior or self.prior(),
             (stage.scale_px or self.robust_scale_px) * self.unit,
             self.size.diagonal / 2,

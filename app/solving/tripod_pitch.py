@@ -198,6 +198,12 @@ class TripodPitch:
             )
         return frames.parameters[0], self.covariance_of(frame, frames.parameters[0])
 
+    def error_px(self, frame: PaintedFrame, parameters: FloatArray) -> float:
+        """Median distance of a frame's paint from the pitch that is shown, by its camera there, pixels."""
+        at = replace(frame, parameters=parameters)
+        seen = _Frames([at], self.size, self.plan, self.policy, self).seen(0)
+        return float(np.median(np.abs(seen.offsets)))
+
     def covariance_of(self, frame: PaintedFrame, parameters: FloatArray) -> FloatArray:
         """The same of parameters that are known already, shape (8, 8)."""
         at = replace(frame, parameters=parameters)
@@ -301,7 +307,7 @@ class _Frames:
             )
         self._known = known
 
-    def _seen(self, at: int) -> PaintOffsets:
+    def seen(self, at: int) -> PaintOffsets:
         frame, known = self._frames[at], self._known
         seen = offsets_of(
             self._problem, self.parameters[at], frame.sightings, frame.sigmas, known.pitch
@@ -321,7 +327,7 @@ class _Frames:
         weight = np.array([DEVIATION_M, DEVIATION_M, DEVIATION_M, KAPPA_DEVIATION]) ** -2.0
         level = MAIN_SIGMA[0] ** -2.0
         for at in range(count):
-            seen = self._seen(at)
+            seen = self.seen(at)
             terms = all_terms(self._grass[at], seen.marking, seen.jacobian, self._plan)
             robust = self._problem.robust(seen.offsets, seen.sigmas, strict=True)
             each = robust * cautious_weights(seen.marking, seen.sigmas) / seen.sigmas**2
@@ -383,7 +389,7 @@ class _Frames:
             self._known = replace(self._known, shared=self._known.shared + step)
             if not np.isfinite(self.parameters).all():
                 raise np.linalg.LinAlgError("the frames leave the pitch open")
-            rest = [np.abs(self._seen(at).offsets) for at in range(len(self._frames))]
+            rest = [np.abs(self.seen(at).offsets) for at in range(len(self._frames))]
             sigmas = np.concatenate([frame.sigmas for frame in self._frames])
             # Of a normal distribution the median distance is 0.6745 standard deviations.
             noise = max(1.0, float(np.median(np.concatenate(rest) / sigmas) / 0.6745) ** 2)

@@ -4,7 +4,7 @@ Of each pair of frames of a real clip the 95 % regions of the camera's position 
 difference, by the sum of both covariances, within chi-square's 95 % for three numbers. Crossbars
 are left out of everything that makes a camera; where people clicked them the camera predicts
 them with its covariance. Frames of a clip that are drawn onto paint share the pitch that they show, as with ``snap
---tripod``; stills have that of no other. ``python -m tests.bench.clips``; ``... N`` takes N frames of each clip
+--tripod``, and as a dataset does for views of a match (cameras started by the same lines); stills have that of no other. ``python -m tests.bench.clips``; ``... N`` takes N frames of each clip
 for the cameras that need no clicks.
 """
 
@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping
+import tempfile
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
@@ -21,19 +23,29 @@ import cv2
 import numpy as np
 from scipy.stats import chi2
 
+from app.config import Settings
+from app.db.store import Store
+from app.features.groups.submit import load
+from app.features.imports.ingest import ingest
+from app.features.paint.service import read_paint
+from app.features.policies.service import change_policy
+from app.features.solutions.service import solve_dataset
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS, X, Z, parameters_from_camera, projection_jacobians
+from app.paint.evidence import to_paint_evidence
 from app.paint.grass import field_of_play
 from app.paint.one_tripod import share_tripod
 from app.paint.propose import propose
 from app.paint.snap import SnappedCamera, snap
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Station, View
+from app.soccer.media import Media
 from app.soccer.pitch import Pitch
-from app.soccer.policy import PAPER, CalibrationPolicy
+from app.soccer.policy import PAPER, TOUCHLINE, CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.solving.resect import REFERENCE_DIAGONAL
 from tests.bench.table import print_table
@@ -105,11 +117,20 @@ def bench_clips(data: Path, frames: int = FRAMES) -> None:
     }
     found = {name: Found() for name in makers}
     seen: dict[tuple[str, str | None], list[tuple[Known, Lines]]] = {}
+    drawn: dict[tuple[str, str], list[tuple[np.ndarray, Lines]]] = {}
     for clip, image, lines in pictures(folder, frames):
         for name, make in makers.items():
             known = make(image, lines)
             if known is not None:
+                if clip is not None and known.snapped is not None:
+                    start = (
+                        _grass(lines) if make is _snapped and lines else _on_paint(known.snapped)
+                    )
+                    drawn.setdefault((name, clip), []).append((image, start))
                 seen.setdefault((name, clip), []).append((known, lines or make_lines({})))
+    for name in [*makers][1:]:
+        views = {clip: each for (kind, clip), each in drawn.items() if kind == name}
+        found[f"{name}, in a dataset"] = Found(in_a_dataset(views))
     for (name, clip), each in seen.items():
         cameras = [known for known, _ in each]
         if clip is not None:
@@ -134,6 +155,46 @@ def share(cameras: list[Known]) -> list[Known]:
         return cameras
     pairs = zip(cameras, shared[1], strict=True)
     return [replace(known, covariance=covariance) for known, covariance in pairs]
+
+
+def in_a_dataset(
+    clips: Mapping[str, Sequence[tuple[np.ndarray, Lines]]],
+) -> dict[str, list[Known]]:
+    """Cameras of a dataset that has each clip as a match, and each frame with its lines as a group of it."""
+    names = [(clip, image, lines) for clip, each in clips.items() for image, lines in each]
+    with tempfile.TemporaryDirectory() as place, closing(_store(Path(place) / "home")) as store:
+        groups = []
+        for number, (clip, image, lines) in enumerate(names):
+            key, file = f"{number:03}", Path(place) / f"{number:03}.png"
+            cv2.imwrite(str(file), image[:, :, ::-1])
+            view = View(key, Station(key, _size(image), lines=lines), media=Media(str(file)))
+            groups.append(Group(key, (view,), match=clip))
+        ingest(store, "clips", groups, source="frames", actor="bench")
+        change_policy(store, "clips", TOUCHLINE, if_match=None, actor="bench")
+        read_paint(store, "clips", actor="bench", workers=1)
+        solve_dataset(store, "clips")
+        found: dict[str, list[Known]] = {}
+        for number, (clip, image, _) in enumerate(names, start=1):
+            solution = load(store, number).solution
+            calibration = None if solution is None else solution.views[0].calibration
+            if calibration is None or calibration.camera is None or calibration.source != "paint":
+                continue
+            covariance = np.reshape(calibration.known_covariance, (PARAMETERS, PARAMETERS))
+            found.setdefault(clip, []).append(Known(calibration.camera, covariance, _size(image)))
+        return found
+
+
+def _store(home: Path) -> Store:
+    return Store.open(Settings(home=home))
+
+
+def _grass(lines: Lines) -> Lines:
+    return make_lines({name: at for name, at in lines.items() if not name.startswith("Goal")})
+
+
+def _on_paint(snapped: SnappedCamera) -> Lines:
+    """What an accepted proposal draws."""
+    return to_paint_evidence(snapped.evidence).some_points()
 
 
 def meet(one: Known, other: Known) -> bool:
@@ -207,8 +268,7 @@ def _clicked(image: np.ndarray, lines: Lines | None) -> Known | None:
     """The camera of the clicks on the grass."""
     if lines is None:
         return None
-    grass = make_lines({name: at for name, at in lines.items() if not name.startswith("Goal")})
-    found = calibrate(grass, PITCH, _size(image), PAPER.calibration)
+    found = calibrate(_grass(lines), PITCH, _size(image), PAPER.calibration)
     if found.camera is None or found.covariance is None:
         return None
     covariance = np.reshape(found.covariance, (PARAMETERS, PARAMETERS))

@@ -28,7 +28,8 @@ LIMIT_PX = 5.5
 DEV_HALF = slice(None, None, 2)
 POLICIES = {
     "inner edges (paper)": CalibrationPolicy(),
-    "middle (all others)": CLICKED,
+    "middle, markings weighed alike (all others)": CLICKED,
+    "middle, points weighed alike": replace(CLICKED, weighed="points"),
     "middle, lines by the Laws (calibrate --goal laws)": replace(CLICKED, goal="laws"),
 }
 

@@ -65,7 +65,7 @@ class LeftOut:
     """
 
     marking: str
-    curve_residuals: FloatArray
+    residuals: FloatArray
     camera: FloatArray
     clicks: float
     share: float

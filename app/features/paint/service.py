@@ -35,6 +35,7 @@ from app.features.paint.queries import (
     match_paint,
     read_readings,
 )
+from app.features.paint.tripod import share_tripods
 from app.features.solutions.service import known_calibrations
 from app.media.frames import VideoIndexer
 from app.progress import ReportProgress
@@ -163,6 +164,7 @@ def read_paint(
             done += len(some)
             if progress is not None:
                 progress(done, len(ids))
+    share_tripods(store, found, matches, actor, run, require_wanted)
     return get_paint(store, found.id)
 
 

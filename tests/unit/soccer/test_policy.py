@@ -89,6 +89,11 @@ class TestHash:
         keys = {replace(PAPER, calibration=one).hash for one in (CLICKED, laws, PAPER.calibration)}
         assert len(keys) == 3
 
+    def test_the_paper_weighs_points_and_the_others_markings(self):
+        weighed = {name: policy.calibration.weighed for name, policy in POLICIES.items()}
+        assert weighed == {"paper": "points", "strict": "markings", "touchline": "markings"}
+        assert repr(replace(CLICKED, weighed="points")) == repr(CLICKED)
+
     def test_sharing_positions_has_no_part_in_what_keys_calibrations(self):
         """Those that were kept before it came stay known; the position itself keys the others."""
         assert repr(CalibrationPolicy(share_position=True)) == repr(CalibrationPolicy())

@@ -9,6 +9,7 @@ from app.solving.line_noise import (
     line_evidence,
     line_noise,
 )
+from app.solving.observations import weights_of_points
 
 MARKINGS, EACH, UNKNOWNS = 14, 6, 4
 NO_PRIOR = np.zeros(UNKNOWNS)
@@ -134,3 +135,36 @@ class TestLineNoise:
             residuals, blind, marking, np.array([0, 0, 0, 25.0]), LinePrior(1.0, 0.1)
         )
         assert found.parameters[3, 3] == pytest.approx(0.04)
+
+
+class TestWeights:
+    """Fits that weigh points of crowded markings less, as errors that they share ask for."""
+
+    SIZES = np.array([2] * 14 + [30, 40])
+    SHARE = 0.5
+
+    def fit(self, seed, share_of_fit):
+        rng = np.random.default_rng(seed)
+        marking = np.repeat(np.arange(len(self.SIZES)), self.SIZES)
+        jacobian = rng.normal(size=(len(self.SIZES), UNKNOWNS))[marking]
+        jacobian = jacobian + 0.3 * rng.normal(size=jacobian.shape)
+        shared = np.sqrt(self.SHARE) * rng.normal(size=len(self.SIZES))[marking]
+        errors = shared + np.sqrt(1 - self.SHARE) * rng.normal(size=len(marking))
+        weights = weights_of_points(marking, share_of_fit)
+        weighted = jacobian.T * weights
+        off = np.linalg.solve(weighted @ jacobian, weighted @ errors)
+        known = LinePrior(1.0, 0.1, self.SHARE)
+        noise = line_noise(errors - jacobian @ off, jacobian, marking, NO_PRIOR, known, weights)
+        return off, noise.parameters
+
+    def errors_and_held(self, share_of_fit):
+        found = [self.fit(seed, share_of_fit) for seed in range(400)]
+        inside = [off @ np.linalg.solve(known, off) for off, known in found]
+        squares = [off @ off for off, _ in found]
+        return np.mean(squares), np.mean(np.array(inside) < chi2.ppf(0.95, UNKNOWNS))
+
+    def test_they_are_nearer_to_the_truth_and_their_covariance_holds_it(self):
+        alike, held_alike = self.errors_and_held(0.0)
+        weighed, held_weighed = self.errors_and_held(self.SHARE)
+        assert weighed < 0.9 * alike
+        assert 0.92 < held_alike < 0.98 and 0.92 < held_weighed < 0.98
