@@ -47,8 +47,8 @@ def tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
         frame = frame_of(place.key)
         rows = [
             row
-            for row in list_rows(session, place.dataset_id)
-            if row.match == place.match and frame is not None and row.first <= frame <= row.last
+            for row in list_rows(session, place.dataset_id, [place.match])
+            if frame is not None and row.first <= frame <= row.last
         ]
         if frame is None or not rows:
             return []

@@ -80,7 +80,7 @@ def refresh_findings(
         only: Id of the track whose groups alone are asked about; None: all of the matches.
     """
     groups = match_groups(session, dataset_id, matches)
-    rows = [row for row in list_rows(session, dataset_id) if row.match in groups]
+    rows = list_rows(session, dataset_id, groups.keys())
     if only is not None:
         rows = [row for row in rows if row.id == only]
     mine = {row.id: groups_by_frame(groups[row.match], row.first, row.last) for row in rows}

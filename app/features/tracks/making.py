@@ -212,8 +212,7 @@ def _said(session: Session, dataset: DatasetHead, stretch: Stretch, own: Any | N
     """What was said of the events of a stretch, wherever it was stored."""
     return corrections_text(
         item
-        for row in list_rows(session, dataset.id)
-        if row.match == stretch.match
+        for row in list_rows(session, dataset.id, [stretch.match])
         for item in corrections_of(row)
         if (own is not None and row.id == own.id) or stretch.first <= item.frame <= stretch.last
     )

@@ -64,12 +64,15 @@ def recording_shots(session: Session, dataset_id: int) -> dict[str, list[tuple[i
 
 
 def accepted_run_rows(session: Session, dataset_id: int) -> Sequence[Any]:
-    """The accepted ball runs of a dataset whose video is still the same, with ``name`` and ``video`` (sha256) of
-    their recordings."""
+    """The accepted ball runs of a dataset whose video is still the same, without their frames, with ``name`` and
+    ``video`` (sha256) of their recordings."""
     run, recording = BallRunModel, RecordingModel
+    names = "id", "dataset_id", "recording_id", "first", "last", "revision"
     statement = (
         select(
-            *run.__table__.columns, recording.name.label("name"), recording.sha256.label("video")
+            *(getattr(run, name) for name in names),
+            recording.name.label("name"),
+            recording.sha256.label("video"),
         )
         .join(recording, recording.id == run.recording_id)
         .where(
@@ -95,12 +98,15 @@ def _heads() -> Select[Any]:
     )
 
 
-def list_rows(session: Session, dataset_id: int) -> Sequence[Any]:
-    """The tracks of a dataset by match and frame, without what is large."""
+def list_rows(
+    session: Session, dataset_id: int, matches: Collection[str] | None = None
+) -> Sequence[Any]:
+    """The tracks of a dataset, or of some of its matches, by match and frame, without what is large."""
     order = TrackModel.match, TrackModel.first, TrackModel.id
-    return session.execute(
-        _heads().where(TrackModel.dataset_id == dataset_id).order_by(*order)
-    ).all()
+    statement = _heads().where(TrackModel.dataset_id == dataset_id).order_by(*order)
+    if matches is not None:
+        statement = statement.where(TrackModel.match.in_(list(matches)))
+    return session.execute(statement).all()
 
 
 def find_row(session: Session, track_id: int) -> Any | None:

@@ -16,6 +16,7 @@ import numpy as np
 from app.config import Settings
 from app.db.session import Session
 from app.errors import ConflictError
+from app.features.recordings.ball_run_queries import find_run
 from app.features.recordings.ball_run_values import run_of_row
 from app.features.recordings.camera_queries import list_cameras_rows, views_of_video
 from app.features.recordings.cameras import read_cameras
@@ -41,7 +42,7 @@ class FollowedRun:
     Attributes:
         first, last: Live frames of the shot that it shows, or shows again.
         state: What it depends on: the run, its link, and the cameras over time.
-        row: Of the table of runs, with ``video``, the sha256 of its recording.
+        row: Of the table of runs without its frames, with ``name`` and ``video`` (sha256) of its recording.
         link: Through which it shows the live shot; None: it is of that shot itself.
         link_row: Of that link.
         cameras: Digests of the cameras over time of its recording, with first and last frame.
@@ -139,7 +140,8 @@ def followed_observations(
                 shown = views_of_video(session, int(run.row.dataset_id), video)
                 grouped[video] = {view.number for view in shown}
             with suppress(ConflictError):
-                for number, one in _observations(settings, run, grouped[video], policy):
+                balls = run_of_row(find_run(session, run.row.id), video).trusted
+                for number, one in _observations(settings, run, balls, grouped[video], policy):
                     if (one.view, number) not in seen:
                         seen.add((one.view, number))
                         found.setdefault(match, []).append(one)
@@ -152,15 +154,18 @@ def _cameras(session: Session, recording_id: int) -> list[tuple[str, int, int]]:
 
 
 def _observations(
-    settings: Settings, run: FollowedRun, grouped: set[int], policy: Policy
+    settings: Settings,
+    run: FollowedRun,
+    trusted: Mapping[int, FollowedBall],
+    grouped: set[int],
+    policy: Policy,
 ) -> Iterator[tuple[int, FollowedObservation]]:
     """The balls of a run in frames of its recording that no group has."""
     link, row = run.link, run.row
     numbers = range(run.first, run.last + 1) if link is None else link.replay.frames
-    balls = run_of_row(row, row.video).trusted
     balls = {
         number: ball
-        for number, ball in balls.items()
+        for number, ball in trusted.items()
         if number in numbers and number not in grouped
     }
     cameras = {
