@@ -10,6 +10,7 @@ import numpy as np
 
 from app.db.json_columns import as_written, parse, unpack
 from app.db.session import Session
+from app.db.store import Store
 from app.features.findings.queries import BallNotice, replace_track_findings
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.queue.refresh_queries import refresh_queue
@@ -66,6 +67,19 @@ def contradicting_balls(ball: BallTrack, inputs: TrackInputs) -> list[Contradict
     return found
 
 
+def refresh_all_findings(store: Store, dataset_id: int, matches: Collection[str]) -> None:
+    """``refresh_findings`` of matches; tracks are read before the write, and again where they changed meanwhile."""
+    saved = False
+    while not saved:
+        with store.read() as session:
+            before = _states(session, dataset_id, matches)
+            found = _read_notices(session, dataset_id, matches, None)
+        with store.write() as session:
+            saved = _states(session, dataset_id, matches) == before
+            if saved:
+                _save_notices(session, dataset_id, found)
+
+
 def refresh_findings(
     session: Session, dataset_id: int, matches: Collection[str], only: int | None = None
 ) -> None:
@@ -79,6 +93,33 @@ def refresh_findings(
         matches: Of the tracks.
         only: Id of the track whose groups alone are asked about; None: all of the matches.
     """
+    _save_notices(session, dataset_id, _read_notices(session, dataset_id, matches, only))
+
+
+@dataclass(frozen=True)
+class _Notices:
+    """What tracks say of groups.
+
+    Attributes:
+        matches: Of the tracks.
+        scope: Ids of the groups that are asked about; None: all of the matches.
+        items: What they say.
+    """
+
+    matches: Collection[str]
+    scope: set[int] | None
+    items: list[BallNotice]
+
+
+def _states(session: Session, dataset_id: int, matches: Collection[str]) -> list[tuple[Any, ...]]:
+    """What the findings of tracks depend on beside groups, of which notices say in which state they hold."""
+    rows = list_rows(session, dataset_id, matches)
+    return [(row.id, row.digest, row.revision, row.verdict) for row in rows]
+
+
+def _read_notices(
+    session: Session, dataset_id: int, matches: Collection[str], only: int | None
+) -> _Notices:
     groups = match_groups(session, dataset_id, matches)
     rows = list_rows(session, dataset_id, groups.keys())
     if only is not None:
@@ -96,7 +137,11 @@ def refresh_findings(
             corrected(inputs, track_from_json(unpack(body.body)), patches), inputs
         )
         found += _notices(session, beside, mine[row.id])
-    changed = replace_track_findings(session, dataset_id, groups.keys(), scope, found)
+    return _Notices(groups.keys(), scope, found)
+
+
+def _save_notices(session: Session, dataset_id: int, found: _Notices) -> None:
+    changed = replace_track_findings(session, dataset_id, found.matches, found.scope, found.items)
     refresh_queue(session, changed)
 
 

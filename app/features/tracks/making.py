@@ -25,7 +25,7 @@ from app.features.tracks.codec import (
     track_from_json,
     track_to_json,
 )
-from app.features.tracks.findings import refresh_findings
+from app.features.tracks.findings import refresh_all_findings
 from app.features.tracks.queries import (
     TrackGroup,
     delete_tracks,
@@ -126,8 +126,7 @@ def make_tracks(
             made.without.append({"stretch": stretch.key, "reason": reason})
         progress(done, total, f"{tracked} of {len(stretches)} stretches tracked.")
     _forget(store, found, stretches, matches)
-    with store.write() as session:
-        refresh_findings(session, found.id, groups.keys())
+    refresh_all_findings(store, found.id, groups.keys())
     return made
 
 
