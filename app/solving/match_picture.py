@@ -119,7 +119,8 @@ class _FittedFrame:
 
     @staticmethod
     def of(frame: PictureFrame, policy: CalibrationPolicy) -> _FittedFrame:
-        problem = ResectionProblem.of(frame.size, policy)
+        # What markings have in common is in FRAME_SIGMA.
+        problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
         observations = observations_of_lines(frame.lines, policy.fitted(frame.pitch), frame.size)
         return _FittedFrame(problem, observations, problem.resect(observations).parameters)
 
@@ -134,8 +135,7 @@ class _FittedFrame:
         unknowns = np.append(self.camera, warp)
         apart, jacobian = search.rows(unknowns)
         scale = self.problem.robust_scale_px * self.problem.unit
-        weights = self.problem.weights(self.observations)
-        weighted = jacobian * (weights / np.sqrt(1 + (apart / scale) ** 2))[:, None]
+        weighted = jacobian / np.sqrt(1 + (apart / scale) ** 2)[:, None]
         gradient, information = weighted.T @ apart, weighted.T @ jacobian
         prior = self.problem.prior()
         gradient[:PARAMETERS] += (self.camera - prior.mean) / prior.sigma**2

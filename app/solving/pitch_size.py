@@ -201,7 +201,8 @@ class _FittedFrame:
 
     @staticmethod
     def of(frame: PitchFrame, pitch: Pitch, policy: CalibrationPolicy) -> _FittedFrame:
-        problem = ResectionProblem.of(frame.size, policy)
+        # What markings have in common is in FRAME_SIGMA_M.
+        problem = ResectionProblem.of(frame.size, replace(policy, weighed="points"))
         observations = observations_of_lines(frame.lines, pitch, frame.size)
         return _FittedFrame(problem, observations, problem.resect(observations))
 
@@ -236,8 +237,7 @@ class _FittedFrame:
         by_width = -by_camera[:, :, Y] * width[:, None]
         rows = np.concatenate([by_camera, np.stack([by_length, by_width], axis=-1)], axis=-1)
         scale = self.problem.robust_scale_px * self.problem.unit
-        weight = self.problem.weights(self.observations)
-        weight = weight / np.sqrt(1 + (offsets**2).sum(axis=1) / scale**2)
+        weight = 1 / np.sqrt(1 + (offsets**2).sum(axis=1) / scale**2)
         weighted = weight[:, None, None] * rows
         gradient = np.einsum("nri,nr->i", weighted, offsets)
         information = np.einsum("nri,nrj->ij", weighted, rows)
