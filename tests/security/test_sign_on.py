@@ -107,7 +107,7 @@ class TestStrangers:
             door.provider.who = {"sub": "s-thief", **claims, "email_verified": verified}
             assert_refused(door.enter(), word="no person here is linked")
             ruled(new_role=Role.VIEWER)
-            assert_refused(door.enter(), word="there is a victim here already")
+            assert_refused(door.enter(), word="there is already a user victim")
             ruled(new_role=None)
 
     def test_somebody_new_gets_the_role_that_the_operator_said(

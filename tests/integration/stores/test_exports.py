@@ -116,7 +116,7 @@ class TestExports:
         for key in ("own.zip", "own/notes.txt"):
             open_store(settings, "frames").put(key, b"somebody's own")
         for name in ("own.zip", "own", ""):
-            with pytest.raises(InputError, match=r"no earlier export|name a folder"):
+            with pytest.raises(InputError, match=r"not an earlier export|name a folder"):
                 export(
                     imported,
                     "league",

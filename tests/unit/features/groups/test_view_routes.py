@@ -70,7 +70,7 @@ class TestNotVisible:
         body = {"lines": lines, "not_visible": ["Circle left"]}
         refused = patch(api, document, "/lines", body)
         assert refused.status_code in (400, 422)
-        assert "names Circle left, which needs null" in refused.text
+        assert "contains Circle left, so Circle left must be null" in refused.text
 
 
 class TestPicture:
