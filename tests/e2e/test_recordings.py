@@ -120,7 +120,7 @@ class TestAdding:
         expect(page.get_by_role("alert")).to_contain_text("a.png is not a video")
         page.goto("/import")
         page.set_input_files("#import-file", film)
-        expect(page.get_by_role("alert")).to_contain_text("Add it on the page Recordings")
+        expect(page.get_by_role("alert")).to_contain_text("Add it on the Recordings page")
 
 
 SLOW = {"downloadThroughput": -1, "uploadThroughput": 4e6, "latency": 0}
@@ -431,7 +431,7 @@ class TestLinking:
         side(page, "Live", 2)
         side(page, "Replay", 65)
         page.keyboard.press("i")
-        expect(times).to_contain_text("it is taken to run as fast as live")
+        expect(times).to_contain_text("assumed to run as fast as live")
         page.get_by_label("Assume that it is").fill("4")
         times.get_by_role("button", name="Assume").click()
         expect(times).to_contain_text("it is taken to run 4.0 times slower than live")
