@@ -46,7 +46,7 @@ static/built/about.json: static/build.mjs static/node_modules/.ready $(MODULES)
 run: setup
 	@$(BIN)/touchline serve --sample
 
-# Two halves side by side, in as many processes as there are cores, and one more for the half that waits
+# Two halves side by side, in as many processes as there are cores, and two more for the half that waits
 # for processes of its own: servers and browsers that are tested are processes too. Files in their order,
 # so that the long ones (integration, security) come first and no process is left with one at the end.
 # Every line says which half speaks.
@@ -72,7 +72,7 @@ test-all: setup chromium postgresql generators readers moto
 	@echo "Every test has passed."
 
 test-python:
-	@$(PYTEST) --numprocesses=$$(( $(PROCESSES) + 1 )) $(QUICK) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
+	@$(PYTEST) --numprocesses=$$(( $(PROCESSES) + 2 )) $(QUICK) --ignore=tests/e2e 2>&1 | sed -u 's/^/python  | /'
 
 test-browser:
 	@{ $(BIN)/npm --prefix static test && $(PYTEST) --numprocesses=$(PROCESSES) $(QUICK) tests/e2e; } 2>&1 | sed -u 's/^/browser | /'

@@ -95,8 +95,12 @@ class PaintProblem:
             pull = pull + self.information @ (self.first - parameters)
         base = marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2
         moved: FloatArray = np.empty(PARAMETERS)
+        # In one layout: the kernel would be compiled for each, which takes ten seconds.
+        whole = (
+            np.ascontiguousarray(one) for one in (seen.offsets, seen.sigmas, base, seen.jacobian)
+        )
         step_to_paint(
-            seen.offsets, seen.sigmas, base, seen.jacobian, information, pull, INNER_STEPS, DAMPING,
+            *whole, information, pull, INNER_STEPS, DAMPING,
             strict, ROBUST_PX * self.unit, STRICT_SIGMAS, STRICT_PX * self.unit, moved,
         )  # fmt: skip
         return moved

@@ -168,5 +168,5 @@ class TestCamera:
         ("lens", "count"), [("brown_conrady", 5), ("fisheye", 12), ("mirror", 12)]
     )
     def test_an_unknown_lens_is_refused(self, lens: str, count: int) -> None:
-        with pytest.raises(CameraError, match="no lens that is known"):
+        with pytest.raises(CameraError, match="is not a known lens"):
             replace(library_camera(MAIN), lens=lens, distortion=(0.0,) * count)

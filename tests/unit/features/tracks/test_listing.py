@@ -27,13 +27,19 @@ from app.features.tracks.service import TrackChange, change_track, list_tracks, 
 from app.features.webhooks.queries import batch_values
 from tests.flights import flight_groups
 from tests.unit.features.tracks.test_service import move
+from tests.unit.stores import Once
 
 NAMES = ("early", "late")
 
 
 @pytest.fixture
-def tracks(store: Store) -> dict[str, int]:
+def tracks(store: Store, once: Once) -> dict[str, int]:
     """Ids of the tracks of two matches; every third group of the second is missing its balls."""
+    made: dict[str, int] = once("tracks of two matches", lambda: _tracks(store))
+    return made
+
+
+def _tracks(store: Store) -> dict[str, int]:
     early = [replace(group, match="early") for group in flight_groups(40)]
     late = [
         replace(group, match="late", key=f"late/{group.key}")
