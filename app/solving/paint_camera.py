@@ -93,15 +93,13 @@ class PaintProblem:
         if self.information is not None:
             information = information + self.information
             pull = pull + self.information @ (self.first - parameters)
-        base = marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2
+        base = np.ascontiguousarray(marking_weights(seen.marking, seen.sigmas) / seen.sigmas**2)
         moved: FloatArray = np.empty(PARAMETERS)
         # In one layout: the kernel would be compiled for each, which takes ten seconds.
-        whole = (
-            np.ascontiguousarray(one) for one in (seen.offsets, seen.sigmas, base, seen.jacobian)
-        )
+        offsets, sigmas = np.ascontiguousarray(seen.offsets), np.ascontiguousarray(seen.sigmas)
         step_to_paint(
-            *whole, information, pull, INNER_STEPS, DAMPING,
-            strict, ROBUST_PX * self.unit, STRICT_SIGMAS, STRICT_PX * self.unit, moved,
+            offsets, sigmas, base, np.ascontiguousarray(seen.jacobian), information, pull, INNER_STEPS,
+            DAMPING, strict, ROBUST_PX * self.unit, STRICT_SIGMAS, STRICT_PX * self.unit, moved,
         )  # fmt: skip
         return moved
 
