@@ -25,7 +25,11 @@ STADIUM_M = 1.5
 """How much the sizes of professional pitches differ."""
 ASPECTS = (4 / 3, 3 / 4, 1.05, 0.95)
 SHIFTS = (-0.25, -0.1, 0.1, 0.25)
-POLICIES = {word: replace(PAPER.calibration, lone_frames=word) for word in ("exact", "any")}
+POLICIES = {
+    "exact": replace(PAPER.calibration, lone_frames="exact"),
+    "any": replace(PAPER.calibration, lone_frames="any"),
+    "any, markings": replace(PAPER.calibration, lone_frames="any", weighed="markings"),
+}
 KINDS = (
     "105 x 68 m",
     "professional pitches",
