@@ -103,11 +103,8 @@ class PaintProblem:
         )  # fmt: skip
         return moved
 
-    def robust(self, rest: FloatArray, sigmas: FloatArray, strict: bool) -> FloatArray:
-        """Weight of each place by how far off it lies, pixels, both shape (N,)."""
-        if not strict:
-            weights: FloatArray = 1 / np.sqrt(1 + (rest / (ROBUST_PX * self.unit)) ** 2)
-            return weights
+    def robust(self, rest: FloatArray, sigmas: FloatArray) -> FloatArray:
+        """Strict weight of each place by how far off it lies, pixels, both shape (N,)."""
         scale = np.maximum(STRICT_SIGMAS * sigmas, STRICT_PX * self.unit)
         return np.asarray((1 + (rest / scale) ** 2) ** -2.0)
 
@@ -129,7 +126,7 @@ class PaintProblem:
             places: Where on the pitch each of it lies, metres, shape (N, 2).
             pitch: The pitch.
         """
-        robust = self.robust(seen.offsets, seen.sigmas, strict=True)
+        robust = self.robust(seen.offsets, seen.sigmas)
         prior = self.prior(parameters).sigma ** -2.0
         terms = pitch_terms(places, seen.marking, seen.jacobian, pitch)
         return paint_noise(seen, robust, prior, self.information, terms)

@@ -329,7 +329,7 @@ class _Frames:
         for at in range(count):
             seen = self.seen(at)
             terms = all_terms(self._grass[at], seen.marking, seen.jacobian, self._plan)
-            robust = self._problem.robust(seen.offsets, seen.sigmas, strict=True)
+            robust = self._problem.robust(seen.offsets, seen.sigmas)
             each = robust * cautious_weights(seen.marking, seen.sigmas) / seen.sigmas**2
             weighted = seen.jacobian * (each / known.noise)[:, None]
             weighted_terms = terms * (each / known.noise)[:, None]

@@ -268,7 +268,7 @@ class _Shot:
         return replace(seen, offsets=shifted_offsets(seen.offsets, seen.jacobian, shift))
 
     def _weights(self, seen: PaintOffsets) -> FloatArray:
-        robust = self._problem.robust(seen.offsets, seen.sigmas, strict=True)
+        robust = self._problem.robust(seen.offsets, seen.sigmas)
         weigh = cautious_weights if self._shifts else marking_weights
         weights: FloatArray = robust * weigh(seen.marking, seen.sigmas) / seen.sigmas**2
         return weights / self._noise
