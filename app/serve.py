@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.terminal.opened import opened_store
 from app.terminal.options import Cluster, acting, read_settings
+from app.terminal.server import opened_store
 from app.terminal.terminal import say, show_progress
 
 if TYPE_CHECKING:

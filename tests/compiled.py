@@ -14,8 +14,7 @@ from app.paint.view_proposal import proposal_of
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.policy import PAPER
-from app.solving.solve import solve
-from app.solving.warm import warm_up
+from app.solving.solve import solve, warm_up
 from app.tracking.ball_solve import track_ball
 from tests.bench.ball_track import frame_times, main
 from tests.bench.link import made_ball

@@ -17,9 +17,9 @@ from sqlalchemy import Connection, event, inspect, select
 from app.config import Settings
 from app.db.dialects.dialect import WRITE, dialect_in, dialect_of
 from app.db.engine import make_engine
+from app.db.idempotency import StoredResponseModel
 from app.db.session import Session
 from app.db.store import Store
-from app.db.stored_responses import StoredResponseModel
 from app.features.tables import Base
 from tests.cluster import ADVICE, Cluster, find_programs, running_cluster
 from tests.on_postgresql import shared_cluster

@@ -197,7 +197,7 @@ def _load() -> None:
     gc.disable()
     for module in pkgutil.walk_packages(app.__path__, "app."):
         importlib.import_module(module.name)
-    from app.solving.warm import warm_up
+    from app.solving.solve import warm_up
 
     warm_up()
     gc.collect()

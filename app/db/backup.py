@@ -25,8 +25,7 @@ from sqlalchemy import inspect, text
 from app.config import Settings
 from app.db.dialects.dialect import dialect_in, dialect_of
 from app.db.engine import make_engine, reported
-from app.db.home import refused
-from app.db.leftovers import is_half_written
+from app.db.home import is_half_written, refused
 from app.db.locks import DatabaseInUse
 from app.db.log import verify_chain
 from app.db.recovery.anchor import Anchor, anchor_of, require_own_database

@@ -7,9 +7,8 @@ from typing import cast
 from sqlalchemy import Index, LargeBinary, Table, delete, func, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.db.base import Base
 from app.db.dialects.statements import insert as insert_or_update
-from app.db.session import Session
+from app.db.session import Base, Session
 
 
 class AttemptModel(Base):

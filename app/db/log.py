@@ -22,10 +22,9 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.canonical import canonical
-from app.db.base import Base
 from app.db.dialects.dialect import dialect_in
 from app.db.json_columns import Json, unpack
-from app.db.session import Session
+from app.db.session import Base, Session
 from app.errors import DamagedError
 
 

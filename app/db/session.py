@@ -8,9 +8,10 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar, cast
 
 from sqlalchemy import Connection, Engine, Executable
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 if TYPE_CHECKING:
-    from app.db.stored_responses import IdempotencyKey
+    from app.db.idempotency import IdempotencyKey
 
 Row = TypeVar("Row")
 
@@ -118,3 +119,29 @@ def now() -> str:
 def text_of(at: datetime) -> str:
     """A time with a zone in UTC, ISO 8601 with microseconds; the texts sort as the times do."""
     return at.astimezone(UTC).isoformat(timespec="microseconds")
+
+
+class Base(DeclarativeBase):
+    """Base of all tables."""
+
+
+class InstallationModel(Base):
+    """Its one row: a random key, and when the installation began."""
+
+    __tablename__ = "installation"
+
+    key: Mapped[str] = mapped_column(primary_key=True)
+    created: Mapped[str]
+
+
+COPIES_USED = "copy_dataset"
+"""Under which name the ids of datasets of copies are remembered, which are counted by themselves."""
+
+
+class UsedIdModel(Base):
+    """The largest id of a table that a deleted dataset had; ids are given once and for all."""
+
+    __tablename__ = "used_id"
+
+    table: Mapped[str] = mapped_column(primary_key=True)
+    id: Mapped[int]

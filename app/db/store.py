@@ -14,7 +14,6 @@ from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.admission import release_admission
 from app.config import Settings
-from app.db.base import InstallationModel
 from app.db.dialects.dialect import AGAIN, WRITE, dialect_of
 from app.db.engine import make_engine, reported
 from app.db.home import make_file
@@ -35,7 +34,7 @@ from app.db.recovery.anchor import (
     sync_anchor,
 )
 from app.db.recovery.preopen_check import OpenedFile, require_sound
-from app.db.session import Session
+from app.db.session import InstallationModel, Session
 from app.errors import EXAMINE, BusyError, DamagedError, StorageError
 
 log = structlog.get_logger("touchline.store")

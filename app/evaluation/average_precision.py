@@ -14,9 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from app.evaluation.bootstrap import Resamples
-from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import JudgedFrame, iou
-from app.evaluation.table import Cell, Column, FrameRange, Row, Table
+from app.evaluation.result import Axis, Cell, Column, Figure, FrameRange, Panel, Row, Series, Table
 from app.geometry.arrays import FloatArray
 from app.plural import plural
 

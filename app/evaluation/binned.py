@@ -9,10 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.evaluation.average_precision import coco_average_precision
-from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import JudgedFrame
-from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Column, FrameRange, Row, Table
+from app.evaluation.result import (
+    Axis,
+    Cell,
+    Column,
+    Figure,
+    FrameRange,
+    FrameResult,
+    Panel,
+    Row,
+    Series,
+    Table,
+)
 from app.plural import plural
 
 

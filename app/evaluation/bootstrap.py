@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from app.evaluation.table import Cell
+from app.evaluation.result import Cell
 from app.geometry.arrays import FloatArray
 
 RESAMPLES = 1000

@@ -8,9 +8,19 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 import numpy as np
 
 from app.evaluation.bootstrap import Resamples
-from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Frame
-from app.evaluation.table import Cell, Column, FrameRange, Row, Table
+from app.evaluation.result import (
+    Axis,
+    Cell,
+    Column,
+    Figure,
+    FrameRange,
+    Mark,
+    Panel,
+    Row,
+    Series,
+    Table,
+)
 from app.geometry.camera import Camera
 from app.plural import plural
 from app.progress import ReportProgress

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Table
+from app.evaluation.result import Cell, FrameResult, Table
 
 FIELDS = ("error_m", "iou", "hit_iou", "predicted_error_m", "predicted_jac")
 """Fields of ``FrameResult`` whose difference is told per frame."""

@@ -10,12 +10,10 @@ from app.evaluation.average_precision import detection_summary, precision_recall
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
-from app.evaluation.figure import Figure
 from app.evaluation.frame import Detection, Frame, JudgedFrame, iou, judge
 from app.evaluation.localization import localization_table, measure_frame, precision_distance
 from app.evaluation.reference_boxes import boxes_figure, boxes_table, comparable
-from app.evaluation.result import Evaluation, FrameResult
-from app.evaluation.table import Table
+from app.evaluation.result import Evaluation, Figure, FrameResult, Table
 from app.geometry.camera import Camera
 from app.progress import ReportProgress, partial_progress
 from app.soccer.frames import Box

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.errors import InputError
-from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
+from app.evaluation.result import Axis, Figure, Mark, Panel, Series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,10 +6,14 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from app.formats.export_names import key_in_group, with_export_key
 from app.formats.fields import id_text
-from app.formats.frame_names import frame_path_by_match, frame_path_in_split
-from app.formats.gamestate import sequence_frame_path
+from app.formats.frame_names import (
+    frame_path_by_match,
+    frame_path_in_split,
+    key_in_group,
+    with_export_key,
+)
+from app.formats.gamestate_reader import sequence_frame_path
 from app.formats.sn_calibration import line_frame_path
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View

@@ -9,10 +9,20 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.evaluation.bootstrap import Resamples
-from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.frame import Detection, Frame, JudgedFrame, iou
-from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Column, FrameRange, Row, Table
+from app.evaluation.result import (
+    Axis,
+    Cell,
+    Column,
+    Figure,
+    FrameRange,
+    FrameResult,
+    Mark,
+    Panel,
+    Row,
+    Series,
+    Table,
+)
 from app.geometry.camera import Camera
 from app.geometry.sphere import position_from_diameter
 from app.plural import plural

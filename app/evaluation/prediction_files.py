@@ -49,9 +49,9 @@ from app.formats.json_text import describe_document, read_json, read_json_lines
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
-from app.soccer.camera_size import size_centred_on_principal_point
 from app.soccer.choices import PredictionFormat
 from app.soccer.frames import Box, ImageSize
+from app.soccer.picture import size_centred_on_principal_point
 
 FORMATS: tuple[str, ...] = get_args(PredictionFormat)
 AUTO = "auto"

@@ -4,18 +4,61 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
 
 from app.errors import InputError
 from app.evaluation.frame import Detection
 from app.evaluation.frame_names import FrameNames, NamedFrame
-from app.evaluation.predicted_track import PredictedTrack
 from app.formats.ball_names import is_ball
-from app.formats.corner_origin import box_from_corner, box_to_corner
 from app.formats.report import Report
-from app.soccer.frames import Box, ImageSize
+from app.geometry.arrays import FloatArray
+from app.soccer.frames import Box, ImageSize, box_from_corner, box_to_corner
+
+
+@dataclass(frozen=True)
+class PredictedTrack:
+    """A ball in 3D over time, as somebody predicted it.
+
+    Attributes:
+        frames: Numbers, None where the file has times alone.
+        times: Seconds, None where the file has numbers alone.
+        position: x, y and z in the pitch frame, metres, z down.
+        sigma: Standard deviations of these, metres, or None.
+        events: Kind, frame and seconds of each; None where no file says any.
+    """
+
+    frames: tuple[int | None, ...]
+    times: tuple[float | None, ...]
+    position: tuple[tuple[float, float, float], ...]
+    sigma: tuple[tuple[float, float, float] | None, ...]
+    events: tuple[tuple[str, int | None, float | None], ...] | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """As it is kept."""
+        return asdict(self)
+
+    @staticmethod
+    def from_json(value: Mapping[str, Any]) -> PredictedTrack:
+        """Back from ``to_json``."""
+        events = value["events"]
+        return PredictedTrack(
+            tuple(value["frames"]),
+            tuple(value["times"]),
+            tuple((x, y, z) for x, y, z in value["position"]),
+            tuple(None if item is None else (item[0], item[1], item[2]) for item in value["sigma"]),
+            None if events is None else tuple((kind, frame, at) for kind, frame, at in events),
+        )
+
+    @property
+    def sigma_array(self) -> FloatArray:
+        """Standard deviations, metres, NaN where there are none, shape (N, 3)."""
+        nothing = (np.nan,) * 3
+        return np.array([item or nothing for item in self.sigma], dtype=float).reshape(-1, 3)
+
 
 MAX_PER_FRAME = 1000
 """Detections of one frame; more is no detector's output but an accident."""

@@ -6,9 +6,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from app.evaluation.bootstrap import Resamples
-from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import Detection, Frame, iou, size_error_percent
-from app.evaluation.table import Column, FrameRange, Row, Table
+from app.evaluation.result import Axis, Column, Figure, FrameRange, Panel, Row, Series, Table
 from app.plural import plural
 from app.soccer.frames import Box
 

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.evaluation.figure import Axis, Figure, Panel, Series
 from app.evaluation.frame import Frame
-from app.evaluation.table import Cell, Column, Row, Table
+from app.evaluation.result import Axis, Cell, Column, Figure, Panel, Row, Series, Table
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import position_from_diameter

@@ -14,8 +14,7 @@ from pathlib import Path, PurePosixPath
 from typing import get_args
 
 from app.errors import DatasetFormatError
-from app.evaluation.predicted_track import PredictedTrack
-from app.evaluation.prediction_run import FieldError, noted, read_field
+from app.evaluation.prediction_run import FieldError, PredictedTrack, noted, read_field
 from app.finite import quoted
 from app.formats import fields
 from app.formats.csv_text import is_missing, read_rows

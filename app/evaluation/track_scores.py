@@ -10,10 +10,19 @@ import numpy as np
 
 from app.errors import InputError
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
-from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
-from app.evaluation.predicted_track import PredictedTrack
-from app.evaluation.result import Evaluation
-from app.evaluation.table import Cell, Column, Row, Table
+from app.evaluation.prediction_run import PredictedTrack
+from app.evaluation.result import (
+    Axis,
+    Cell,
+    Column,
+    Evaluation,
+    Figure,
+    Mark,
+    Panel,
+    Row,
+    Series,
+    Table,
+)
 from app.evaluation.track_files import KINDS
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.plural import plural

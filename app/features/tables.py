@@ -3,14 +3,14 @@
 ``dataset``, ``station``, ``groups`` and ``view`` hold the present state of what was said; the
 ``log`` can rebuild them. ``verdict``, ``dismissal`` and ``log`` only grow, ``solution`` and ``calibration`` are
 inserted and never changed (triggers see to it). ``queue`` is a projection of all of these, one
-row a group. Who needs all tables imports ``Base`` from here: that of ``db.base`` knows those alone
+row a group. Who needs all tables imports ``Base`` from here: that of ``db.session`` knows those alone
 that have been imported.
 """
 
 from __future__ import annotations
 
-from app.db import ephemeral_state, log, stored_responses  # noqa: F401
-from app.db.base import Base as Base
+from app.db import ephemeral_state, idempotency, log  # noqa: F401
+from app.db.session import Base as Base
 from app.features.agreement import tables as agreement  # noqa: F401
 from app.features.batches import tables as batches  # noqa: F401
 from app.features.comments import tables as comments  # noqa: F401

@@ -13,7 +13,6 @@ from app.errors import DatasetFormatError
 from app.formats.camera_arrays import read_camera_arrays, read_opencv_storage
 from app.formats.camera_json import COVARIANCE, camera_from_json, covariance_from_json
 from app.formats.camera_matrix import camera_from_matrices, holds_matrices
-from app.formats.corner_origin import HALF
 from app.formats.fields import stated_size
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.json_text import describe_document, is_camera, read_json, read_json_lines
@@ -23,7 +22,7 @@ from app.formats.sn_calibration import CAMERAS, LINES
 from app.formats.synloc import camera_from_synloc, image_records_by_stem, is_synloc
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
-from app.soccer.frames import ImageSize
+from app.soccer.frames import HALF, ImageSize
 
 _FILE = re.compile(r"(?:camera_)?(.+)\.(?:json|jsonl|ndjson|npz|ya?ml)", re.ASCII | re.IGNORECASE)
 _ENDINGS = ".json, .jsonl, .npz, .yml"

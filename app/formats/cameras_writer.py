@@ -8,9 +8,8 @@ from pathlib import Path, PurePosixPath
 from app.errors import InputError
 from app.finite import json_text
 from app.formats.camera_json import camera_to_json
-from app.formats.export_names import fold_file_name, frame_name_claims
 from app.formats.export_record import ExportRecord
-from app.formats.frame_names import view_file_path
+from app.formats.frame_names import fold_file_name, frame_name_claims, view_file_path
 from app.formats.view_files import PutText, write_to_disk
 from app.geometry.camera import Camera
 from app.soccer.frames import ImageSize

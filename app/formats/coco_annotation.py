@@ -1,7 +1,7 @@
 """Where an annotation of a foreign COCO file puts its object: a box, or one point; and of which image it is.
 
 Their pixels begin at the corner of the first pixel, ours at its centre: boxes and keypoints alike
-are half a pixel less here (``corner_origin``).
+are half a pixel less here (``soccer.frames``).
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from typing import Any
 
 from app.finite import quoted
 from app.formats import fields
-from app.formats.corner_origin import box_from_corner
 from app.formats.fields import IdIndex, id_text
 from app.formats.picture_finder import picture_name_parts
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box
+from app.soccer.frames import Box, box_from_corner
 
 Annotation = tuple[str, Mapping[str, Any]]
 """Its place in the file (``annotations[3]``), and itself."""

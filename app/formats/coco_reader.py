@@ -9,6 +9,16 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
+from app.formats.ball_names import (
+    CAMERA,
+    CORNER,
+    ORIGIN,
+    OUTSIDE,
+    PREFIX,
+    STATE,
+    Categories,
+    Category,
+)
 from app.formats.camera_json import camera_from_json
 from app.formats.coco_annotation import (
     Annotation,
@@ -19,18 +29,7 @@ from app.formats.coco_annotation import (
     is_occluded,
     quote_value,
 )
-from app.formats.coco_categories import (
-    CAMERA,
-    CORNER,
-    ORIGIN,
-    OUTSIDE,
-    PREFIX,
-    STATE,
-    Categories,
-    Category,
-)
 from app.formats.coco_frames import Frame, FrameFile, group_frames, split_of_folders
-from app.formats.corner_origin import box_from_corner
 from app.formats.fields import id_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import UNASSIGNED
@@ -45,14 +44,12 @@ from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.synloc import camera_from_synloc, is_synloc
 from app.formats.trees import opened_tree
-from app.formats.view_groups import PlacedView, ViewGroups
-from app.formats.view_state import StateReader
+from app.formats.view_state import PlacedView, StateReader, ViewGroups
 from app.geometry.camera import Camera
 from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
-from app.soccer.frames import Box
-from app.soccer.group import Group, View
-from app.soccer.media import Media
+from app.soccer.frames import Box, box_from_corner
+from app.soccer.group import Group, Media, View
 
 _OURS = ("manifest.json", "findings.json", "propose.json", "calibrate.json")
 """JSON files that lie in folders of exports and are no labels."""

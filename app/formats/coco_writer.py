@@ -13,13 +13,12 @@ from pathlib import Path
 from typing import IO, Any
 
 from app.finite import json_text
+from app.formats.ball_names import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.formats.camera_json import camera_to_json
-from app.formats.coco_categories import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
-from app.formats.corner_origin import box_to_corner
 from app.formats.export_record import ExportRecord, chosen_box, frame_name
 from app.formats.frame_names import UNASSIGNED
 from app.formats.view_state import head_to_json, view_to_json
-from app.soccer.frames import Box
+from app.soccer.frames import Box, box_to_corner
 from app.soccer.group import View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
 

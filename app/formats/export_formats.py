@@ -10,11 +10,17 @@ from typing import get_args
 from app.errors import InputError
 from app.formats.cameras_writer import camera_name_claims, write_camera_files
 from app.formats.coco_writer import write_coco
-from app.formats.export_names import Claims, ExportNames, Outline, frame_name_claims
 from app.formats.export_record import ExportRecord
-from app.formats.format_names import ExportFormat
-from app.formats.frame_names import FrameName, frame_path_by_match, frame_path_in_split
-from app.formats.gamestate import sequence_frame_path, sequence_name_claims
+from app.formats.frame_names import (
+    Claims,
+    ExportNames,
+    FrameName,
+    Outline,
+    frame_name_claims,
+    frame_path_by_match,
+    frame_path_in_split,
+)
+from app.formats.gamestate_reader import sequence_frame_path, sequence_name_claims
 from app.formats.gamestate_writer import write_gamestate
 from app.formats.issia import FramePersons
 from app.formats.issia_3d_writer import write_issia_3d
@@ -25,9 +31,10 @@ from app.formats.sn_calibration import line_frame_path, line_name_claims
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import labels_frame_path, write_soccernet_v3
 from app.formats.soccernet_v3d_writer import write_soccernet_v3d
-from app.formats.tracking_writer import write_cdf, write_tracab
 from app.formats.tracks_writer import (
     TrackRecord,
+    write_cdf,
+    write_tracab,
     write_track_arrays,
     write_track_tables,
     write_tracks,
@@ -35,6 +42,7 @@ from app.formats.tracks_writer import (
 from app.formats.view_files import PutText
 from app.formats.yolo_writer import write_yolo
 from app.plural import plural
+from app.soccer.choices import ExportFormat
 from app.soccer.group import Group
 
 FORMATS: tuple[str, ...] = get_args(ExportFormat)

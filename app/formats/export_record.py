@@ -6,8 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from app.formats.export_names import with_export_key
-from app.formats.frame_names import expected_frame_suffix, frame_path_by_match
+from app.formats.frame_names import expected_frame_suffix, frame_path_by_match, with_export_key
 from app.geometry.camera import Camera
 from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box

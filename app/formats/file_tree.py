@@ -14,7 +14,7 @@ from app.config import Settings
 from app.errors import DatasetFormatError
 from app.formats.report import Report
 from app.object_store.path import StoredPath
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 if TYPE_CHECKING:
     from app.formats.zip_tree import ZipTree

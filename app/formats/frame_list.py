@@ -16,14 +16,12 @@ from app.config import Settings
 from app.errors import DatasetFormatError, InputError, NotFoundError
 from app.formats.file_tree import DEFAULT_LIMITS, Limits, Root
 from app.formats.json_text import read_json
-from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
-from app.formats.safe_path import require_safe_path
+from app.formats.safe_path import read_regular_file, require_safe_path
 from app.object_store.address import is_address, seal
 from app.object_store.path import StoredPath, find_path, target_path
 from app.plural import plural
-from app.soccer.group import Group, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, View
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 

@@ -17,9 +17,9 @@ from app.errors import InputError
 from app.finite import json_text
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
-from app.formats.export_names import fold_file_name
 from app.formats.export_record import ExportRecord
-from app.formats.gamestate import (
+from app.formats.frame_names import fold_file_name
+from app.formats.gamestate_reader import (
     BALL_ID,
     CAMERA_ID,
     IMAGES,

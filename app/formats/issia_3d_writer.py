@@ -17,7 +17,7 @@ from app.formats.issia import (
     camera_number_of_view,
     frame_number_of_group,
 )
-from app.formats.spill import SortedSpill, open_spill
+from app.formats.view_files import SortedSpill, open_spill
 from app.geometry.camera import Camera
 from app.soccer.group import View
 from app.soccer.solution import BallFit

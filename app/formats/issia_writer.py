@@ -15,7 +15,7 @@ from app.formats.camera_json import camera_to_json
 from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, IssiaNumberOwners
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration_writer import line_file_text
-from app.formats.spill import Key, SortedSpill, open_spill
+from app.formats.view_files import Key, SortedSpill, open_spill
 from app.soccer.annotation import CORNERS
 from app.soccer.group import Group, Station, View
 

@@ -12,16 +12,13 @@ from typing import Any
 
 from app.errors import DatasetFormatError
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, limited_chunks
-from app.formats.folder_tree import FolderTree
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.json_text import read_json
-from app.formats.parquet import import_pyarrow
+from app.formats.parquet_writer import import_pyarrow
 from app.formats.report import Report
-from app.formats.trees import opened_tree
-from app.formats.view_groups import PlacedView, ViewGroups
-from app.formats.view_state import StateReader, extras_from_json
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.formats.trees import FolderTree, opened_tree
+from app.formats.view_state import PlacedView, StateReader, ViewGroups, extras_from_json
+from app.soccer.group import Group, Media
 
 NEEDED = ("group", "view", "width", "height", "lines", "balls", "given", "extras", "station")
 OPTIONAL = (

@@ -8,17 +8,30 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from app.errors import InputError
 from app.finite import finite
 from app.finite import json_text as finite_text
 from app.formats.camera_json import covariance_to_json
 from app.formats.export_record import ExportRecord, chosen_box, frame_name
 from app.formats.manifest import software_version
-from app.formats.parquet import import_pyarrow
 from app.formats.view_state import view_to_json
 from app.geometry.camera import Camera
 from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.solution import Ball3D, BallFit, BestBall, Solution, ViewSolution
+
+
+def import_pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow
+        import pyarrow.parquet as parquet
+    except ImportError:
+        raise InputError(
+            "Parquet needs the package pyarrow, which is not installed",
+            hint="Install Touchline with its extra: pip install 'touchline[export]'.",
+        ) from None
+    return pyarrow, parquet
+
 
 TABLE = "views.parquet"
 ROWS = 1024

@@ -1,14 +1,16 @@
-"""Paths that stay where they belong, whoever wrote them."""
+"""Paths that stay where they belong, whoever wrote them, and files opened only where they are files."""
 
 from __future__ import annotations
 
 import os
 import re
+import stat
 import unicodedata
 from pathlib import Path
+from typing import IO
 from urllib.parse import unquote
 
-from app.errors import UnsafePathError
+from app.errors import DatasetFormatError, UnsafePathError
 from app.finite import quoted
 
 _DRIVE = re.compile(r"[A-Za-z]:")
@@ -82,3 +84,46 @@ def _path_problem(path: str) -> str | None:
 def is_hidden(name: str) -> bool:
     """Whether a file or folder of that name is none that people mean."""
     return (name.startswith(".") and name not in (".", "..")) or name == "__MACOSX"
+
+
+MAX_BYTES = 256 * 1024 * 1024
+"""Longest file that is read whole."""
+
+
+def open_regular_file(path: Path, shown: str = "") -> IO[bytes]:
+    """A file open for reading.
+
+    Args:
+        path: The file.
+        shown: Its name as a person knows it; empty: the path.
+
+    Raises:
+        DatasetFormatError: It is a pipe, a device, a socket or a folder.
+        OSError: It cannot be opened.
+    """
+    file = open(path, "rb", opener=_open_without_blocking)  # noqa: SIM115 - who asked closes it
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
+    raise DatasetFormatError(shown or str(path), None, None, "is not a plain file")
+
+
+def _open_without_blocking(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def read_regular_file(path: Path, limit: int = MAX_BYTES) -> bytes:
+    """The whole content of a file that somebody named.
+
+    Raises:
+        DatasetFormatError: It cannot be read, is no plain file, or is longer than the limit.
+    """
+    try:
+        with open_regular_file(path) as file:
+            content = file.read(limit + 1)
+    except OSError as error:
+        problem = f"cannot be read ({error.strerror})"
+        raise DatasetFormatError(str(path), None, None, problem) from error
+    if len(content) > limit:
+        raise DatasetFormatError(str(path), None, None, f"is longer than {limit:,} bytes")
+    return content

@@ -13,13 +13,16 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
-from app.formats.export_names import frame_name_claims
-from app.formats.frame_names import UNASSIGNED, frame_path_by_match, view_file_path
+from app.formats.frame_names import (
+    UNASSIGNED,
+    frame_name_claims,
+    frame_path_by_match,
+    view_file_path,
+)
 from app.formats.soccernet_v3 import SPLITS
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, View
 
 DEFAULT_SIZE = ImageSize(960, 540)
 LINES, CAMERAS = "lines", "cameras"

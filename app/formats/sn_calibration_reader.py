@@ -11,7 +11,6 @@ from typing import Any
 
 from app.errors import DatasetFormatError, UnknownMarkingError
 from app.formats import fields
-from app.formats.corner_origin import HALF
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.line_documents import LineDocument, read_line_documents
@@ -28,9 +27,8 @@ from app.formats.soccernet_v3 import SPLITS
 from app.formats.trees import opened_tree
 from app.plural import plural
 from app.soccer.annotation import Extras, Lines, make_lines
-from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.frames import HALF, ImagePoint, ImageSize
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import WITHOUT_GEOMETRY, find_marking_like
 
 _OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")

@@ -10,10 +10,9 @@ from app.errors import InputError
 from app.finite import json_text
 from app.formats import fields
 from app.formats.cameras_writer import camera_file_name, camera_file_text, camera_owner
-from app.formats.export_names import fold_file_name
 from app.formats.export_record import ExportRecord
 from app.formats.fields import exact_inverse
-from app.formats.frame_names import view_file_path
+from app.formats.frame_names import fold_file_name, view_file_path
 from app.formats.match_info import PLACE, MatchInfoWriter, match_info_of_view
 from app.formats.sn_calibration import (
     CAMERAS,

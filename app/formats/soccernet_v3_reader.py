@@ -10,7 +10,6 @@ from typing import Any
 from app.errors import DatasetFormatError, UnsafePathError
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.formats.json_text import read_json
-from app.formats.match_frames import MatchFrames
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_record import GAME, IMAGE, REST, ImageRecord, record_from_json
@@ -20,6 +19,7 @@ from app.formats.soccernet_v3 import (
     LABELS,
     MATCH_DEPTH,
     SPLITS,
+    MatchFrames,
     group_label,
 )
 from app.formats.trees import opened_tree

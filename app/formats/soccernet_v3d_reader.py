@@ -14,12 +14,11 @@ from app.formats.camera_json import camera_from_json
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.formats.json_text import parse_literal
-from app.formats.match_frames import MatchFrames
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_record import GAME, IMAGE
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
-from app.formats.soccernet_v3 import SPLIT_FILES, TABLE, group_label
+from app.formats.soccernet_v3 import SPLIT_FILES, TABLE, MatchFrames, group_label
 from app.formats.soccernet_v3_reader import MatchReader
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera

@@ -6,22 +6,23 @@ gives the same group.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from app.errors import DatasetFormatError, InputError, UnknownMarkingError, UnsafePathError
 from app.formats import fields
 from app.formats.camera_json import camera_from_json, camera_to_json
+from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.soccernet_record import BALLS, GAME, IMAGE, RECORD, REST
 from app.geometry.camera import camera_covariance
+from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
-from app.soccer.group import CALIBRATIONS, Group, Station, View
+from app.soccer.group import CALIBRATIONS, Group, LeftOut, Station, View, make_left_out
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
-from app.soccer.reasons import LeftOut, make_left_out
 
 MAX_TEXT = 1000
 """Longest key or label, characters."""
@@ -336,3 +337,64 @@ def _read_metadata(value: Any) -> dict[str, Any]:
 
 def _objects_of_list(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
+
+
+@dataclass(frozen=True)
+class PlacedView:
+    """A view, its place in its group, and its group's head."""
+
+    head: GroupHead
+    position: int
+    view: View
+
+
+class ViewGroups:
+    """Puts together views whose group has one key.
+
+    A group is ready when it has as many views as it says; views of static cameras may lie in
+    several files. Stations of one key become one, so that a thousand groups share it.
+    """
+
+    def __init__(self, report: Report):
+        self._report = report
+        self._waiting: dict[str, list[PlacedView]] = {}
+        self._shared: dict[str, Station] = {}
+        self._done: set[str] = set()
+        """Groups that were ready: whatever comes of them afterwards comes twice."""
+
+    def add(self, item: PlacedView, path: str) -> Iterator[Group]:
+        """The group that this view completes, if it does; ``path`` is the file that it comes from."""
+        key = item.head.key
+        waiting = [] if key in self._done else self._waiting.setdefault(key, [])
+        if key in self._done or any(other.view.key == item.view.key for other in waiting):
+            self._report.note(path, key, item.view.key, "comes twice; the first one counts")
+            return
+        waiting.append(item)
+        if len(waiting) == item.head.views:
+            self._done.add(key)
+            yield self._make_group(self._waiting.pop(key))
+
+    def incomplete_groups(self) -> Iterator[Group]:
+        """Groups that have fewer views than they say, as they are, which is said."""
+        lacking = [
+            f"{key} ({len(items)} of {items[0].head.views})"
+            for key, items in self._waiting.items()
+            if items[0].head.views > len(items)
+        ]
+        if lacking:
+            count = plural(len(lacking), "group has", "groups have")
+            shown = ", ".join(lacking[:5]) + (", ..." if len(lacking) > 5 else "")
+            self._report.remark(f"{count} fewer views than when it was written: {shown}")
+        for key in list(self._waiting):
+            yield self._make_group(self._waiting.pop(key))
+
+    def _make_group(self, items: list[PlacedView]) -> Group:
+        self._report.imported += len(items)
+        items.sort(key=lambda item: item.position)
+        return items[0].head.group(tuple(self._with_shared_station(item.view) for item in items))
+
+    def _with_shared_station(self, view: View) -> View:
+        station = view.station
+        if not station.shared:
+            return view
+        return replace(view, station=self._shared.setdefault(station.key, station))

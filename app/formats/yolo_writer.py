@@ -12,13 +12,12 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from app.finite import json_text
-from app.formats.corner_origin import box_to_corner
 from app.formats.csv_text import CsvTable
 from app.formats.export_record import ExportRecord, chosen_box
 from app.formats.frame_names import expected_frame_suffix, frame_path_in_split, split_folder
 from app.formats.view_files import PutText, write_to_disk
 from app.plural import plural
-from app.soccer.frames import Box, ImageSize
+from app.soccer.frames import Box, ImageSize, box_to_corner
 from app.soccer.group import View
 
 LISTS = ("train", "val", "test")

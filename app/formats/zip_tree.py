@@ -14,7 +14,7 @@ from app.formats.file_tree import BROKEN, Limits, Root, read_limited
 from app.formats.report import Report
 from app.formats.safe_path import is_hidden, require_safe_path
 from app.object_store.path import StoredPath
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.zip_file import UNREADABLE, count_truncated, open_nested, open_zip
 
 _RATIO_FLOOR = 1024 * 1024

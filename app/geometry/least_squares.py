@@ -12,7 +12,7 @@ import numpy as np
 
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray
-from app.geometry.damped_solve import solve_damped
+from app.geometry.resection_kernels import solve_damped
 
 NormalEquations = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 """Maps parameters (B, n) to cost (B,), gradient (B, n) and J^T W J (B, n, n)."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from app.geometry.arrays import FloatArray, require_shape
-from app.geometry.polyline_kernels import clip_polyline_into, nearest_places
 
 
 def inside_image(points: FloatArray, width: int, height: int) -> npt.NDArray[np.bool_]:
@@ -62,3 +62,76 @@ def distance_to_polyline(points: FloatArray, polyline: FloatArray) -> tuple[Floa
     apart, nearest = np.empty(len(points)), np.empty((len(points), 2))
     nearest_places(np.ascontiguousarray(points), np.ascontiguousarray(polyline), apart, nearest)
     return apart, nearest
+
+
+# Types are checked by hand from here on: numba compiles these functions from their arguments.
+compiled = njit(cache=True, error_model="numpy", nogil=True)
+
+
+@compiled
+def nearest_places(points, polyline, apart, nearest):
+    """Distances, shape (N,), and nearest places, shape (N, 2), written to the last two; M >= 2."""
+    for n in range(len(points)):
+        x, y = points[n, 0], points[n, 1]
+        for m in range(len(polyline) - 1):
+            along_x = polyline[m + 1, 0] - polyline[m, 0]
+            along_y = polyline[m + 1, 1] - polyline[m, 1]
+            squared = max(along_x**2 + along_y**2, 1e-300)
+            share = ((x - polyline[m, 0]) * along_x + (y - polyline[m, 1]) * along_y) / squared
+            share = min(max(share, 0.0), 1.0)
+            place_x, place_y = polyline[m, 0] + share * along_x, polyline[m, 1] + share * along_y
+            distance = np.hypot(x - place_x, y - place_y)
+            if m == 0 or distance < apart[n]:
+                apart[n], nearest[n, 0], nearest[n, 1] = distance, place_x, place_y
+
+
+@compiled
+def clip_polyline_into(points, width, height, room):
+    """How many points of the clipped polyline were written to ``room``, shape (2 N, 2).
+
+    ``points`` of shape (N, 2), pixels; those that are NaN are left out, and their neighbours are
+    joined. Crossings of the border are added.
+    """
+    count, before, was_inside = 0, -1, False
+    for n in range(len(points)):
+        if np.isnan(points[n, 0]):
+            continue
+        inside = is_inside(points[n, 0], points[n, 1], width, height)
+        if before >= 0 and inside != was_inside:
+            within, outside = (points[n], points[before]) if inside else (points[before], points[n])
+            count += cross_border(within, outside, width, height, room[count])
+        if inside:
+            room[count] = points[n]
+            count += 1
+        before, was_inside = n, inside
+    return count
+
+
+@compiled
+def is_inside(x, y, width, height):
+    """Whether a pixel lies in the image."""
+    return x >= 0 and x < width and y >= 0 and y < height
+
+
+@compiled
+def cross_border(within, outside, width, height, place):
+    """1 and the crossing of the border next to ``within`` in ``place``; 0 where there is none."""
+    least, found = np.inf, 0
+    step_x, step_y = outside[0] - within[0], outside[1] - within[1]
+    for border in range(4):
+        limit = 0.0
+        if border < 2:
+            if step_x == 0:
+                continue
+            limit = 0.0 if border == 0 else width - 1.0
+            x, y = limit, within[1] + (limit - within[0]) / step_x * step_y
+        else:
+            if step_y == 0:
+                continue
+            limit = 0.0 if border == 2 else height - 1.0
+            x, y = within[0] + (limit - within[1]) / step_y * step_x, limit
+        squared = (x - within[0]) ** 2 + (y - within[1]) ** 2
+        if is_inside(x, y, width, height) and (found == 0 or squared < least):
+            least, found = squared, 1
+            place[0], place[1] = x, y
+    return found

@@ -23,13 +23,13 @@ import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.curve_fit import minimize_curve_costs
 from app.geometry.curve_residuals import (
     accumulate_equations,
     derivative_rows_of_points,
     residual_rows,
 )
 from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, STUCK, Fit
+from app.geometry.resection_kernels import minimize_curve_costs
 from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
 
 PARAMETERS = 8
@@ -37,7 +37,7 @@ PAN, TILT, ROLL, X, Y, Z, LOG_FOCAL, KAPPA = range(PARAMETERS)
 
 SEGMENT, ARC = 0, 1
 NAMES = (CONVERGED, OUT_OF_STEPS, STUCK)
-"""Why a start stopped, by the number that ``curve_fit`` has for it."""
+"""Why a start stopped, by the number that ``resection_kernels`` has for it."""
 
 IntArray = npt.NDArray[np.int64]
 

@@ -22,9 +22,16 @@ from starlette.responses import Response
 from starlette.types import Message
 
 from app.canonical import canonical
-from app.db.idempotency import KeyedRequest, claim, end_claim, find_stored, store_sent
+from app.db.idempotency import (
+    IdempotencyKey,
+    KeyedRequest,
+    StoredResponse,
+    claim,
+    end_claim,
+    find_stored,
+    store_sent,
+)
 from app.db.store import Store
-from app.db.stored_responses import IdempotencyKey, StoredResponse
 from app.errors import BusyError, OverloadedError, StorageError
 from app.http.deps import ACTOR_HEADER
 from app.http.problem import make_problem, problem_response

@@ -10,8 +10,7 @@ from typing import Annotated, Any, Concatenate, ParamSpec, TypeVar
 from fastapi import Depends, Request
 from starlette.responses import Response
 
-from app.db.idempotency import KeyedRequest, PendingResponse
-from app.db.stored_responses import StoredResponse
+from app.db.idempotency import KeyedRequest, PendingResponse, StoredResponse
 from app.http.documents import json_of
 
 P = ParamSpec("P")

@@ -15,7 +15,7 @@ from fastapi import FastAPI
 
 from app.errors import InputError
 from app.http.connections import Connection
-from app.solving.warm import warm_up
+from app.solving.solve import warm_up
 
 WAITING = 256
 """Connections that may wait to be accepted."""

@@ -43,7 +43,7 @@ from app.features.what_if.statistics import StatisticsStore
 from app.http.events import Events
 from app.media.frames import Frames
 from app.soccer.actors import LOCAL_USER
-from app.solving.warm import warm_up
+from app.solving.solve import warm_up
 
 log = structlog.get_logger("touchline.api")
 

@@ -24,7 +24,7 @@ from app.media.object_frames import Archives, is_stored, read_object
 from app.media.video import Times, frame_at, kept_index, make_index, open_video
 from app.object_store.address import unseal
 from app.plural import plural
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."

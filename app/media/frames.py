@@ -43,7 +43,7 @@ from app.media.neighbours import neighbours
 from app.media.object_frames import fetch_frame, is_kept, is_stored
 from app.media.video import Times, remember_index, remembered_index
 from app.progress import ReportProgress
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.worker_pool import Explain, PoolTask, WorkerPool
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
 

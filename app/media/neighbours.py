@@ -10,7 +10,7 @@ from app.config import Settings
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.media.files import has_member, video_times
 from app.media.object_frames import is_stored
-from app.soccer.media import FARTHEST, Media, split_frame_number
+from app.soccer.group import FARTHEST, Media, split_frame_number
 
 
 def neighbours(media: Media, group: str, static: bool, settings: Settings) -> dict[int, Media]:

@@ -23,7 +23,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.object_store.address import is_address, split_address, unseal
 from app.object_store.path import StoredPath
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.zip_file import nested_name, open_nested, open_zip
 
 MAX_OPEN = 16

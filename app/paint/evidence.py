@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
-from app.paint.grass_colour import grass_colour
+from app.paint.grass import grass_colour
 from app.paint.profile_kernels import BEYOND_PX, SIDE_PX, drop_strays, find_stripes
 from app.paint.tracing import TracedPlaces, trace_places
 from app.soccer.frames import Box

@@ -1,8 +1,4 @@
-"""Frame pitch: the size of the pitch that proposed cameras of one film show together.
-
-A camera is sought on 105 x 68 m. On another pitch single markings lie beside their paint, and the
-frames of one main camera say together where the paint has them (``solving.pitch_size``).
-"""
+"""Frame pitch: the size of the pitch that frames of one film, or of one tripod, show together."""
 
 from __future__ import annotations
 
@@ -11,13 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.errors import GeometryError
+from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.geometry.resection import CurvePoints, parameters_from_camera
 from app.paint.evidence import Image, read_picture, seek, to_paint_evidence, trace
 from app.paint.grass import field_of_play
+from app.paint.snap import SnappedCamera
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.pitch_size import PitchFrame, estimate_pitch
+from app.solving.tripod_pitch import PaintedFrame, TripodPitch, about_plan, find_tripod_pitch
 
 WINDOW_PX = 20.0
 """At 960 wide, to either side that paint is sought: markings of another pitch lie far off."""
@@ -75,3 +75,38 @@ def pitch_of(frames: Sequence[PitchFrame], pitch: Pitch) -> Pitch | None:
 
 def _is_near(camera: Camera, other: Camera | None) -> bool:
     return other is not None and bool(np.linalg.norm(camera.position - other.position) < NEAR_M)
+
+
+def painted_frame(snapped: SnappedCamera) -> PaintedFrame:
+    """A camera on its paint, as frames are solved together."""
+    evidence, camera = snapped.evidence, snapped.camera
+    traced = evidence.traced
+    pixels = camera.project(traced.places) + evidence.offsets[:, None] * traced.normals
+    pixels = np.ascontiguousarray(pixels - camera.principal_point)
+    half = float(np.hypot(*snapped.size)) / 2
+    sightings = CurvePoints(pixels, traced.marking, np.ones(len(pixels)))
+    return PaintedFrame(parameters_from_camera(camera, half), sightings, evidence.sigmas)
+
+
+def share_tripod(
+    frames: Sequence[SnappedCamera], pitch: Pitch, policy: CalibrationPolicy
+) -> tuple[TripodPitch, list[FloatArray]] | None:
+    """The pitch that frames of one camera on a tripod show, and what each camera is known to with it.
+
+    Args:
+        frames: On their paint, of pictures of one size, in their order.
+        pitch: On which the cameras lie.
+        policy: Prior of the distortion.
+
+    Returns:
+        The pitch, and of each camera the second moment about it, shape (8, 8); None where the frames are
+        too few, leave it open, or stand on no tripod.
+    """
+    if len({frame.size for frame in frames}) != 1:
+        return None
+    height, width = frames[0].size
+    painted = [painted_frame(frame) for frame in frames]
+    shown = find_tripod_pitch(painted, ImageSize(width, height), pitch, policy)
+    if shown is None:
+        return None
+    return shown, [about_plan(frame.parameters, *shown.camera(frame)) for frame in painted]

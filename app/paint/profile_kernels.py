@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from app.paint.grass_colour import is_grass
+from app.paint.grass import is_grass
 
 compiled = njit(cache=True, nogil=True, error_model="numpy")
 

@@ -40,19 +40,18 @@ from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
 from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
 from app.paint.goal import goal_height
 from app.paint.grass import field_of_play, why_no_field
-from app.paint.ridges import Strength, line_strength
-from app.paint.scoring import ScoredPicture
+from app.paint.ridges import Strength, line_strength, straight_pieces
 from app.paint.search import (
     KAPPA_MEAN,
     SCOUTED,
     SEARCHED,
+    ScoredPicture,
     VisiblePaint,
     search,
     shown_by,
     shows_the_same,
 )
 from app.paint.snap import SnappedCamera, snap_reading
-from app.paint.straight import straight_pieces
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch

@@ -1,19 +1,14 @@
-"""Ridges: what looks like a painted line, in the whole picture, without any camera.
-
-A line is a ridge of brightness: strongly bent across, hardly along (the eigenvalues of the
-Hessian), with grass to both sides, long and thin.
-
-Source: Steger, "An unbiased detector of curvilinear structures".
-"""
+"""Ridges: what looks like a painted line in the whole picture, without any camera, and its long straight pieces."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
-from app.geometry.arrays import BoolArray
-from app.paint.ridge_kernels import ridge_strength, thin_ridges
+from app.geometry.arrays import BoolArray, FloatArray
+from app.paint.grass import is_grass
 
 Image = npt.NDArray[np.uint8]
 Strength = npt.NDArray[np.float32]
@@ -108,3 +103,186 @@ def _percentile(strength: npt.NDArray[np.float32], inside: npt.NDArray[np.uint8]
     """Of the strength on the field, from every third pixel."""
     values = strength[::3, ::3][inside[::3, ::3] > 0]
     return float(np.percentile(values, STRONGEST_PERCENT)) if len(values) else np.inf
+
+
+NEAR_PX = 2.5
+"""Paint that lies so near a piece belongs to it, at 960 wide."""
+SHORTEST_PX = 45.0
+GAP_PX = 25
+LEAST_PIXELS = 3
+"""Fewer points have no direction."""
+
+
+def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
+    """The pieces with the most paint, longest first: their ends in pixels, shape (L, 4)."""
+    unit = line_like.shape[1] / 960
+    rest = line_like.astype(np.uint8)
+    found = cv2.HoughLinesP(
+        rest, 1, np.pi / 360, int(30 * unit), None, SHORTEST_PX * unit, GAP_PX * unit
+    )
+    if found is None:
+        return np.empty((0, 4))
+    rows, columns = np.nonzero(rest)
+    paint = np.column_stack([columns, rows]).astype(np.float64)
+    free = np.ones(len(paint), dtype=bool)
+    ends = found.reshape(-1, 4).astype(np.float64)
+    pieces: list[FloatArray] = []
+    for _ in range(most):
+        support = np.array([np.count_nonzero(free & _along(paint, end, unit)) for end in ends])
+        best = int(np.argmax(support))
+        if support[best] < LEAST_PIXELS or support[best] < 0.6 * SHORTEST_PX * unit:
+            break
+        taken = free & _along(paint, ends[best], unit)
+        for _ in range(2):
+            taken = free & _grown(paint, _fitted(paint[taken]), unit)
+            if np.count_nonzero(taken) < LEAST_PIXELS:
+                break
+        if np.count_nonzero(taken) < LEAST_PIXELS:
+            break
+        pieces.append(_fitted(paint[taken]))
+        free &= ~taken
+        ends = ends[support >= 0.4 * SHORTEST_PX * unit]
+        if len(ends) == 0:
+            break
+    return np.array(pieces).reshape(-1, 4)
+
+
+def _along_and_off(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Where paint lies along a piece from its start, and how far from it, shapes (N,); its length."""
+    start, stop = end[:2], end[2:]
+    length = float(np.hypot(*(stop - start)))
+    direction = (stop - start) / length
+    offset = paint - start
+    across = np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0])
+    return offset @ direction, across, length
+
+
+def _along(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
+    """The paint beside a piece, between its ends."""
+    along, across, length = _along_and_off(paint, end)
+    near: npt.NDArray[np.bool_] = (across < NEAR_PX * unit) & (along > -2) & (along < length + 2)
+    return near
+
+
+def _grown(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
+    """The paint along a piece and, on both sides, as far as it goes on without a long gap."""
+    along, across, length = _along_and_off(paint, end)
+    near = across < NEAR_PX * unit
+    places = np.sort(along[near])
+    gaps = np.flatnonzero(np.diff(places) > GAP_PX * unit)
+    before = gaps[places[gaps] < 0]
+    after = gaps[places[gaps + 1] > length]
+    low = places[before[-1] + 1] if len(before) else -np.inf
+    high = places[after[0]] if len(after) else np.inf
+    grown: npt.NDArray[np.bool_] = near & (along >= low) & (along <= high)
+    return grown
+
+
+def _fitted(points: FloatArray) -> FloatArray:
+    """Ends of the line through points, by its principal axis, shape (4,)."""
+    middle = points.mean(axis=0)
+    _, vectors = np.linalg.eigh(np.cov((points - middle).T))
+    along = (points - middle) @ vectors[:, 1]
+    return np.concatenate(
+        [middle + along.min() * vectors[:, 1], middle + along.max() * vectors[:, 1]]
+    )
+
+
+compiled = njit(cache=True, nogil=True, error_model="numpy")
+
+FLAT = 0.6
+"""Largest share that the bend along a ridge may have in the bend across it."""
+STEPS = ((0, 1), (1, 1), (1, 0), (1, -1))
+"""Row and column to the neighbour across a ridge: across the columns, diagonal, ..."""
+
+
+@compiled
+def ridge_strength(level, image, inside, side, least, strength, across):
+    """Strength of the bright ridge at each pixel, and the direction across it.
+
+    Args:
+        level: Smoothed brightness, float32, shape (H, W).
+        image: Red green blue, shape (H, W, 3).
+        inside: 1 on the field of play, shape (H, W).
+        side: Where grass is looked for to both sides, pixels.
+        least: Strength from which on a ridge is looked at.
+        strength: Result: the bend across, grey levels per square pixel; 0 where there is no ridge.
+        across: Result: index into ``STEPS``.
+    """
+    height, width = level.shape
+    strength[:] = 0.0
+    across[:] = 0
+    # A bend across of b is with one along of FLAT b at most, either way.
+    bent, folded, flattest = FLAT / (1.0 + FLAT) ** 2, -FLAT / (1.0 - FLAT) ** 2, FLAT - 1.0
+    bends = np.empty(width)
+    for y in range(1, height - 1):
+        # Nothing branches here, so that several pixels are worked out at once.
+        for x in range(1, width - 1):
+            here = 2.0 * level[y, x]
+            xx = level[y, x + 1] + level[y, x - 1] - here
+            bends[x] = xx + (level[y + 1, x] + level[y - 1, x] - here)
+        for x in range(1, width - 1):
+            both = bends[x]
+            if both > flattest * least or inside[y, x] == 0:
+                continue
+            here = 2.0 * level[y, x]
+            xx = level[y, x + 1] + level[y, x - 1] - here
+            yy = level[y + 1, x] + level[y - 1, x] - here
+            xy = 0.25 * (
+                level[y + 1, x + 1]
+                + level[y - 1, x - 1]
+                - level[y + 1, x - 1]
+                - level[y - 1, x + 1]
+            )
+            product, square = xx * yy - xy * xy, both * both
+            if (product > bent * square) | (product < folded * square):
+                continue
+            half = 0.5 * (xx - yy)
+            root = np.sqrt(half * half + xy * xy)
+            bend = root - 0.5 * both
+            if bend < least:
+                continue
+            # Eigenvector of the lower eigenvalue, from the better conditioned of two forms.
+            if half < 0:
+                vx, vy = half - root, xy
+            else:
+                vx, vy = xy, -half - root
+            length = np.sqrt(vx * vx + vy * vy)
+            if length == 0.0:
+                continue
+            vx, vy = vx / length, vy / length
+            if not (
+                _is_grass_at(image, x + side * vx, y + side * vy)
+                and _is_grass_at(image, x - side * vx, y - side * vy)
+            ):
+                continue
+            strength[y, x] = bend
+            if abs(vy) < 0.4142 * abs(vx):
+                across[y, x] = 0
+            elif abs(vx) < 0.4142 * abs(vy):
+                across[y, x] = 2
+            else:
+                across[y, x] = 1 if vx * vy > 0 else 3
+
+
+@compiled
+def _is_grass_at(image, x, y):
+    column, row = int(x + 0.5), int(y + 0.5)
+    if column < 0 or row < 0 or column >= image.shape[1] or row >= image.shape[0]:
+        return False
+    return is_grass(image[row, column, 0], image[row, column, 1], image[row, column, 2])
+
+
+@compiled
+def thin_ridges(strength, across, strong, thin):
+    """Writes 1 where a strong ridge is strongest across itself, else 0."""
+    height, width = strength.shape
+    thin[:] = 0
+    for y in range(1, height - 1):
+        for x in range(1, width - 1):
+            if strong[y, x] == 0:
+                continue
+            dy, dx = STEPS[across[y, x]]
+            here = strength[y, x]
+            if here > strength[y + dy, x + dx] and here >= strength[y - dy, x - dx]:
+                thin[y, x] = 1

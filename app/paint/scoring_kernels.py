@@ -1,4 +1,4 @@
-"""Compiled kernels of scoring and of the rough refinement; ``scoring`` is the door to this file.
+"""Compiled kernels of scoring and of the rough refinement; ``search`` is the door to this file.
 
 Types are checked by hand here. Pixels are relative to the principal point.
 """

@@ -12,8 +12,8 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.sample.fixture import Colour, Look, Outfit
 from app.sample.instant import TEAM, Instant
-from app.sample.look import Colour, Look, Outfit
 from app.sample.patch import Image, Patch
 from app.sample.pose import INDEX, Pose
 

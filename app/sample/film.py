@@ -17,8 +17,8 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.sample.figures import draw_distant_person, draw_person, people_in_view
+from app.sample.fixture import Look
 from app.sample.instant import HALF_LENGTH, Instant
-from app.sample.look import Look
 from app.sample.patch import Image
 from app.sample.pose import pose_people
 from app.sample.props import draw_ball, draw_goal_posts, draw_net

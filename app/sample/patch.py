@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
-from app.sample.look import Colour
+from app.sample.fixture import Colour
 
 Image = npt.NDArray[np.uint8]
 Paint = tuple[float, float, float, float]

@@ -13,14 +13,13 @@ from pathlib import Path
 import cv2
 
 from app.finite import json_text
-from app.formats.match_frames import ARCHIVE
+from app.formats.soccernet_v3 import ARCHIVE
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.progress import ReportProgress
 from app.sample.faults import FaultPlan
 from app.sample.render import render
-from app.sample.scene import Scene
+from app.sample.scene import TRUTH, Scene, TruthWriter, truth_to_json
 from app.sample.scenes import Stage, make_scene, make_stage
-from app.sample.truth import TRUTH, TruthWriter, truth_to_json
 from app.sample.write import JPEG_QUALITY, ZIP_DATE
 
 SEED = 20_260_808

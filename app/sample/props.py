@@ -5,13 +5,14 @@ from __future__ import annotations
 from functools import lru_cache
 from itertools import pairwise
 
+import cv2
 import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import tight_box
+from app.sample.fixture import Colour, Fixture
 from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, Instant
-from app.sample.look import Colour
 from app.sample.patch import Image, Patch
 from app.soccer.pitch import GOAL_HEIGHT, GOAL_WIDTH
 
@@ -179,3 +180,40 @@ def _is_in_frame(pixels: FloatArray, image: Image) -> bool:
     rows, columns = image.shape[:2]
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     return bool((high > -20).all() and low[0] < columns + 20 and low[1] < rows + 20)
+
+
+LEFT, TOP, HEIGHT = 36, 30, 30
+FONT = cv2.FONT_HERSHEY_DUPLEX
+DARK = (44, 34, 28)
+LIGHT = (240, 240, 240)
+
+
+def draw_scoreboard(image: Image, fixture: Fixture, game_time: str, is_main: bool) -> None:
+    """Teams, score and time on the main camera; a small mark on replays."""
+    if not is_main:
+        _draw_text_cell(image, LEFT, 84, "REPLAY", (36, 36, 190), LIGHT)
+        return
+    look = fixture.look
+    clock = game_time.split(" - ")[-1]
+    home, away = fixture.score
+    x = LEFT
+    x = _draw_text_cell(image, x, 66, clock, LIGHT, DARK)
+    x = _draw_team(image, x, fixture.home, look.home.shirt)
+    x = _draw_text_cell(image, x, 62, f"{home} - {away}", (96, 60, 24), LIGHT)
+    _draw_team(image, x, fixture.away, look.away.shirt)
+
+
+def _draw_team(image: Image, x: int, name: str, colour: Colour) -> int:
+    cv2.rectangle(image, (x, TOP), (x + 5, TOP + HEIGHT), colour, -1)
+    return _draw_text_cell(image, x + 6, 58, name[:3].upper(), DARK, LIGHT)
+
+
+def _draw_text_cell(
+    image: Image, x: int, width: int, text: str,
+    ground: tuple[int, int, int], ink: tuple[int, int, int],
+) -> int:  # fmt: skip
+    cv2.rectangle(image, (x, TOP), (x + width - 1, TOP + HEIGHT), ground, -1)
+    (length, height), _ = cv2.getTextSize(text, FONT, 0.55, 1)
+    origin = (x + (width - length) // 2, TOP + (HEIGHT + height) // 2)
+    cv2.putText(image, text, origin, FONT, 0.55, ink, 1, cv2.LINE_AA)
+    return x + width

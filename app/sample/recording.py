@@ -37,7 +37,7 @@ from app.sample.instant import BALL_DIAMETER, TEAM, shirt_numbers
 from app.sample.order import RECORDING_SECONDS, SEED, SHORTEST_RECORDING
 from app.sample.patch import Image
 from app.sample.play import Play, make_play
-from app.sample.scoreboard import draw_scoreboard
+from app.sample.props import draw_scoreboard
 from app.sample.views import HEIGHT, WIDTH, is_inside_image
 
 FPS, REPLAY_FPS = 25, 50

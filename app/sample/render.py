@@ -14,12 +14,11 @@ from app.formats.soccernet_record import IMAGE
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.figures import DrawnPerson, draw_person, people_in_view
+from app.sample.fixture import Colour, Lamp, Light, Look
 from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
-from app.sample.look import Colour, Lamp, Light, Look
 from app.sample.pose import INDEX, LIMBS, Pose, pose_people
-from app.sample.props import draw_ball, draw_goal_posts, draw_net
+from app.sample.props import draw_ball, draw_goal_posts, draw_net, draw_scoreboard
 from app.sample.scene import Scene
-from app.sample.scoreboard import draw_scoreboard
 from app.sample.surface import (
     BOARD_HEIGHT,
     TILE,

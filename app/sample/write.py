@@ -19,14 +19,14 @@ import cv2
 from app.durable import PARTIAL
 from app.errors import InputError
 from app.finite import json_text
-from app.formats.match_frames import ARCHIVE
+from app.formats.soccernet_v3 import ARCHIVE
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.progress import ReportProgress
 from app.sample.fixture import group_counts, make_fixture
 from app.sample.order import GROUPS, SEED
 from app.sample.render import render
+from app.sample.scene import TRUTH, TruthWriter, truth_to_json
 from app.sample.scenes import make_match
-from app.sample.truth import TRUTH, TruthWriter, truth_to_json
 from app.worker_process import spawned_pool
 
 JPEG_QUALITY = 85

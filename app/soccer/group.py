@@ -1,22 +1,135 @@
-"""Group: the views of one instant, the unit of review and of solving."""
+"""Group: the views of one instant with their frames, the unit of review and of solving."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath, PurePosixPath
 from string import ascii_uppercase
-from typing import get_args
+from typing import Literal, get_args
 
 from app.errors import InputError
 from app.geometry.camera import Camera
+from app.object_store.address import is_address
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import ImageSize
-from app.soccer.media import Media
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
-from app.soccer.reasons import LeftOut
+
+Reason = Literal[
+    "bad_field_lines",
+    "sides_confused",
+    "not_same_instant",
+    "ball_not_visible",
+    "bad_calibration",
+    "duplicate_view",
+    "other",
+]
+"""``other`` needs a note."""
+REASONS: tuple[str, ...] = get_args(Reason)
+MAX_NOTE = 2000
+"""Characters."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Why a person left a view out of its group; ``note`` says it in their own words."""
+
+    reason: str
+    note: str | None = None
+
+
+def make_left_out(reason: str | None, note: str | None) -> LeftOut | None:
+    """What a person says of a view that is left out; None when they say nothing.
+
+    Raises:
+        InputError: The reason is none, or a note is missing, stands alone or is too long.
+    """
+    note = checked_note(note)
+    if reason is None and note is None:
+        return None
+    if reason not in REASONS:
+        known = ", ".join(REASONS)
+        problem = (
+            "a note needs a reason beside it" if reason is None else f'"{reason}" is not a reason'
+        )
+        raise InputError(f"{problem}; reasons are {known}", pointer="/reason")
+    require_explanation(reason, note)
+    return LeftOut(reason, note)
+
+
+def checked_note(note: str | None) -> str | None:
+    """A note without white space around it; None where nothing is left.
+
+    Raises:
+        InputError: It is too long.
+    """
+    note = (note or "").strip() or None
+    if note is not None and len(note) > MAX_NOTE:
+        raise InputError(
+            f"a note has at most {MAX_NOTE:,} characters, and this one has {len(note):,}",
+            pointer="/note",
+        )
+    return note
+
+
+def require_explanation(reason: str | None, note: str | None) -> None:
+    """Raise InputError where a reason says nothing by itself, and no note does."""
+    if reason == "other" and note is None:
+        raise InputError('the reason "other" needs a note', pointer="/note")
+
+
+@dataclass(frozen=True)
+class Media:
+    """Where the frame of a view can be read: a file, or a member of an archive."""
+
+    path: str
+    member: str | None = None
+    frame: int | None = None
+    """Number of the frame when ``path`` is a video."""
+
+
+FARTHEST = 5
+"""Frames before and after that are looked for."""
+CLIP_FOLDER = "img1"
+"""Holds the frames of one clip in their order (SoccerNet game state, MOT)."""
+_NUMBERED = re.compile(r"(.*?)([0-9]{1,12})", re.DOTALL)
+_LAST_NUMBER = re.compile(r"([0-9]+)[^0-9]*")
+
+
+def is_numbered_in_time(media: Media, group: str, static: bool) -> bool:
+    """Whether the name of a frame counts time, so that there may be neighbours.
+
+    Args:
+        media: Where the frame lies; one in an object store has no neighbours, for each of which the
+            store would have to be asked.
+        group: Key of the group, which is the number of its frame for static cameras.
+        static: Whether the camera stands still, so that its files are numbered by frames.
+    """
+    if is_address(media.path):
+        return False
+    return media.frame is not None or split_frame_number(media, group, static) is not None
+
+
+def split_frame_number(media: Media, group: str, static: bool) -> tuple[PurePath, str, str] | None:
+    """Name of a frame, what stands before its number, and the number; None: it counts no time."""
+    name = PurePosixPath(media.member) if media.member is not None else PurePath(media.path)
+    found = _NUMBERED.fullmatch(name.stem)
+    if found is None:
+        return None
+    by_frame = static and _last_number(group) == int(found[2])
+    if not by_frame and name.parent.name != CLIP_FOLDER:
+        return None
+    return name, found[1], found[2]
+
+
+def _last_number(group: str) -> int | None:
+    found = _LAST_NUMBER.search(group.rsplit("/", 1)[-1])
+    return int(found[1]) if found else None
+
 
 CALIBRATIONS: tuple[str, ...] = get_args(CalibrationChoice)
 

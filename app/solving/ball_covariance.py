@@ -13,9 +13,8 @@ from app.soccer.frames import ImageSize
 from app.soccer.picture import camera_aspect
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
-from app.solving.camera_numbers import WHOLE, CameraNumbers
 from app.solving.facts import STEP_PX, Facts
-from app.solving.triangulate import BallObservation
+from app.solving.triangulate import WHOLE, BallObservation, CameraNumbers
 
 CLICK_DIAGONAL = float(np.hypot(1920, 1080))
 """The policy's click sigma holds for 1920 x 1080 and grows with the diagonal."""

@@ -29,6 +29,7 @@ from app.soccer.solution import (
     PaintFit,
     Suspect,
 )
+from app.solving.camera_positions import PositionPrior, position_prior_of_match
 from app.solving.jaccard import (
     as_evaluator_markings,
     jaccard,
@@ -39,7 +40,6 @@ from app.solving.jaccard import (
 )
 from app.solving.labels import find_suspects
 from app.solving.lone_frame import LoneFrame, lone_frame
-from app.solving.main_position import PositionPrior, position_prior_of_match
 from app.solving.observations import Observations, observations_of_lines
 from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture_camera import WIDTH, PictureProblem, estimate_picture, warp_of

@@ -21,8 +21,9 @@ from app.geometry.triangulation import triangulation_shifts
 from app.soccer.group import View
 from app.soccer.picture import camera_aspect
 from app.soccer.solution import Calibration
-from app.solving.camera_numbers import WHOLE, CameraNumbers
 from app.solving.triangulate import (
+    WHOLE,
+    CameraNumbers,
     PairPoint,
     arrays_of_pairs,
     ball_observations,

@@ -10,13 +10,12 @@ from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D, Pair, ViewSolution
-from app.solving.calibration_findings import calibration_findings
+from app.solving.ball_3d import implausible_reasons
+from app.solving.calibration_findings import calibration_findings, paint_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
 from app.solving.gates import odds_text
 from app.solving.numbers import format_degrees, format_metres, format_pixels
-from app.solving.paint_findings import paint_findings
-from app.solving.plausible import implausible_reasons
 from app.solving.sides import SwappedView, find_swaps
 from app.solving.triangulate import BallObservation
 

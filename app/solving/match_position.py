@@ -1,20 +1,16 @@
-"""Match position: where a match's main camera stands, from its other frames.
-
-A main camera turns on its tripod for the whole match, so the frames of one match say together
-what a frame with few markings cannot say alone. Each frame is calibrated by itself first; the
-others' positions then become its prior, for the way that it looks (``match_model``). Neither a
-wrong match nor a single bad frame carries through: Student weights, and ``calibrate`` drops a prior
-that the frame's own lines contradict.
-"""
+"""Match position: where the main camera of a match stands, from its frames, and which frames are of one match."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import dataclass
 from functools import cached_property
+from heapq import heappop, heappush
 
 import numpy as np
 
+from app.geometry.arrays import FloatArray
 from app.geometry.resection import PAN, PARAMETERS, X, Z, parameters_from_camera
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
@@ -22,8 +18,109 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate_near
-from app.solving.main_position import PositionPrior, is_main_position, position_prior_of_match
-from app.solving.match_model import FramePlace, MatchModel, PlaceEquations
+from app.solving.camera_positions import PositionPrior, is_main_position, position_prior_of_match
+
+UNKNOWNS = 6
+"""Place at pan 0, metres, and how much it moves with the pan, metres a radian."""
+MEAN = np.array([0.0, 64.5, -15.5, 1.7, 0.0, 0.0])
+SIGMA = np.array([1.0, 11.0, 4.5, 4.0, 0.7, 0.2])
+"""Of the unknowns over real matches."""
+FREEDOM = 4.0
+"""Degrees of freedom of the places' Student distribution."""
+FARTHEST = 8.0
+"""No place costs more than this: one odd frame does not end a match, three do."""
+_ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class FramePlace:
+    """Where one frame alone puts its camera.
+
+    Attributes:
+        position: Pitch frame, metres, shape (3,).
+        covariance: Shape (3, 3).
+        pan: Radians.
+    """
+
+    position: FloatArray
+    covariance: FloatArray
+    pan: float
+
+
+@dataclass(frozen=True)
+class MatchModel:
+    """The model that explains some places best.
+
+    Attributes:
+        unknowns: Shape (6,).
+        covariance: Shape (6, 6).
+        chi_square: Squared distance of each place from it, in sigmas, three numbers each, (N,).
+        cost: Negative logarithm of its evidence, but for what does not depend on the model.
+    """
+
+    unknowns: FloatArray
+    covariance: FloatArray
+    chi_square: FloatArray
+    cost: float
+
+    def at(self, pan: float) -> tuple[FloatArray, FloatArray]:
+        """Place for a pan (radians) and its variance along each axis, shapes (3,)."""
+        turned = np.hstack([np.eye(3), pan * np.eye(3)])
+        place: FloatArray = turned @ self.unknowns
+        return place, np.diag(turned @ self.covariance @ turned.T).copy()
+
+
+class PlaceEquations:
+    """Normal equations of each of some places, to fit one model to many choices of them."""
+
+    def __init__(self, places: Sequence[FramePlace], wander_m: FloatArray):
+        """``wander_m``: what a place differs from the model by itself, each axis, shape (3,)."""
+        positions = np.array([place.position for place in places]).reshape(-1, 3)
+        covariances = np.array([place.covariance for place in places]).reshape(-1, 3, 3)
+        pans = np.array([place.pan for place in places])
+        inverses = np.linalg.inv(covariances + np.diag(wander_m**2))
+        turned = np.zeros((len(positions), 3, UNKNOWNS))
+        turned[:, :, :3] = np.eye(3)
+        turned[:, :, 3:] = pans[:, None, None] * np.eye(3)
+        # About the prior's mean: the numbers stay small.
+        self._offsets = positions - turned @ MEAN
+        weighted = inverses @ turned
+        self._information = (turned.transpose(0, 2, 1) @ weighted).reshape(-1, UNKNOWNS**2)
+        self._pulls = np.einsum("nai,na->ni", weighted, self._offsets)
+        self._squares = np.einsum("na,nab,nb->n", self._offsets, inverses, self._offsets)
+
+    def __len__(self) -> int:
+        return len(self._squares)
+
+    def fit(self, rows: slice | FloatArray) -> MatchModel:
+        """The model of some of the places, one at least."""
+        information, pulls, squares = (
+            self._information[rows],
+            self._pulls[rows],
+            self._squares[rows],
+        )
+        found = np.zeros(UNKNOWNS)
+        found[:3] = np.median(self._offsets[rows], axis=0)
+        normal = np.diag(SIGMA**-2)
+        for _ in range(_ROUNDS):
+            chi = _chi_square(found, information, pulls, squares)
+            weight = (FREEDOM + 3) / (FREEDOM + chi)
+            normal = (weight @ information).reshape(UNKNOWNS, UNKNOWNS) + np.diag(SIGMA**-2)
+            found = np.linalg.solve(normal, weight @ pulls)
+        chi = _chi_square(found, information, pulls, squares)
+        losses = (FREEDOM + 3) / 2 * np.log1p(chi / FREEDOM)
+        # What a model of its own costs: the share of the prior that the places leave of it.
+        narrowed = np.linalg.slogdet(normal)[1] + 2 * np.log(SIGMA).sum()
+        cost = np.minimum(losses, FARTHEST).sum() + 0.5 * ((found / SIGMA) ** 2).sum()
+        return MatchModel(MEAN + found, np.linalg.inv(normal), chi, float(cost + 0.5 * narrowed))
+
+
+def _chi_square(
+    found: FloatArray, information: FloatArray, pulls: FloatArray, squares: FloatArray
+) -> FloatArray:
+    chi = squares - 2 * (pulls @ found) + information @ np.outer(found, found).ravel()
+    return np.maximum(chi, 0.0)
+
 
 WANDER_M = np.array([0.15, 0.15, 0.1])
 """What a camera's place differs from that of its match by itself, standard deviation of each axis."""
@@ -111,3 +208,76 @@ def share_position(
     pan = parameters_from_camera(alone.camera, size.diagonal / 2)[PAN]
     near = others.prior(float(pan))
     return alone if near is None else calibrate_near(alone, near, lines, pitch, size, policy)
+
+
+WANDER_IN_RUN_M = np.array([0.3, 0.3, 0.18])
+"""What frames of one match are allowed to differ by, each axis, beyond their own sigmas."""
+
+
+def guess_matches(places: Sequence[FramePlace | None]) -> list[int]:
+    """A match for each frame, from 0, where nobody names them: runs whose places agree.
+
+    Args:
+        places: Of all frames by name; None where a frame says nothing, it goes with the one
+            before.
+    """
+    known = [(index, place) for index, place in enumerate(places) if place is not None]
+    runs = _Runs([place for _, place in known])
+    runs.join()
+    run = {known[at][0]: number for number, at in enumerate(runs.firsts)}
+    return _filled(run, len(places))
+
+
+class _Runs:
+    """Runs of places side by side, each known by its first place."""
+
+    def __init__(self, places: Sequence[FramePlace]):
+        self._equations = PlaceEquations(places, WANDER_IN_RUN_M)
+        self._end = {at: at + 1 for at in range(len(places))}
+        self._begin = {at + 1: at for at in range(len(places))}
+        self._cost = {at: self._cost_of(at, at + 1) for at in range(len(places))}
+        self._gains: list[tuple[float, int, int, int, float]] = []
+
+    @property
+    def firsts(self) -> list[int]:
+        """The first place of each run."""
+        return sorted(self._end)
+
+    def join(self) -> None:
+        """Join neighbours until none gains by it."""
+        for first in self.firsts:
+            self._consider(first)
+        while self._gains:
+            _, first, second, end, cost = heappop(self._gains)
+            if self._end.get(first) != second or self._end.get(second) != end:
+                continue
+            del self._end[second]
+            self._end[first], self._begin[end], self._cost[first] = end, first, cost
+            self._consider(first)
+            if first in self._begin:
+                self._consider(self._begin[first])
+
+    def _consider(self, first: int) -> None:
+        """Note what a run and the one behind it gain when they are joined."""
+        second = self._end[first]
+        if second not in self._end:
+            return
+        end = self._end[second]
+        cost = self._cost_of(first, end)
+        gain = self._cost[first] + self._cost[second] - cost
+        if gain > 0:
+            heappush(self._gains, (-gain, first, second, end, cost))
+
+    def _cost_of(self, first: int, end: int) -> float:
+        return self._equations.fit(slice(first, end)).cost
+
+
+def _filled(run: dict[int, int], count: int) -> list[int]:
+    """Runs of all frames from those of first frames; without any, each frame is its own."""
+    if not run:
+        return list(range(count))
+    matches, present = [], 0
+    for index in range(count):
+        present = run.get(index, present)
+        matches.append(present)
+    return matches

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.geometry.point_kernels import keep_farthest_points
 from app.geometry.resection import ARC, SEGMENT, CurvePoints, Curves, IntArray
+from app.geometry.resection_kernels import keep_farthest_points
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Arc, Pitch, Segment

@@ -31,22 +31,23 @@ from app.geometry.resection import (
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import CIRCLES
 from app.soccer.policy import CalibrationPolicy
-from app.solving.line_noise import LineNoise, LinePrior, line_noise
-from app.solving.main_position import (
+from app.solving.camera_positions import (
     MAIN_FREEDOM,
     MAIN_MEAN,
     MAIN_SIGMA,
     STADIUM,
+    STANDS,
     PositionPrior,
     is_main_position,
+    starts_from_stands,
 )
+from app.solving.line_noise import LineNoise, LinePrior, line_noise
 from app.solving.observations import (
     SHARED_SHARE,
     Observations,
     principal_point,
     weights_of_points,
 )
-from app.solving.starts import STANDS, starts_from_stands
 
 REFERENCE_DIAGONAL = float(np.hypot(960, 540))
 """Scales in pixels hold for 960 x 540 and grow with the diagonal."""

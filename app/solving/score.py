@@ -1,17 +1,19 @@
-"""Score: how well cameras fit the annotated lines of many frames."""
+"""Score: how well cameras fit the annotated lines of many frames, and a marking that they were not shown."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from app.geometry.camera import Camera
-from app.soccer.annotation import Lines
+from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT
+from app.solving.calibrate import calibrate
 from app.solving.jaccard import (
     camera_jaccard,
     jaccard,
@@ -19,6 +21,9 @@ from app.solving.jaccard import (
     measure_markings,
     project_markings,
 )
+from app.solving.match_position import NO_PLACES, Places, share_position
+from app.solving.observations import observations_of_lines
+from app.solving.resect import ResectionProblem
 
 SHARE_ABOVE = 0.75
 CHALLENGE_PX = 5.0
@@ -90,3 +95,45 @@ def score_frames(frames: Iterable[FrameScore | None]) -> Score:
         error_median_px=median,
         error_p95_px=p95,
     )
+
+
+def leave_one_out(
+    lines: Lines,
+    pitch: Pitch,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    others: Places = NO_PLACES,
+) -> Iterator[tuple[str, float | None]]:
+    """Each marking with the largest distance of its points from where the others put it.
+
+    Args:
+        lines: Annotated points by marking, pixels of ``size``.
+        pitch: The pitch.
+        size: Annotated size.
+        policy: How the others are calibrated.
+        others: Places of the match's other frames, if its camera's position is shared.
+
+    Yields:
+        Marking and pixels; None where the others do not give a camera.
+    """
+    for marking in lines:
+        yield marking, error_without(lines, marking, pitch, size, policy, others)
+
+
+def error_without(
+    lines: Lines,
+    marking: str,
+    pitch: Pitch,
+    size: ImageSize,
+    policy: CalibrationPolicy,
+    others: Places = NO_PLACES,
+) -> float | None:
+    """Largest distance of a marking's points from where the others put it, pixels."""
+    rest = make_lines({name: points for name, points in lines.items() if name != marking})
+    alone = calibrate(rest, pitch, size, policy)
+    camera = share_position(alone, others, rest, pitch, size, policy).camera
+    if camera is None:
+        return None
+    problem = ResectionProblem.of(size, policy)
+    seen = observations_of_lines(make_lines({marking: lines[marking]}), policy.fitted(pitch), size)
+    return float(problem.distances(problem.parameters(camera), seen).max())

@@ -17,8 +17,8 @@ from app.geometry.camera import Camera
 from app.geometry.sphere import apparent_scale
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.solving.ball_3d import is_plausible_position
 from app.solving.ball_covariance import pixel_covariance
-from app.solving.plausible import is_plausible_position
 from app.solving.triangulate import BallObservation, PairPoint, triangulate_observation_pairs
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])

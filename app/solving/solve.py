@@ -13,8 +13,14 @@ from types import MappingProxyType
 
 import numpy as np
 
+from app.geometry.camera import Camera
+from app.geometry.distortion import COEFFICIENTS
+from app.geometry.likely_point import CameraTable, likely_points
+from app.soccer.annotation import make_lines
+from app.soccer.frames import ImageSize
 from app.soccer.group import Group, View, view_letter
-from app.soccer.policy import Policy
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.solution import (
     GATES,
     SOLVER_VERSION,
@@ -23,16 +29,15 @@ from app.soccer.solution import (
     Solution,
     ViewSolution,
 )
+from app.solving.ball_3d import best_ball, exported_ball, judged_pairs, mean_ball
 from app.solving.ball_box import fit_ball, predict_ball_in_view
 from app.solving.ball_covariance import MeanCovariance
-from app.solving.best_ball import best_ball
-from app.solving.calibrate import calibrate_view, view_key
+from app.solving.calibrate import calibrate, calibrate_view, view_key
 from app.solving.contradiction import chi_square_of, find_contradiction
 from app.solving.facts import Facts, facts_of
 from app.solving.findings import find_group_findings
 from app.solving.gates import JudgedView, describe_gates
 from app.solving.judgement import PASSES, Judgement, judge_groups
-from app.solving.mean_ball import exported_ball, judged_pairs, mean_ball
 from app.solving.triangulate import ball_observations, triangulate_observation_pairs
 
 NO_CALIBRATIONS: Mapping[str, Calibration] = MappingProxyType({})
@@ -172,3 +177,27 @@ def _judged_views(
 def _letters_of_left_out_views(group: Group) -> tuple[str, ...]:
     """Letters of the views that a person left out."""
     return tuple(view_letter(i) for i, view in enumerate(group.views) if not view.included)
+
+
+_SQUARE = {
+    "Big rect. right main": [(300.0, 150.0), (500.0, 400.0)],
+    "Big rect. right top": [(300.0, 150.0), (700.0, 170.0)],
+    "Big rect. right bottom": [(500.0, 400.0), (900.0, 380.0)],
+    "Side line right": [(700.0, 170.0), (900.0, 380.0)],
+    "Circle right": [(350.0, 260.0), (340.0, 280.0), (380.0, 330.0)],
+}
+
+
+def warm_up() -> None:
+    """Calibrate a made-up picture and look for a point once; the first time on a machine this compiles for seconds."""
+    calibrate(make_lines(_SQUARE), Pitch(), ImageSize(960, 540), CalibrationPolicy())
+    lens = np.array([0.01, *np.zeros(COEFFICIENTS - 1)])
+    upright = Camera(np.eye(3), np.zeros(3), (1000.0, 1000.0), (480.0, 270.0), distortion=lens)
+    upright.undistort(np.zeros((1, 2)))
+    likely_points(
+        CameraTable.of([upright]),
+        np.zeros((1, 2)),
+        np.zeros((1, 1), int),
+        np.zeros((1, 3)),
+        np.ones((1, 1, 2, 2)),
+    )

@@ -1,7 +1,7 @@
 """Tripod pitch: what the frames of one camera on a tripod say together of the pitch that they show.
 
 No pitch is quite the plan, and the paint of one frame cannot tell it: its camera gives way
-(``paint_terms``). Frames that one tripod took have a position in common, and length, width, crown, the place of the paint
+(``paint_noise``). Frames that one tripod took have a position in common, and length, width, crown, the place of the paint
 and of each line; all are unknowns with what is known of stadiums as prior, beside the camera of each frame.
 
 A camera that is used with the plan stays on the plan's markings. How far it is from the camera that
@@ -34,18 +34,20 @@ from app.geometry.resection import (
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.solving.camera_positions import MAIN_MEAN, MAIN_SIGMA, is_main_position
 from app.solving.lone_frame import CROWN_SIGMA_M, INWARD_SIGMA_M, PAINT_SIZE_SIGMA_M
-from app.solving.main_position import MAIN_MEAN, MAIN_SIGMA, is_main_position
 from app.solving.many_frames import CERTAIN_SIGMAS
 from app.solving.observations import principal_point
 from app.solving.paint_camera import PaintProblem, offsets_of
-from app.solving.paint_noise import LENS, PaintOffsets, cautious_weights
-from app.solving.paint_terms import (
+from app.solving.paint_noise import (
     CROWN,
     INWARD,
+    LENS,
     SIZES,
     TERMS,
+    PaintOffsets,
     all_terms,
+    cautious_weights,
     painted_shift,
     shifted_offsets,
 )
@@ -128,7 +130,7 @@ class TripodPitch:
 
     @property
     def terms(self) -> FloatArray:
-        """Numbers of the pitch in their standard deviations (``paint_terms``), shape (TERMS,)."""
+        """Numbers of the pitch in their standard deviations (``paint_noise``), shape (TERMS,)."""
         return self.shared[_PITCH]
 
     @property

@@ -1,14 +1,10 @@
-"""The server that a command works against, instead of a home on this machine.
-
-The command line is then a user of the public interface, and uses the library for scripts
-(``touchline.client``) like any other script; no other module of the server does.
-"""
+"""What a command works on: a server, or the database of a home on this machine."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +13,16 @@ from urllib.parse import urlsplit
 
 from app.durable import is_open_to_others
 from app.errors import InputError, ReviewError
-from app.formats.plain_file import open_regular_file
+from app.formats.safe_path import open_regular_file
+from app.progress import ReportProgress
+from app.terminal.options import read_settings
+from app.terminal.terminal import show_progress
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from app.config import Settings
+    from app.db.store import Store
     from touchline.client import Client
 
 ABLE = (
@@ -184,3 +187,29 @@ def _command_error(server: ServerPlace, error: Exception) -> ReviewError:
     if said_nothing:
         hint = "Is it running, and the address right?"
     return ReviewError(message, hint=hint)
+
+
+@contextmanager
+def opened_store(settings: Settings | None = None) -> Iterator[Store]:
+    """The database of a home; by default the one that the environment names."""
+    require_home()
+    from app.db.store import Store
+
+    with closing(Store.open(settings or read_settings())) as store:
+        yield store
+
+
+@contextmanager
+def opened_to_solve(
+    what: str, workers: int | None, cluster: str | None = None
+) -> Iterator[tuple[Store, Executor | None, ReportProgress]]:
+    """The database, where its datasets are solved, and a bar that says what is done."""
+    from app.workers.executors import executor_of
+
+    settings = read_settings(cluster=cluster)
+    with (
+        opened_store(settings) as store,
+        executor_of(settings, workers) as executor,
+        show_progress(what) as progress,
+    ):
+        yield store, executor, progress

@@ -6,7 +6,7 @@ pitch is quite the plan), plus a deviation of its own; the lens's distortion fol
 Between neighbours the background says how the camera turned and zoomed.
 
 The normal equations are those of ``shot_equations``. Covariances come from the same
-factors; what no pitch has as planned (``solving.paint_terms``) all frames have in common.
+factors; what no pitch has as planned (``solving.paint_noise``) all frames have in common.
 
 Where the shot shows its pitch (``solving.tripod_pitch``) it is solved twice: on the plan, whose markings then
 lie on the paint, and on that pitch. How far both cameras of a frame are apart is the uncertainty of the first.
@@ -37,14 +37,20 @@ from app.geometry.resection import (
     parameters_from_camera,
     projection_jacobians,
 )
-from app.paint.one_tripod import painted_frame
+from app.paint.frame_pitch import painted_frame
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.main_position import MAIN_MEAN, MAIN_SIGMA, is_main_position
+from app.solving.camera_positions import MAIN_MEAN, MAIN_SIGMA, is_main_position
 from app.solving.paint_camera import PaintProblem, offsets_of
-from app.solving.paint_noise import PaintOffsets, cautious_weights, marking_weights
-from app.solving.paint_terms import TERMS, all_terms, shifted_offsets
+from app.solving.paint_noise import (
+    TERMS,
+    PaintOffsets,
+    all_terms,
+    cautious_weights,
+    marking_weights,
+    shifted_offsets,
+)
 from app.solving.resect import ResectionProblem
 from app.solving.tripod_pitch import (
     DEVIATION_M,

@@ -20,7 +20,7 @@ from typing import get_args
 
 import psutil
 
-from app.formats.format_names import ExportFormat
+from app.soccer.choices import ExportFormat
 from tests.bench.table import print_table
 from tests.e2e.service import ROOT, SERVE
 

@@ -18,8 +18,7 @@ from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
-from app.solving.leave_one_out import error_without
-from app.solving.score import score_frame, score_frames
+from app.solving.score import error_without, score_frame, score_frames
 from tests.bench.table import print_table
 
 SIZE = ImageSize(960, 540)

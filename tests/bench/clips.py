@@ -36,14 +36,13 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS, X, Z, parameters_from_camera, projection_jacobians
 from app.paint.evidence import to_paint_evidence
+from app.paint.frame_pitch import share_tripod
 from app.paint.grass import field_of_play
-from app.paint.one_tripod import share_tripod
 from app.paint.propose import propose
 from app.paint.snap import SnappedCamera, snap
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, TOUCHLINE, CalibrationPolicy
 from app.solving.calibrate import calibrate

@@ -11,10 +11,9 @@ from scipy.optimize import least_squares
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.damped_solve import solve_damped
 from app.geometry.likely_point import invert_symmetric
-from app.geometry.smallest_singular import smallest_singular_vectors
-from app.geometry.triangulation import triangulate_pairs
+from app.geometry.resection_kernels import solve_damped
+from app.geometry.triangulation import smallest_singular_vectors, triangulate_pairs
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch

@@ -20,7 +20,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.leave_one_out import error_without
+from app.solving.score import error_without
 from tests.bench.table import print_table
 
 SIZE, PITCH = ImageSize(960, 540), Pitch()

@@ -36,8 +36,7 @@ from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.soccer.solution import Calibration, Solution

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.formats.issia_people import MIRRORED, people_on_grass, turn_people
+from app.formats.issia import MIRRORED, people_on_grass, turn_people
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.report import Report
 from tests.bench.table import print_table

@@ -25,7 +25,7 @@ from app.features.predictions.evaluation import tables_of
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.service import delete_predictions, view_predictions
 from app.features.solutions.service import solve_dataset
-from app.sample.truth import read_truth
+from app.sample.scene import read_truth
 from app.sample.write import write_sample
 from app.soccer.frames import Box, ImageSize
 from tests.evaluation.tiny_detector import write_tiny_detector

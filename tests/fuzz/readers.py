@@ -36,13 +36,12 @@ from app.finite import json_text
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
 from app.formats.file_tree import Limits
-from app.formats.format_names import ImportFormat
 from app.formats.guess_format import guess_format
 from app.formats.output import output_tree
 from app.formats.report import Report
 from app.media.files import read_frame
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.choices import ImportFormat
+from app.soccer.group import Group, Media
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from app.terminal.options import read_text

@@ -22,8 +22,7 @@ from app.formats.report import Report
 from app.media.files import decode_frame, picture_header, read_frame, read_pixels
 from app.media.frames import Frames, make_picture
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 
 ORIENTATIONS = range(1, 9)
 STORED = np.zeros((48, 80, 3), np.uint8)

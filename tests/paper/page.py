@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from app.evaluation.evaluate import Evaluation
-from app.evaluation.table import Cell
+from app.evaluation.result import Cell
 from tests.paper import simulated
 from tests.paper.issia import Issia
 from tests.paper.printed_jac import Directions

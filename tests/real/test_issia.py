@@ -89,7 +89,7 @@ class TestSolve:
 
 
 class TestPeople:
-    """Those of cameras 2 and 6 are mirrored in the files (``datasets.issia_people``)."""
+    """Those of cameras 2 and 6 are mirrored in the files (``formats.issia``)."""
 
     @pytest.mark.parametrize("cameras", [(1, 2), (5, 6), (2, 4), (4, 6), (3, 4)])
     def test_the_same_person_stands_at_one_place_in_two_cameras(self, cameras):

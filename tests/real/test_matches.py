@@ -15,9 +15,9 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.leave_one_out import error_without
 from app.solving.match_position import NO_PLACES, place_of
 from app.solving.pitch_size import PitchFrame, estimate_pitch
+from app.solving.score import error_without
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LINES = DATA / "sn22-dev" / "lines.zip"

@@ -12,7 +12,7 @@ from app.features.file_tools.paint import agree_files, snap_files
 from app.media.files import decode_frame
 from app.paint.view_proposal import proposal_of
 from app.soccer.frames import ImageSize
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.calibrate import calibrate

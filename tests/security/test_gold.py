@@ -20,7 +20,7 @@ from app.features.independent_annotations import known_truth as mixing
 from app.features.independent_annotations.queries import GOLD, annotations_in
 from app.features.people.roles import Role
 from app.features.solutions.service import solve_dataset
-from app.soccer.media import Media
+from app.soccer.group import Media
 from tests.scenes import make_scenes
 from tests.security.apart import API, BODIES, Apart, opened
 from tests.security.cheat import features_of, in_order, telling

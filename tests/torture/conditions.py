@@ -43,8 +43,8 @@ class Clock(when.datetime):
     @classmethod
     def now(cls, tz=None):
         return when.datetime.fromtimestamp(time.time(), tz)
-import app.db.stored_responses, app.db.session
-app.db.session.datetime = app.db.stored_responses.datetime = Clock
+import app.db.idempotency, app.db.session
+app.db.session.datetime = app.db.idempotency.datetime = Clock
 """
 """Gives a server a clock that is as many seconds aside as a file says.
 

@@ -31,8 +31,7 @@ from app.http.services import Services
 from app.http.site import Site
 from app.main import create_app
 from app.soccer.annotation import Lines, make_lines
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
 from tests.balls import box_around
 from tests.cameras import SIZE, looking

@@ -81,7 +81,7 @@ ON_BOTH = frozenset(
         "features/verdicts/test_service_verdict.py",
         "features/versions/test_check.py",
         "features/versions/test_freeze.py",
-        "db/test_stored_responses.py",
+        "db/test_idempotency.py",
         "features/queue/test_queries_conditions.py",
         "features/queue/test_queries_listing.py",
         "db/test_log.py",
@@ -93,7 +93,6 @@ ON_BOTH = frozenset(
 """Files whose tests always run on SQLite and on PostgreSQL: what the engines do differently, what finds
 damage, and one way each of edits, verdicts, versions and answers through the store."""
 WHEN_ALL = ON_BOTH | {
-    "db/test_idempotency.py",
     "features/datasets/test_service_delete.py",
     "features/imports/test_ingest.py",
     "features/queue/test_service_listing.py",

@@ -19,8 +19,7 @@ from app.features.queue.refresh_queries import refresh_queue
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from tests.cameras import EVERY_COEFFICIENT

@@ -25,8 +25,7 @@ from app.features.solutions.tables import SolutionModel
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import MARKINGS, Pitch
 from app.soccer.solution import SOLVER_VERSION
 from tests.balls import seen

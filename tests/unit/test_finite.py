@@ -25,7 +25,7 @@ from pydantic import BaseModel
 
 import app
 from app import features
-from app.evaluation.figure import Axis, Figure, Panel, Series, figure_csv
+from app.evaluation.result import Axis, Figure, Panel, Series, figure_csv
 from app.features.findings.service import GroupFindings
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.jobs.queries import _json_column as job_text
@@ -34,7 +34,7 @@ from app.finite import finite, json_text
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.parquet import import_pyarrow
+from app.formats.parquet_writer import import_pyarrow
 from app.geometry.camera import Camera
 from app.log import only_finite
 from app.soccer.finding import Finding, Fix
@@ -56,7 +56,7 @@ WRITERS = {
         "formats/json_text.py",  # measures, writes nothing
     },
     "msgspec.json.encode": {"finite.py"},
-    "csv.writer": {"formats/csv_text.py", "evaluation/figure.py"},
+    "csv.writer": {"formats/csv_text.py", "evaluation/result.py"},
     "csv.DictWriter": set(),
 }
 """Who may write without ``app.finite``, and why that is sound."""

@@ -24,36 +24,40 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
-    around assign estimates etag listing orphan player
-    3d accept access account action actions actors address adjudicate adjust adjustments admission adopt advice
-    after ahead anchor annotate app arrays arrival ask attempt axis backup bar bars batches before best binned block
-    blocks bodies body boxes browser bulk bundle button buttons cache calibrate candidate canonical canvas caption
-    card cards categories cell changes chart chip choice chooser class cli client clip clock cluster codec codecs colours
-    command comment comments compare comparison completion config confirm connections contact cookies copy copying corner
-    counts cross css csv cursor curve cuts damped database datasets day delete deps descriptions details detect
-    devices diagram dialect dialog diff differences dismissals distance documents drags drawing drawn durable editor
-    empty endings engine enrol ephemeral equations errors estimator evaluate event events executors export exports facets facts faults
-    fields figure figures files film finder finite first fit fixture folder folders follow form format formats frozen
-    gestures give glossary gold grass grid guess guide guideline guidelines header headers heat help histograms
-    history hit home hooks hosts idempotency identity if image images import imports index indexing info init insert
-    insight invitation invitations invite items jaccard join json kept kernels key keys kinds known konva last
-    latest lazy lease leases least leftovers legend lens lesson lessons letter limits links list live local
-    locks login logins lone look loupe mail main maintenance many map markdown marks match matches matrix me
-    measures membership mentions menu merge messages metrics migrate mini model motion name names navigation needs
-    neighbours notice nudge numbers object on open openapi opened opentrackio options order origin other output own
-    ownership packing page pages paint palette panel parameters parquet parse parts patch path pen people
-    permissions pins pitch pitches pixel place places plain play playback plural png pointer policies pool popover pose
-    position postgresql preopen preview problem process processes profile progress projection proof property
-    proposal propose props provider queries query quota rail rater reader reasons record refresh reimport remote render
-    repeats report requests resect resource respond responses restore result rethreshold return revert reviewers
-    rights roles rotation router routes row rows rules run runner runs safe save scale scene scene3d scenes schemas score
-    scoreboard scoring scroll search sender sending serve server service serving session sets shared sharing sheet
-    sign singular site smallest snapshot solve solving source sources sphere spill spread sqlite squares stacks
-    stage staging standpoints starts state statements statistics steps storage store stored straight stream stretches strict
-    submit suggested suggestions summary surface swap synloc tab table tall team term terminal text threads
-    threshold ticks time tokens tools trace tracing track tracking transfer transitions tree trees triangulate tries tripod truth types
-    undo undrawn upload v3 v3d video viewport viewports virtual visibility wal walk warm web what when window words
-    work worker workspace write writer zip making predicted constraints correct filter intervals measurements hints
+    3d accept access account action actions actors address adjudicate adjust adjustments admission
+    adopt advice after ahead anchor annotate app around arrays arrival ask assign attempt axis
+    backup bar bars batches before binned block blocks bodies body boxes browser bulk bundle button
+    buttons cache calibrate candidates canonical canvas caption card cards cell changes chart chip
+    choice chooser class cli client clip clock cluster codec codecs colours command comment comments
+    compare comparison completion config confirm connections constraints contact cookies copy
+    copying correct counts cross css csv cursor curve cuts database datasets day delete deps
+    descriptions details detect devices diagram dialect dialog diff differences dismissals distance
+    documents drags drawing durable editor empty endings engine enrol ephemeral equations errors
+    estimates estimator etag evaluate event events executors export exports facets facts faults
+    fields figure figures files film filter finder finite first fit fixture folder folders follow
+    form format formats frozen gestures give glossary gold grass grid guess guide guideline
+    guidelines header headers heat help hints histograms history hit home hooks hosts idempotency
+    identity if image images import imports index indexing info init insert insight intervals
+    invitation invitations invite items jaccard join json kept kernels key keys kinds known konva
+    last latest lazy lease leases least legend lens lesson lessons letter limits links list listing
+    live local locks login logins lone loupe mail main maintenance making many map markdown marks
+    match matches matrix me measurements measures membership mentions menu merge messages metrics
+    migrate mini models motion name names navigation needs neighbours notice nudge numbers object on
+    open openapi opentrackio options order origin orphan other output own ownership packing page
+    pages paint palette panel parameters parquet parse parts patch path pen people permissions pins
+    pitch pitches pixel place places play playback player plural png pointer policies pool popover
+    pose position postgresql preopen preview problem process processes profile progress projection
+    proof property proposal propose props provider queries query quota rail rater reader reasons
+    record refresh reimport remote render repeats report requests resect resource respond responses
+    restore result rethreshold return revert reviewers rights roles rotation router routes row rows
+    rules run runner runs safe save scale scene scene3d scenes schemas score scoring scroll search
+    sender sending serve server service serving session sets shared sharing sheet sign site snapshot
+    solve solving source sources sphere spread sqlite squares stacks stage staging standpoints state
+    statements statistics steps storage store stored stream stretches strict submit suggested
+    suggestions summary surface swap synloc tab table tall team term terminal text threads threshold
+    ticks time tokens tools tracing track tracking transfer transitions tree trees triangulate tries
+    tripod truth types undo undrawn upload v3 v3d video viewport viewports virtual visibility wal
+    walk web what when window words work worker workspace write writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be

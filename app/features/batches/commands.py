@@ -8,10 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import GoldStart
-from app.terminal.opened import opened_store
 from app.terminal.options import Json, acting
 from app.terminal.remote import BATCH
-from app.terminal.server import connected, given_server
+from app.terminal.server import connected, given_server, opened_store
 from app.terminal.terminal import print_rows, print_values
 
 commands = typer.Typer(help="Groups that are assigned to people.", no_args_is_help=True)

@@ -6,10 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from app.terminal.opened import opened_store
 from app.terminal.options import Json, acting
 from app.terminal.remote import DATASET
-from app.terminal.server import ServerPlace, connected, given_server
+from app.terminal.server import ServerPlace, connected, given_server, opened_store
 from app.terminal.terminal import print_json, print_values, say
 
 commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)

@@ -11,7 +11,7 @@ from sqlalchemy import delete, select, true
 
 from app.config import Settings
 from app.db.dialects.statements import items_of, texts_in
-from app.db.leftovers import DAY, last_written
+from app.db.home import DAY, last_written
 from app.db.session import Session
 from app.features.datasets.tables import ViewModel
 from app.features.imports.upload_queries import list_uploads

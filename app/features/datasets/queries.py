@@ -25,10 +25,9 @@ from sqlalchemy import (
 )
 
 from app.canonical import canonical
-from app.db.base import COPIES_USED, UsedIdModel
 from app.db.dialects.statements import DeferReferences, insert_or_replace
 from app.db.json_columns import as_written, parse
-from app.db.session import Session
+from app.db.session import COPIES_USED, Session, UsedIdModel
 from app.features.batches.tables import BatchModel
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.findings.tables import DismissalModel

@@ -9,12 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.policies.commands import read_policy_option
-from app.formats.format_names import CommandFormat, ExportFormat
 from app.object_store.address import is_address
 from app.object_store.path import StoredPath, find_path, target_path
-from app.soccer.choices import BoxKind, CalibrationChoice, PicturesWritten, TrainingViews
+from app.soccer.choices import (
+    BoxKind,
+    CalibrationChoice,
+    CommandFormat,
+    ExportFormat,
+    PicturesWritten,
+    TrainingViews,
+)
 from app.soccer.frames import ImageSize
-from app.terminal.opened import opened_store
 from app.terminal.options import (
     POLICY_OR_FILE,
     Dataset,
@@ -26,7 +31,7 @@ from app.terminal.options import (
     parse_size,
     read_settings,
 )
-from app.terminal.server import connected, given_server
+from app.terminal.server import connected, given_server, opened_store
 from app.terminal.terminal import print_error, print_export, print_import, say, show_progress
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from app.db.leftovers import DAY, clear, last_written
+from app.db.home import DAY, clear, last_written
 from app.db.session import now
 from app.durable import PARTIAL, replace_file
 from app.errors import NotFoundError

@@ -8,14 +8,18 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
-from app.formats.export_names import fold_file_name, frame_identity, with_export_key
-from app.formats.frame_names import FrameName, frame_path_by_match
+from app.formats.frame_names import (
+    FrameName,
+    fold_file_name,
+    frame_identity,
+    frame_path_by_match,
+    with_export_key,
+)
 from app.formats.safe_path import resolve_inside
 from app.media.files import media_facts, picture_header
 from app.media.frames import SentPicture
 from app.object_store.address import is_address, unseal
-from app.soccer.group import Group, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, View
 
 ReadPicture = Callable[[Media, int | None, bool], SentPicture]
 """From where a frame lies, its width (None: as it is) and whether it is mirrored."""

@@ -18,13 +18,13 @@ from app.features.jobs.queries import EXPORT, Job
 from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
 from app.features.jobs.service import Jobs
 from app.formats.file_tree import Root
+from app.formats.output import require_absent_in_store
 from app.formats.safe_path import require_safe_path
-from app.formats.store_output import require_absent
 from app.media.frames import Frames, SentPicture
 from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
 from app.plural import plural
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 KIND = EXPORT
 
@@ -56,7 +56,7 @@ def request_export(
     found = get_dataset_head(store, request["dataset"])
     version = request.get("version")
     if request.get("to") is not None:
-        require_absent(_target_in_store(store, request["to"]))
+        require_absent_in_store(_target_in_store(store, request["to"]))
     require_possible(
         store,
         found.id,

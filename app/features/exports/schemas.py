@@ -11,9 +11,8 @@ from app.features.exports.folder import ExportEntry
 from app.features.jobs.queries import DONE, Job
 from app.features.jobs.schemas import JobDocument
 from app.features.versions.schemas import VersionId
-from app.formats.format_names import ExportFormat
 from app.http.documents import Document, ListDocument
-from app.soccer.choices import BoxKind, JobState, PicturesSent, TrainingViews
+from app.soccer.choices import BoxKind, ExportFormat, JobState, PicturesSent, TrainingViews
 
 
 class ExportRequest(BaseModel):

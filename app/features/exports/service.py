@@ -40,12 +40,12 @@ from app.formats.export_formats import (
     view_settings,
     write_format,
 )
-from app.formats.export_names import ExportNames, Outline
 from app.formats.export_record import ExportRecord
 from app.formats.file_tree import Root
+from app.formats.frame_names import ExportNames, Outline
 from app.formats.issia import FramePersons
 from app.formats.manifest import UNKNOWN_LICENCE, Manifest, write_manifest
-from app.formats.store_output import output_anywhere
+from app.formats.output import output_anywhere
 from app.formats.tracks_writer import TrackRecord
 from app.formats.view_files import PutText, ViewFiles
 from app.media.frames import make_picture

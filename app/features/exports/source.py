@@ -17,8 +17,8 @@ from app.features.groups.view_queries import ViewFileFields, view_file_fields
 from app.features.versions.membership import policy_settings, version_settings, version_stamp
 from app.features.versions.queries import BATCH, VersionGroup, read_rows
 from app.features.versions.service import FrozenGroup, Version, thaw, thaw_outlines
-from app.formats.export_names import Outline
 from app.formats.export_record import ExportRecord
+from app.formats.frame_names import Outline
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy

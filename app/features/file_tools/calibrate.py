@@ -35,11 +35,10 @@ from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate, lone_frame_of, with_lone_covariance
 from app.solving.calibration_findings import calibration_findings, lone_findings
-from app.solving.leave_one_out import leave_one_out
 from app.solving.lone_frame import LoneFrame
-from app.solving.match_model import FramePlace
-from app.solving.match_position import Places, place_of, share_position
-from app.solving.warm import warm_up
+from app.solving.match_position import FramePlace, Places, place_of, share_position
+from app.solving.score import leave_one_out
+from app.solving.solve import warm_up
 
 CHUNK = 16
 """Frames that one process takes at a time."""

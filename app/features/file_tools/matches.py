@@ -15,17 +15,15 @@ from app.errors import DatasetFormatError, GeometryError
 from app.formats.csv_text import read_rows
 from app.formats.file_tree import Limits
 from app.formats.json_text import read_json
-from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
+from app.formats.safe_path import read_regular_file
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.policy import CLICKED
-from app.solving.match_model import FramePlace
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
-from app.solving.match_position import NO_PLACES, Places
-from app.solving.match_runs import guess_matches
+from app.solving.match_position import NO_PLACES, FramePlace, Places, guess_matches
 from app.solving.pitch_size import PitchFrame, estimate_pitch
 
 

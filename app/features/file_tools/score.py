@@ -10,8 +10,8 @@ from typing import Any
 from app.errors import DatasetFormatError, InputError
 from app.formats.cameras_reader import read_cameras
 from app.formats.json_text import read_json
-from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
+from app.formats.safe_path import read_regular_file
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.camera import Camera
 from app.progress import ReportProgress

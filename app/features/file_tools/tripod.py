@@ -18,7 +18,7 @@ from app.formats.cameras_writer import camera_file_name, camera_file_text
 from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
-from app.paint.one_tripod import share_tripod
+from app.paint.frame_pitch import share_tripod
 from app.paint.snap import SnappedCamera
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch

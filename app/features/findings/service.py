@@ -25,8 +25,7 @@ from app.features.queue.queries import (
 from app.features.queue.refresh_queries import read_import_findings, refresh_queue
 from app.features.solutions.queries import is_solved
 from app.soccer.finding import Dismissal, Finding
-from app.soccer.group import Group
-from app.soccer.reasons import checked_note
+from app.soccer.group import Group, checked_note
 
 BATCH = 100
 

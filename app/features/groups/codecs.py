@@ -17,13 +17,11 @@ from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
-from app.soccer.group import Group, SharedPosition, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
-from app.soccer.reasons import LeftOut
 
 _LINES = dict[str, tuple[ImagePoint, ...]]
 look_through(_LINES)

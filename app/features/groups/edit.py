@@ -14,11 +14,10 @@ from app.errors import InputError, NotFoundError
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import MAX_PIXEL, ImagePoint
-from app.soccer.group import CALIBRATIONS, Group, SharedPosition, Station, View
+from app.soccer.group import CALIBRATIONS, Group, SharedPosition, Station, View, make_left_out
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
-from app.soccer.reasons import make_left_out
 
 MAX_POINTS = 1000
 """Most points of one marking."""

@@ -10,10 +10,9 @@ from typing import Any
 from sqlalchemy import Select, func, insert, select
 
 from app.canonical import canonical
-from app.db.base import UsedIdModel
 from app.db.dialects.statements import larger
 from app.db.json_columns import pack
-from app.db.session import Session
+from app.db.session import Session, UsedIdModel
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
 from app.features.groups import codecs
 from app.features.groups.digest import group_inputs_hash, station_digest, view_digest

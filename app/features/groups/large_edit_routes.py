@@ -18,7 +18,7 @@ from app.errors import OverloadedError
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration
-from app.solving.warm import warm_up
+from app.solving.solve import warm_up
 from app.worker_pool import ReadyWorker, least_busy
 from app.worker_process import WorkerEnded, WorkerLimits
 

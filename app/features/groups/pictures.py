@@ -21,15 +21,12 @@ from app.features.paint.proposal_queries import Proposal
 from app.geometry.camera import Camera
 from app.media.files import read_pixels
 from app.media.frames import refused_picture
-from app.paint.drawn_lines import beside_drawn
 from app.paint.evidence import Image
-from app.paint.picture_scale import why_unreadable
-from app.paint.view_paint import hiding_boxes, paint_of
-from app.paint.view_proposal import ViewProposal, proposal_of
+from app.paint.view_paint import hiding_boxes, paint_of, why_unreadable
+from app.paint.view_proposal import ViewProposal, beside_drawn, proposal_of
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, View
 from app.soccer.paint_evidence import (
     EXTRACTOR_VERSION,
     NO_FRAME,

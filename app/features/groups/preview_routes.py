@@ -22,8 +22,7 @@ from app.features.groups.view_paint import PaintFollower, WithoutPictures
 from app.http.request_limits import PREVIEWS, is_large
 from app.log import log_to_stderr
 from app.soccer.group import Group
-from app.solving.solve import solve
-from app.solving.warm import warm_up
+from app.solving.solve import solve, warm_up
 from app.worker_pool import ReadyWorker, least_busy
 from app.worker_process import WorkerEnded, WorkerLimits
 

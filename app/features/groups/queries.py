@@ -29,12 +29,10 @@ from app.features.match_estimates.queries import Factors, factors_of
 from app.features.paint.queries import paint_digests, read_readings
 from app.features.people.visibility_queries import seen_in
 from app.soccer.annotation import BallAnnotation, Extras
-from app.soccer.group import Group, SharedPosition, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.reasons import LeftOut
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,17 @@ from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
-from app.soccer.group import Group, View, view_letter
-from app.soccer.media import is_numbered_in_time
+from app.soccer.group import (
+    MAX_NOTE,
+    Group,
+    LeftOut,
+    Reason,
+    View,
+    is_numbered_in_time,
+    view_letter,
+)
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.pitch import MARKINGS, canonical_marking
-from app.soccer.reasons import MAX_NOTE, LeftOut, Reason
 
 
 def _known_marking(name: str) -> str:

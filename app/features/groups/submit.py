@@ -42,8 +42,7 @@ from app.features.people.visibility_queries import COPIES
 from app.features.queue.refresh_queries import refresh_queue, update_row
 from app.features.solutions.queries import EncodedSolution, insert_solutions, read_solutions
 from app.features.solutions.service import Solve, known_calibrations, solve_encoded
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Solution
 from app.solving.solve import solve

@@ -19,6 +19,7 @@ from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.calibrate import calibrate_station, shortest_counted_marking_px
+from app.solving.calibration_findings import READ_PAINT
 from app.solving.jaccard import (
     as_evaluator_markings,
     jaccard,
@@ -27,7 +28,6 @@ from app.solving.jaccard import (
     project_markings,
     unannotated_not_missing,
 )
-from app.solving.paint_findings import READ_PAINT
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,11 @@ from app.features.solutions.service import known_calibrations
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.media.frames import Frames
-from app.paint.drawn_lines import propose_beside
 from app.paint.view_paint import read_paint
+from app.paint.view_proposal import propose_beside
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, View
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration

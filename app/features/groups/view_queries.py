@@ -21,8 +21,7 @@ from app.features.queue.tables import QueueModel
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Station
-from app.soccer.media import Media
+from app.soccer.group import Media, Station
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 

@@ -43,7 +43,7 @@ from app.http.respond import responds
 from app.http.route import Route
 from app.http.services import Services
 from app.media.frames import Frames, SentPicture
-from app.soccer.media import FARTHEST, Media
+from app.soccer.group import FARTHEST, Media
 from app.worker_process import WorkerEnded
 
 router = APIRouter(prefix="/views", tags=["views"], route_class=Route)

@@ -23,7 +23,7 @@ from app.features.guidelines.queries import (
 from app.features.imports.upload_queries import upload_path
 from app.finite import Moment
 from app.media.frames import Frames
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 MAX_LETTERS = 100_000
 MAX_PICTURE = 4_000_000

@@ -23,8 +23,8 @@ from app.features.imports.ingest import IngestReport, ingest_session
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
 from app.geometry.camera import Camera
-from app.soccer.camera_size import size_centred_on_principal_point
 from app.soccer.frames import ImageSize
+from app.soccer.picture import size_centred_on_principal_point
 
 BATCH = 50
 """Cameras a transaction."""

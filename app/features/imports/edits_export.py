@@ -32,7 +32,7 @@ from app.features.imports.queries import group_verdicts, known_groups, shared_st
 from app.finite import json_text
 from app.formats.file_tree import Root
 from app.formats.manifest import Manifest, write_manifest
-from app.formats.store_output import output_anywhere
+from app.formats.output import output_anywhere
 from app.progress import ReportProgress
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION

@@ -24,10 +24,9 @@ from app.formats.report import Report
 from app.soccer.annotation import Extras
 from app.soccer.finding import FINDING_KINDS
 from app.soccer.frames import MAX_SIDE
-from app.soccer.group import CALIBRATIONS, Group, Station, View
+from app.soccer.group import CALIBRATIONS, MAX_NOTE, REASONS, Group, Station, View, make_left_out
 from app.soccer.pitch import canonical_marking
 from app.soccer.policy import PAPER, Policy
-from app.soccer.reasons import MAX_NOTE, REASONS, make_left_out
 
 MAX_LINE = 32 * 1024 * 1024
 MAX_BALLS, MAX_TEXT = 100, 1000

@@ -15,12 +15,11 @@ from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
 from app.media.files import picture_header, video_length, video_times
 from app.media.images import SIDEWAYS, ImageHeader
-from app.paint.picture_scale import SHAPES_APART
+from app.paint.view_paint import SHAPES_APART
 from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, View
 
 OUTSIDE = 0.02
 """Of a side; annotators of public datasets clicked up to 1 % beyond the border of a picture."""

@@ -9,9 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from app.features.imports.folders import FolderItem
 from app.features.imports.jobs import ImportRequest
-from app.formats.format_names import ImportFormat
 from app.http.documents import Document, ListDocument
-from app.soccer.choices import CalibrationChoice, PolicyName
+from app.soccer.choices import CalibrationChoice, ImportFormat, PolicyName
 from app.soccer.frames import MAX_SIDE
 
 Camera = Annotated[int, Field(ge=0, le=999)]

@@ -18,7 +18,6 @@ from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.formats.cameras_reader import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.file_tree import Limits, Root
-from app.formats.format_names import ImportFormat
 from app.formats.frame_list import read_frame_list
 from app.formats.frames_reader import check_grouping, read_frames
 from app.formats.gamestate_reader import read_gamestate
@@ -35,7 +34,7 @@ from app.media.images import check_size, read_header
 from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
-from app.soccer.choices import CalibrationChoice
+from app.soccer.choices import CalibrationChoice, ImportFormat
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch

@@ -22,7 +22,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from app.config import Settings
-from app.db.leftovers import PART, clear
+from app.db.home import PART, clear
 from app.db.locks import require_lock
 from app.db.session import now
 from app.durable import replace_file, sync

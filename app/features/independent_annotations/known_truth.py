@@ -37,8 +37,7 @@ from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import Version, find_version, thaw
 from app.formats.camera_json import camera_to_json
-from app.sample.scene import SceneTruth
-from app.sample.truth import TRUTH, read_truth
+from app.sample.scene import TRUTH, SceneTruth, read_truth
 from app.soccer.actors import person_of
 from app.soccer.group import Group
 

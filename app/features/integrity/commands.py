@@ -8,9 +8,8 @@ from typing import Annotated
 import typer
 
 from app.plural import plural
-from app.terminal.opened import opened_store
 from app.terminal.options import Json, read_settings
-from app.terminal.server import require_home
+from app.terminal.server import opened_store, require_home
 from app.terminal.terminal import print_json, say
 
 commands = typer.Typer()

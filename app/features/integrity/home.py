@@ -15,8 +15,7 @@ import pysqlite3.dbapi2
 from app.config import Settings
 from app.db.check import Check
 from app.db.dialects.sqlite import MIN_SQLITE
-from app.db.home import make_home, open_to_others
-from app.db.leftovers import leftovers
+from app.db.home import leftovers, make_home, open_to_others
 from app.db.log import entries_after, last_time
 from app.db.recovery.anchor import read_anchor
 from app.db.session import Session, text_of

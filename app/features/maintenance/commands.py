@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from app.terminal.opened import opened_store
 from app.terminal.options import Json, acting
+from app.terminal.server import opened_store
 from app.terminal.terminal import print_values
 
 commands = typer.Typer()

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.plural import plural
-from app.terminal.opened import opened_store, opened_to_solve
 from app.terminal.options import Dataset, Json, Size, Workers, acting
+from app.terminal.server import opened_store, opened_to_solve
 from app.terminal.terminal import print_json, print_rows, print_values, say
 
 if TYPE_CHECKING:

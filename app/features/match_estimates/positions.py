@@ -38,8 +38,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.solving.calibrate import calibrate_station, calibration_key
-from app.solving.match_model import FramePlace
-from app.solving.match_position import Places, pan_of, place_of
+from app.solving.match_position import FramePlace, Places, pan_of, place_of
 from app.workers.executors import fan_out
 
 _BATCH = 100

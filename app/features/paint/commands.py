@@ -13,8 +13,8 @@ import typer
 from app.features.match_estimates.commands import print_sentences
 from app.plural import plural
 from app.soccer.choices import ProposalOutcome
-from app.terminal.opened import opened_store
 from app.terminal.options import Json, Workers, acting, parse_size, read_settings
+from app.terminal.server import opened_store
 from app.terminal.terminal import print_json, print_values, say, show_progress
 
 commands = typer.Typer()

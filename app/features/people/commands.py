@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.terminal.opened import opened_store
 from app.terminal.options import Json, acting, read_settings
+from app.terminal.server import opened_store
 from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:

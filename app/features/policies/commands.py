@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.terminal.opened import opened_store
 from app.terminal.options import POLICY_OR_FILE, Dataset, Json, acting, read_text
-from app.terminal.server import connected, given_server
+from app.terminal.server import connected, given_server, opened_store
 from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:

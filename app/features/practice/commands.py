@@ -10,8 +10,8 @@ import typer
 
 from app.durable import keep_private
 from app.sample.order import GROUPS, RECORDING_SECONDS, SEED, SHORTEST_RECORDING, SampleOrder
-from app.terminal.opened import opened_store
 from app.terminal.options import Json, Workers, acting, read_settings
+from app.terminal.server import opened_store
 from app.terminal.terminal import print_values, show_progress
 
 commands = typer.Typer()

@@ -27,12 +27,11 @@ from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibilit
 from app.features.practice.lessons import WORDS, Feedback, judge, kind_of
 from app.features.practice.recording import recording_practice_work, require_own_recording
 from app.features.solutions.service import solve_dataset
-from app.formats.match_frames import ARCHIVE
+from app.formats.soccernet_v3 import ARCHIVE
 from app.progress import ReportProgress, partial_progress
 from app.sample.order import SampleOrder
 from app.sample.practice import LESSONS, write_practice
-from app.sample.scene import SceneTruth
-from app.sample.truth import TRUTH, read_truth
+from app.sample.scene import TRUTH, SceneTruth, read_truth
 from app.sample.write import SampleReport, write_sample
 from app.soccer.policy import PAPER
 

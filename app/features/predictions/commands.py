@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from app.plural import plural
-from app.terminal.opened import opened_store
 from app.terminal.options import Dataset, Json, Workers, acting, read_settings
+from app.terminal.server import opened_store
 from app.terminal.terminal import (
     print_error,
     print_json,

@@ -21,10 +21,9 @@ from app.features.groups.view_queries import StoredView, dataset_views
 from app.features.predictions.queries import PredictionSet
 from app.features.predictions.service import LISTED, frame_names, require_free, save_predictions
 from app.features.queue.query import parse_query
-from app.formats.corner_origin import box_from_corner
 from app.media.files import decode_frame
 from app.progress import ReportProgress
-from app.soccer.frames import Box, ImageSize
+from app.soccer.frames import Box, ImageSize, box_from_corner
 
 DEFAULT_SIDE = 640
 """Of the input, where the model leaves it open and does not say."""

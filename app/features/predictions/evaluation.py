@@ -17,9 +17,7 @@ from app.evaluation.comparison import (
     compare_tables,
     differing_pins,
 )
-from app.evaluation.figure import Figure
-from app.evaluation.result import NUMBERS, FrameResult
-from app.evaluation.table import Table
+from app.evaluation.result import NUMBERS, Figure, FrameResult, Table
 from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.service import read_dataset_head
 from app.features.predictions import evaluation_queries as frame_rows

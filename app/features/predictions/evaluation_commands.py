@@ -12,13 +12,12 @@ from app.features.predictions.commands import print_set
 from app.progress import ReportProgress
 from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
 from app.soccer.frames import ImageSize
-from app.terminal.opened import opened_store
 from app.terminal.options import Dataset, Json, acting, parse_size
-from app.terminal.server import ServerPlace, connected, given_server
+from app.terminal.server import ServerPlace, connected, given_server, opened_store
 from app.terminal.terminal import print_json, say, show_progress
 
 if TYPE_CHECKING:
-    from app.evaluation.table import Cell, Table
+    from app.evaluation.result import Cell, Table
     from app.features.predictions.sources import SourcesRequest
 
 commands = typer.Typer()

@@ -9,10 +9,8 @@ from fastapi import APIRouter, Query, Response
 
 from app.errors import NotFoundError
 from app.evaluation.comparison import FIELDS
-from app.evaluation.figure import FIGURES, Figure, figure_csv, table_csv
 from app.evaluation.figure_png import figure_png
-from app.evaluation.result import NUMBERS
-from app.evaluation.table import TABLES, Table
+from app.evaluation.result import FIGURES, NUMBERS, TABLES, Figure, Table, figure_csv, table_csv
 from app.features.jobs.queries import Job
 from app.features.predictions import evaluation as review
 from app.features.predictions.evaluation_schemas import (

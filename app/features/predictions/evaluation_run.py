@@ -12,8 +12,7 @@ from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import Detection, Frame
-from app.evaluation.result import Evaluation
-from app.evaluation.table import Table
+from app.evaluation.result import Evaluation, Table
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.view_queries import StoredView, dataset_views
 from app.features.predictions.evaluation import read_evaluation

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from app.evaluation.comparison import Difference, FrameOfTwoRuns
-from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Table
+from app.evaluation.result import Cell, FrameResult, Table
 from app.features.predictions.evaluation import RunComparison, read_tables
 from app.features.predictions.evaluation_run import MAX_NAME, EvaluationRequest
 from app.features.versions.schemas import VersionId

@@ -9,9 +9,8 @@ from typing import Any
 
 from app.db.store import Store
 from app.errors import InputError
-from app.evaluation.figure import Figure, figure_csv, table_csv
 from app.evaluation.figure_png import figure_png
-from app.evaluation.result import FrameResult
+from app.evaluation.result import Figure, FrameResult, figure_csv, table_csv
 from app.features.predictions.evaluation import (
     MAX_PAGE,
     FrameQuery,

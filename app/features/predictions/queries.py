@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, delete, func, insert, select
 from app.canonical import canonical
 from app.db.json_columns import Json, as_written, pack, parse, unpack
 from app.db.session import Session
-from app.evaluation.predicted_track import PredictedTrack
+from app.evaluation.prediction_run import PredictedTrack
 from app.features.datasets.tables import ViewModel
 from app.features.groups.codecs import camera_from_json, camera_to_json
 from app.features.groups.digest import digest

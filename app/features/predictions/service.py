@@ -43,7 +43,7 @@ from app.formats.report import Report
 from app.geometry.camera import Camera
 from app.object_store.address import unseal
 from app.soccer.frames import ImageSize
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 LISTED = 100
 """Unknown frames and problems that a report names; all are counted."""

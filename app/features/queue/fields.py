@@ -8,8 +8,8 @@ from typing import Literal, get_args
 
 from app.soccer.choices import VerdictState
 from app.soccer.finding import FINDING_KINDS
+from app.soccer.group import REASONS
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
-from app.soccer.reasons import REASONS
 from app.soccer.solution import GATES
 
 FieldKind = Literal["number", "flag", "choice", "text", "ids", "order"]

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from app.terminal.opened import opened_store
 from app.terminal.options import acting
 from app.terminal.remote import follow, some
-from app.terminal.server import connected, given_server
+from app.terminal.server import connected, given_server, opened_store
 from app.terminal.terminal import print_json, print_values, show_progress
 
 TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "damaged", "shots", "sha256")

@@ -32,8 +32,7 @@ from app.features.recordings.service import Recording, get_recording, groups_tak
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.tracking.track import FrameCamera
 from app.video.frames import read_frames
 from app.video.index import RecordingIndex

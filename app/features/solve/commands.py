@@ -9,9 +9,8 @@ import typer
 
 from app.features.policies.commands import read_policy_option
 from app.plural import plural
-from app.terminal.opened import opened_store, opened_to_solve
 from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, acting
-from app.terminal.server import ServerPlace, connected, given_server
+from app.terminal.server import ServerPlace, connected, given_server, opened_store, opened_to_solve
 from app.terminal.terminal import (
     INTERRUPTED,
     held_interrupts,

@@ -46,8 +46,8 @@ from app.features.tracks.stored import UNJUDGED, corrections_of, stored_track, s
 from app.features.tracks.stored import Track as Track
 from app.features.tracks.stored import TrackSummary as TrackSummary
 from app.features.tracks.stretches import frame_of
+from app.soccer.group import checked_note
 from app.soccer.policy import Policy
-from app.soccer.reasons import checked_note
 from app.tracking.ball_correct import TrackPatch
 from app.tracking.ball_track import BallTrack, Correction
 

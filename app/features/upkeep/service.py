@@ -16,13 +16,13 @@ from typing import TypeVar
 import structlog
 
 from app.config import Settings
-from app.db.leftovers import delete_leftovers
+from app.db.home import delete_leftovers
+from app.db.idempotency import delete_old_responses, shorten_responses
 from app.db.log import newest_entry
 from app.db.recovery.anchor import sync_anchor
 from app.db.recovery.preopen_check import log_file
 from app.db.session import text_of
 from app.db.store import Store
-from app.db.stored_responses import delete_old_responses, shorten_responses
 from app.errors import ReviewError
 from app.features.datasets.orphan_queries import expire_cache
 from app.features.datasets.service import delete_unused_calibrations

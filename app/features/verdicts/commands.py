@@ -8,9 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import VerdictState
-from app.terminal.opened import opened_store
 from app.terminal.options import Dataset, Json, acting
-from app.terminal.server import connected, given_server
+from app.terminal.server import connected, given_server, opened_store
 from app.terminal.terminal import print_error, print_json, print_values, say
 
 commands = typer.Typer()

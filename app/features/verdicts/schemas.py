@@ -12,7 +12,7 @@ from app.features.verdicts.bulk import BatchReport, BulkPlan, Refusal, SampleGro
 from app.http.documents import Document, ListDocument
 from app.soccer.choices import VerdictState
 from app.soccer.finding import FINDING_KINDS
-from app.soccer.reasons import MAX_NOTE, Reason
+from app.soccer.group import MAX_NOTE, Reason
 
 
 class VerdictEdit(BaseModel):

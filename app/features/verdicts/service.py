@@ -21,8 +21,7 @@ from app.features.verdicts.queries import (
 )
 from app.finite import Moment
 from app.soccer.choices import VerdictState
-from app.soccer.group import Group
-from app.soccer.reasons import REASONS, checked_note, require_explanation
+from app.soccer.group import REASONS, Group, checked_note, require_explanation
 from app.soccer.solution import Solution
 
 STATES: tuple[str, ...] = get_args(VerdictState)

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.soccer.choices import SplitKind, VersionRule
-from app.terminal.opened import opened_store, opened_to_solve
 from app.terminal.options import Cluster, Dataset, Json, Workers, acting, parse_cameras, read_text
 from app.terminal.remote import VERSION
-from app.terminal.server import connected, given_server
+from app.terminal.server import connected, given_server, opened_store, opened_to_solve
 from app.terminal.terminal import (
     print_error,
     print_json,

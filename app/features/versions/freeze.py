@@ -53,8 +53,7 @@ from app.formats.manifest import software_version
 from app.media.files import media_facts
 from app.progress import ReportProgress
 from app.soccer.finding import Finding
-from app.soccer.group import Group
-from app.soccer.reasons import checked_note
+from app.soccer.group import Group, checked_note
 from app.soccer.solution import SOLVER_VERSION
 from app.soccer.split import Split, Splitter
 

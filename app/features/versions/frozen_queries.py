@@ -25,8 +25,7 @@ from app.features.solutions.queries import read_calibration_bodies
 from app.features.solutions.tables import CalibrationModel
 from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.paint_evidence import reading_from_json
 from app.soccer.pitch import Pitch
 

@@ -23,7 +23,7 @@ from app.features.versions.verify import VersionDifference
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
 from app.soccer.choices import SplitKind, VersionRule
-from app.soccer.reasons import MAX_NOTE
+from app.soccer.group import MAX_NOTE
 from app.soccer.split import TEST_CAMERAS, Split
 
 Point = Annotated[list[float], Field(min_length=3, max_length=3)]

@@ -33,7 +33,7 @@ from app.features.jobs.runner import JobProgress
 from app.media.frames import Frames, SentPicture, make_picture
 from app.object_store.path import find_path, target_path
 from app.object_store.store import open_store
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.worker_process import WorkerProcess
 from tests.e2e.service import serving
 from tests.moto_server import SIGNED, ClassLimiter, store_settings, stored_settings

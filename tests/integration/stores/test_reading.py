@@ -26,8 +26,7 @@ from app.media.object_frames import is_kept
 from app.object_store.address import split_address
 from app.object_store.path import find_path
 from app.object_store.store import open_store
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 from tests.moto_server import ClassLimiter, fill_store, store_settings, stored_settings
 
 

@@ -1,3 +1,5 @@
+"""Stored responses: for a day, by key and actor."""
+
 from __future__ import annotations
 
 import threading
@@ -5,12 +7,19 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from sqlalchemy import select, update
 
 from app.db.idempotency import (
+    IdempotencyKey,
     KeyedRequest,
     PendingResponse,
+    StoredResponse,
+    StoredResponseModel,
+    delete_old_responses,
+    find_response,
     find_stored,
     has_key,
+    insert_response,
     read_progress,
     save_progress,
     store_sent,
@@ -18,9 +27,57 @@ from app.db.idempotency import (
 )
 from app.db.log import Entry, append
 from app.db.store import Store
-from app.db.stored_responses import IdempotencyKey, StoredResponse
 from app.errors import ConflictError
 from tests.unit.features.pending import keyed_request
+
+ANSWER = StoredResponse(
+    "digest", 201, {"etag": '"a"', "content-type": "text/plain"}, b"\x00body" * 9
+)
+
+
+def keep(own_store: Store, key: str, actor: str, answer: StoredResponse) -> bool:
+    with own_store.write() as session:
+        return insert_response(session, key, actor, answer)
+
+
+def find(own_store: Store, key: str, actor: str) -> StoredResponse | None:
+    with own_store.read() as session:
+        return find_response(session, key, actor)
+
+
+class TestInsertResponse:
+    def test_the_first_one_stays(self, own_store: Store) -> None:
+        assert keep(own_store, "k", "ann", ANSWER)
+        assert not keep(own_store, "k", "ann", StoredResponse("other", 200, {}, b""))
+        assert find(own_store, "k", "ann") == ANSWER
+
+    def test_another_person_may_use_the_same_key(self, own_store: Store) -> None:
+        keep(own_store, "k", "ann", ANSWER)
+        assert find(own_store, "k", "bob") is None
+
+    def test_an_expired_answer_is_not_found_and_its_key_is_free(self, own_store: Store) -> None:
+        keep(own_store, "old", "ann", ANSWER)
+        age(own_store)
+        assert find(own_store, "old", "ann") is None
+        other = StoredResponse("other", 200, {}, b"")
+        assert keep(own_store, "old", "ann", other)
+        assert find(own_store, "old", "ann") == other
+
+
+class TestDeleteOldResponses:
+    def test_only_old_ones_go(self, own_store: Store) -> None:
+        keep(own_store, "old", "ann", ANSWER)
+        age(own_store)
+        keep(own_store, "new", "ann", ANSWER)
+        with own_store.write() as session:
+            delete_old_responses(session)
+            assert list(session.scalars(select(StoredResponseModel.key))) == ["new"]
+
+
+def age(own_store: Store) -> None:
+    with own_store.write() as session:
+        session.execute(update(StoredResponseModel).values(at="2020-01-01T00:00:00"))
+
 
 RESPONSE = StoredResponse("digest", 201, {"etag": '"a"'}, b"{}")
 
@@ -79,14 +136,16 @@ class TestPendingResponse:
             run = session.execute
 
             def execute(statement: Any, *values: Any, **options: Any) -> Any:
-                statements.append(str(statement).split()[0])
+                statements.append(str(statement))
                 return run(statement, *values, **options)
 
             monkeypatch.setattr(session, "execute", execute)
             append(session, [Entry("deed", "ann", "2026-01-01T00:00:00Z", {"did": "it"})])
             before = len(statements)
         assert before > 0
-        assert statements[before:] == ["INSERT"]
+        # PostgreSQL tells other processes of the commit, too.
+        last = [text.split()[0] for text in statements[before:] if "pg_notify" not in text]
+        assert last == ["INSERT"]
 
     def test_of_a_request_without_a_key_nothing_is_stored_and_the_response_is_made_afterwards(
         self, store: Store

@@ -7,7 +7,7 @@ import pytest
 
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.cameras import cameras_table, jac_figure, score_cameras
-from app.evaluation.table import FrameRange
+from app.evaluation.result import FrameRange
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import MARKINGS, Pitch

@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.comparison import FIELDS, compare_frames, compare_tables, differing_pins
-from app.evaluation.result import FrameResult
-from app.evaluation.table import Cell, Column, Row, Table
+from app.evaluation.result import Cell, Column, FrameResult, Row, Table
 
 RESULT = FrameResult(1, 1, "g", "1.png", "m", ball=True, detections=1)
 PINS = {

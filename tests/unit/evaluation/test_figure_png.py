@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.evaluation.figure import Axis, Figure, Mark, Panel, Series
 from app.evaluation.figure_png import HEIGHT, PALETTE, WIDTH, figure_png
+from app.evaluation.result import Axis, Figure, Mark, Panel, Series
 
 LINE = Series("a", "A line", (0.0, 1.0), (0.0, 1.0))
 

@@ -10,7 +10,7 @@ from app.evaluation.bootstrap import Resamples
 from app.evaluation.evaluate import Inputs, Options, evaluate
 from app.evaluation.frame import Detection
 from app.evaluation.reference_boxes import boxes_figure, boxes_table
-from app.evaluation.table import FrameRange
+from app.evaluation.result import FrameRange
 from app.soccer.frames import Box
 
 ONE_MATCH = Resamples.draw(["m"])

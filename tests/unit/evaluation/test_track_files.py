@@ -8,9 +8,8 @@ import pytest
 
 from app.errors import DatasetFormatError, InputError
 from app.evaluation.frame_names import FrameNames
-from app.evaluation.predicted_track import PredictedTrack
 from app.evaluation.prediction_files import read_predictions
-from app.evaluation.prediction_run import ReadPredictions
+from app.evaluation.prediction_run import PredictedTrack, ReadPredictions
 from app.soccer.frames import ImageSize
 
 HEAD = "frame,time_s,x_m,y_m,z_m,sigma_m,state,cameras\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.evaluation.predicted_track import PredictedTrack
+from app.evaluation.prediction_run import PredictedTrack
 from app.evaluation.result import Evaluation
 from app.evaluation.track_scores import TrueTrack, evaluate_tracks
 

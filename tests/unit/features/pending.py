@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from app.db.idempotency import KeyedRequest, PendingResponse
+from app.db.idempotency import IdempotencyKey, KeyedRequest, PendingResponse, StoredResponse
 from app.db.session import Session, pending_response
-from app.db.stored_responses import IdempotencyKey, StoredResponse
 
 
 def keyed_request(key: str = "key", actor: str = "ann") -> PendingResponse[Any]:

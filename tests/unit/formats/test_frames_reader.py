@@ -12,8 +12,7 @@ from app.formats.frames_reader import check_grouping, read_frames
 from app.formats.report import Report
 from app.media.images import check_size, read_header
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 
 
 def size_of(data: bytes, name: str) -> ImageSize:

@@ -11,8 +11,7 @@ from app.formats.issia_reader import IssiaOptions, camera_number, open_issia
 from app.formats.report import Report
 from app.geometry.camera import Camera
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 
 
 def _xgtf(balls: dict[int, tuple[int, int]], persons: dict[int, int]) -> str:

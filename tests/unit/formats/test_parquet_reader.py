@@ -15,9 +15,8 @@ from app.formats.parquet_reader import read_parquet
 from app.formats.parquet_writer import write_parquet
 from app.formats.report import Report
 from app.geometry.camera import Camera
-from app.soccer.group import Group
+from app.soccer.group import Group, LeftOut
 from app.soccer.picture import PictureGeometry
-from app.soccer.reasons import LeftOut
 
 Solved = Callable[..., ExportRecord]
 Make = Callable[..., Group]

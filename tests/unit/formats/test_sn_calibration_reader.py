@@ -12,7 +12,7 @@ from app.formats.report import Report
 from app.formats.sn_calibration import DEFAULT_SIZE
 from app.formats.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
 from app.soccer.frames import ImageSize
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 LINE = [{"x": 0.25, "y": 0.5}, {"x": 1.0, "y": -0.125}]
 NAMED_WITH_SPACE = json.dumps(

@@ -26,8 +26,7 @@ from app.formats.sn_calibration_writer import lines_to_json, write_line_files, w
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station
 from app.soccer.pitch import MARKINGS
 from tests.cameras import write_cameras
 

@@ -9,8 +9,7 @@ import pytest
 
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 
 Write = Callable[[Any], Path]
 

@@ -14,14 +14,12 @@ from hypothesis import strategies as st
 from app.config import Settings
 from app.errors import DatasetFormatError, ImageError
 from app.formats.file_tree import Limits, files_inside
-from app.formats.folder_tree import FolderTree
 from app.formats.guess_format import guess_format
-from app.formats.match_frames import MatchFrames
-from app.formats.plain_file import read_regular_file
 from app.formats.report import Report
-from app.formats.safe_path import is_hidden
+from app.formats.safe_path import is_hidden, read_regular_file
+from app.formats.soccernet_v3 import MatchFrames
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.formats.trees import open_tree, opened_tree
+from app.formats.trees import FolderTree, open_tree, opened_tree
 from app.formats.zip_tree import ZipTree
 from app.media.object_frames import Archives
 

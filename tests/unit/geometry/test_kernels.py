@@ -20,9 +20,9 @@ KERNELS = {
 
 def test_kernels_of_several_modules_are_found() -> None:
     assert {
-        "curve_fit.minimize_curve_costs",
-        "start_kernels.aim_starts",
-        "point_kernels.keep_farthest_points",
+        "resection_kernels.minimize_curve_costs",
+        "curve_residuals.accumulate_equations",
+        "polyline.nearest_places",
     } <= set(KERNELS)
 
 

@@ -6,9 +6,9 @@ import pytest
 
 from app.errors import ShapeError
 from app.geometry.camera import Camera
-from app.geometry.smallest_singular import smallest_singular_vectors
 from app.geometry.triangulation import (
     parallax_angle,
+    smallest_singular_vectors,
     triangulate_pairs,
     triangulation_shifts,
 )

@@ -22,10 +22,9 @@ from app.features.recordings.service import get_recording
 from app.finite import json_text
 from app.formats.frame_names import frame_path_in_split
 from app.http.team import get_team
-from app.sample.truth import TRUTH, truth_to_json
+from app.sample.scene import TRUTH, truth_to_json
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from tests.drawn_balls import place, write_film
 from tests.flights import add_flight
 from tests.integration.conftest import picture

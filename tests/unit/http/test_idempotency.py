@@ -18,7 +18,7 @@ from structlog.testing import capture_logs
 
 from app.admission import release_admission
 from app.db import idempotency
-from app.db.stored_responses import StoredResponseModel, shorten_responses
+from app.db.idempotency import StoredResponseModel, shorten_responses
 from app.errors import StorageError
 from app.features.verdicts import routes as verdicts
 from app.features.verdicts.service import set_verdict

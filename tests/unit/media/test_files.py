@@ -24,7 +24,7 @@ from app.media.files import (
     read_frame,
 )
 from app.media.object_frames import Archives
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 # Left half dark, right half bright: a flip is seen.
 PICTURE = np.concatenate(

@@ -19,7 +19,7 @@ from app.config import Settings
 from app.errors import ImageError, NotFoundError, OverloadedError, TooLargeError
 from app.media import frames as module
 from app.media.frames import Frames, make_picture
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.worker_process import WorkerLimits
 
 PICTURE = np.full((90, 160, 3), 90, np.uint8)

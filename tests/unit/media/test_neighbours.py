@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.media.neighbours import neighbours
-from app.soccer.media import Media
+from app.soccer.group import Media
 
 PIXELS = np.full((64, 96, 3), 90, np.uint8)
 

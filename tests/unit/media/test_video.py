@@ -15,7 +15,7 @@ from app.media import video as video_index
 from app.media.files import decode_frame, has_index, read_frame, video_times
 from app.media.frames import Frames
 from app.media.neighbours import neighbours
-from app.soccer.media import Media
+from app.soccer.group import Media
 from tests.videos import delay_start, number_of, vary_times, write_video
 
 TICK = 512

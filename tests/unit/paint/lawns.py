@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.camera import Camera
-from app.paint.scoring import ScoredPicture
+from app.paint.search import ScoredPicture
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.jaccard import project_markings

@@ -11,12 +11,15 @@ import pytest
 from app.errors import GeometryError
 from app.paint import view_proposal
 from app.paint.propose import propose
-from app.paint.view_proposal import proposal_of
-from app.soccer.frames import ImageSize
+from app.paint.view_proposal import NOTHING_NEW, ViewProposal, beside_drawn, proposal_of
+from app.soccer.annotation import Lines, make_lines
+from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.paint_evidence import POINTS_PER_MARKING
-from app.soccer.pitch import GoalEdge, Pitch
-from app.soccer.policy import PAPER
+from app.soccer.pitch import GoalEdge, Pitch, opposite_marking
+from app.soccer.policy import PAPER, CalibrationPolicy
 from app.solving.calibrate import calibrate
+from tests.cameras import SIZE
+from tests.unit.applications import lines_of
 from tests.unit.paint.lawns import PITCH, SMALL, TRUE, drawn, lawn
 
 POLICY = PAPER.calibration
@@ -99,3 +102,63 @@ def test_a_policy_whose_lines_lie_by_the_laws_is_followed(
     monkeypatch.setattr(view_proposal, "propose", keep)
     proposal_of(lawn(drawn(TRUE, 3)), SMALL, (), PITCH, replace(POLICY, goal=goal))
     assert tried == [sought]
+
+
+SEEN = lines_of(TRUE.scaled(4 / 3, 4 / 3))
+FOUND = ViewProposal("proposed", "", SEEN, 0.9, 0.8, 0.3, 0.25, 500)
+DEFAULT_POLICY = CalibrationPolicy()
+
+
+def beside(drawn: Lines) -> ViewProposal:
+    return beside_drawn(FOUND, drawn, PITCH, SIZE, DEFAULT_POLICY)
+
+
+def only(*markings: str) -> Lines:
+    return make_lines({name: SEEN[name] for name in markings})
+
+
+def test_without_drawn_lines_all_is_proposed() -> None:
+    assert beside({}) is FOUND
+    nothing = replace(FOUND, outcome="nothing", lines={})
+    assert beside_drawn(nothing, SEEN, PITCH, SIZE, DEFAULT_POLICY) is nothing
+
+
+def test_drawn_markings_are_not_proposed_again() -> None:
+    found = beside(only("Side line right"))
+    assert found.sentence == ""
+    assert dict(found.lines) == {
+        name: points for name, points in SEEN.items() if name != "Side line right"
+    }
+    assert replace(found, lines=SEEN) == FOUND
+
+
+def test_drawn_lines_say_which_half_is_seen() -> None:
+    drawn = {
+        opposite_marking(name): SEEN[name] for name in ("Side line right", "Big rect. right main")
+    }
+    found = beside(make_lines(drawn))
+    assert found.sentence == ""
+    assert "Side line bottom" in found.lines and "Side line top" not in found.lines
+    assert found.lines["Side line bottom"] == SEEN["Side line top"]
+
+
+def test_what_is_drawn_elsewhere_is_named_and_left() -> None:
+    moved = [ImagePoint(point.x, point.y + 60.0) for point in SEEN["Big rect. right main"]]
+    drawn = make_lines({**only("Side line right"), "Big rect. right main": moved})
+    found = beside(drawn)
+    assert found.outcome == "proposed"
+    assert "“Big rect. right main” is drawn up to " in found.sentence
+    assert "Side line right" not in found.sentence
+    assert not set(drawn) & set(found.lines)
+
+
+def test_what_the_camera_does_not_see_is_named() -> None:
+    drawn = make_lines({**only("Side line right"), "Side line left": SEEN["Side line top"]})
+    assert "“Side line left” is drawn where the proposed camera does not see it" in (
+        beside(drawn).sentence
+    )
+
+
+def test_where_all_is_drawn_already_nothing_is_proposed() -> None:
+    found = beside(SEEN)
+    assert (found.outcome, dict(found.lines), found.sentence) == ("unsure", {}, NOTHING_NEW)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.formats.match_frames import ARCHIVE
+from app.formats.soccernet_v3 import ARCHIVE
 from app.sample.practice import (
     CLEAN,
     LESSONS,
@@ -17,9 +17,8 @@ from app.sample.practice import (
     practice_stage,
     write_practice,
 )
-from app.sample.scene import PRACTICE_KINDS, Scene
+from app.sample.scene import PRACTICE_KINDS, Scene, read_truth
 from app.sample.scenes import make_scene
-from app.sample.truth import read_truth
 from app.soccer.policy import PAPER
 from app.soccer.solution import Solution
 from app.solving.solve import solve

@@ -12,7 +12,7 @@ import pytest
 from app.errors import InputError
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.sample.truth import read_truth
+from app.sample.scene import read_truth
 from app.sample.write import write_sample
 from tests.scenes import make_scenes
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.soccer.media import Media, is_numbered_in_time, split_frame_number
+from app.soccer.group import Media, is_numbered_in_time, split_frame_number
 
 
 class TestCountsTime:

@@ -9,7 +9,7 @@ from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, POLICIES, CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_station, calibration_key
 from app.solving.jaccard import camera_jaccard
-from app.solving.leave_one_out import error_without
+from app.solving.score import error_without
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
 

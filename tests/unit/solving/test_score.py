@@ -1,6 +1,10 @@
+from __future__ import annotations
+
 import pytest
 
-from app.solving.score import FrameScore, score_frame, score_frames
+from app.soccer.annotation import make_lines
+from app.soccer.policy import CalibrationPolicy
+from app.solving.score import FrameScore, leave_one_out, score_frame, score_frames
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN, PITCH, click
 
@@ -28,3 +32,17 @@ class TestScoreFrame:
         assert min(found.jac) > 0.9
         assert max(found.distances_px) < 3
         assert found.challenge == pytest.approx(found.jac[0], abs=0.1)
+
+
+class TestLeaveOneOut:
+    def test_the_others_predict_a_marking_they_were_not_shown(self):
+        lines = click(MAIN, 0.5)
+        errors = dict(leave_one_out(lines, PITCH, SIZE, CalibrationPolicy()))
+        assert set(errors) == set(lines)
+        assert sorted(errors.values())[len(errors) // 2] < 5.0
+
+    def test_what_the_others_cannot_calibrate_has_no_error(self):
+        lines = click(MAIN)
+        few = make_lines({name: lines[name] for name in list(lines)[:3]})
+        errors = dict(leave_one_out(few, PITCH, SIZE, CalibrationPolicy()))
+        assert set(errors.values()) == {None}

@@ -21,7 +21,7 @@ from app.soccer.pitch import GOAL_PARTS, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.lone_frame import CROWN_SIGMA_M, INWARD_SIGMA_M
 from app.solving.paint_camera import PaintProblem, offsets_of
-from app.solving.paint_terms import CROWN, INWARD, TERMS, painted_shift
+from app.solving.paint_noise import CROWN, INWARD, TERMS, painted_shift
 from app.solving.resect import ResectionProblem
 from app.solving.tripod_pitch import PaintedFrame, TripodPitch, about_plan, find_tripod_pitch
 from tests.cameras import SIZE

@@ -421,8 +421,8 @@ class TestRefusals:
         [
             ("http://example.org", "is not encrypted"),
             ("http://127.0.0.1.example.org", "is not encrypted"),
-            ("ftp://127.0.0.1", "no address"),
-            ("https://user:pass@example.org", "no address"),
+            ("ftp://127.0.0.1", "is not the address of a server"),
+            ("https://user:pass@example.org", "is not the address of a server"),
             ("http://127.0.0.1:1", "does not answer"),
         ],
     )

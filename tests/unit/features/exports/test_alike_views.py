@@ -31,8 +31,7 @@ from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_sn_calibration
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from tests.cameras import SIZE
 from tests.unit.stores import BEHIND, MAIN
 

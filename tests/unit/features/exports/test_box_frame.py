@@ -16,8 +16,7 @@ from PIL import Image
 from app.features.exports.service import export
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 from tests.cameras import SIZE
 
 RADIUS, SIDE = 6.0, 18.0

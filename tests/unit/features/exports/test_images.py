@@ -12,8 +12,7 @@ from app.config import Settings
 from app.features.exports.images import ExportImages
 from app.media.frames import make_picture
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 
 
 @pytest.fixture

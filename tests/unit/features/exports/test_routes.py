@@ -24,8 +24,7 @@ from app.features.versions.freeze import FreezeRequest, freeze
 from app.formats.export_formats import FORMATS
 from app.media.frames import SentPicture
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from tests.waiting import SECONDS
 
 API = "/api/v1/exports"

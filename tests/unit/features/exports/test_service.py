@@ -22,7 +22,7 @@ from app.features.verdicts.service import set_verdict
 from app.formats.export_formats import options_used_by
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.soccer.policy import PAPER
 
 OF_BROADCAST = [name for name in FORMATS if name not in ("issia", "issia-3d", *TRACKS)]

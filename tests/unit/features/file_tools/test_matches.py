@@ -6,7 +6,7 @@ import pytest
 from app.errors import DatasetFormatError
 from app.features.file_tools.matches import read_matches, shares_of
 from app.formats.sn_calibration import LineFile
-from app.solving.match_model import FramePlace
+from app.solving.match_position import FramePlace
 from tests.cameras import SIZE
 
 

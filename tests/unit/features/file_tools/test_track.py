@@ -18,7 +18,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.lone_frame import CROWN_SIGMA_M, PAINT_SIZE_SIGMA_M
-from app.solving.paint_terms import CROWN, SIZES, TERMS
+from app.solving.paint_noise import CROWN, SIZES, TERMS
 from app.solving.tripod_pitch import SHARED, TripodPitch
 from app.tracking.track import FrameCamera, Track
 from tests.tracked_frames import CAMERA, frame

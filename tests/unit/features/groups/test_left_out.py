@@ -28,8 +28,7 @@ from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group, Station, View
-from app.soccer.reasons import LeftOut
+from app.soccer.group import Group, LeftOut, Station, View
 from tests.balls import seen
 from tests.cameras import SIZE
 from tests.unit.stores import OPPOSITE, drawn

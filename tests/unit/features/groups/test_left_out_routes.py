@@ -13,8 +13,7 @@ import pytest
 
 from app.features.imports.ingest import ingest
 from app.features.versions.freeze import FreezeRequest, freeze
-from app.soccer.group import Group
-from app.soccer.media import FARTHEST, Media
+from app.soccer.group import FARTHEST, Group, Media
 
 API = "/api/v1"
 DATASET = f"{API}/datasets/broadcast"

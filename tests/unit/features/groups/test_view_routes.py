@@ -22,7 +22,7 @@ from app.features.groups.view_routes import (
     get_neighbours,
 )
 from app.features.imports.ingest import ingest
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.worker_pool import PoolTask
 
 API = "/api/v1"

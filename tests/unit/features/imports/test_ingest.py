@@ -19,8 +19,7 @@ from app.features.stations.service import load_station, submit_station
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 from tests.unit.features.independent_annotations.begun import begin_take
 
 

@@ -22,8 +22,7 @@ from app.formats.report import Report
 from app.media import video as video_index
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from tests.videos import write_video
 
 SIZE = ImageSize(128, 72)

@@ -24,13 +24,13 @@ from app.features.imports.sources import FORMATS, USERS, Source, import_source
 from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned, unassigned_frames
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
-from app.formats import issia_people
+from app.formats import issia
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from tests.cameras import write_cameras
-from tests.unit.formats.test_issia_people import issia_folder
+from tests.unit.formats.test_issia import issia_folder
 
 SIZE = ImageSize(1280, 720)
 Fill = Callable[..., list[int]]
@@ -521,7 +521,7 @@ class TestLinesOfAnotherDay:
 
 
 class TestMirroredPeople:
-    """People of ISSIA's camera 2, who are mirrored in its files (``datasets.issia_people``)."""
+    """People of ISSIA's camera 2, who are mirrored in its files (``formats.issia``)."""
 
     def test_importing_again_mends_a_dataset_of_before_and_turns_nobody_twice(
         self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -539,7 +539,7 @@ class TestMirroredPeople:
             return [[box["points"]["x1"] for box in extras.boxes] for extras in every]
 
         with monkeypatch.context() as before:
-            before.setattr(issia_people, "MIRRORED", frozenset())
+            before.setattr(issia, "MIRRORED", frozenset())
             import_source(store, "old", source, store.settings)
         mirrored = people()
         again = import_source(store, "old", source, store.settings)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.db.leftovers import delete_leftovers
+from app.db.home import delete_leftovers
 from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
 from app.features.imports.upload_parts import PartWriter, begin_upload_in_parts
 from app.features.imports.upload_queries import (

@@ -26,7 +26,7 @@ from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
-from app.soccer.media import Media
+from app.soccer.group import Media
 from tests.e2e.film import write_film
 
 FIRST, GOLD = 100, 110

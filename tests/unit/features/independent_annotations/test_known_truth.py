@@ -35,10 +35,10 @@ from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze
 from app.finite import json_text
-from app.sample.truth import TRUTH, truth_to_json
+from app.sample.scene import TRUTH, truth_to_json
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.solving.jaccard import project_markings
 from tests.scenes import make_scenes
 from tests.unit.features.independent_annotations.begun import begin_for_batch, begin_take

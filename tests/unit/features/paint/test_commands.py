@@ -14,8 +14,7 @@ import pytest
 from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import ingest
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
 from tests.cameras import SIZE, looking
 from tests.unit.paint.lawns import SMALL, TRUE, drawn, lawn

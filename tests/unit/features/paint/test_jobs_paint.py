@@ -17,8 +17,7 @@ from app.features.paint import service as editing
 from app.features.paint.jobs import PAINT
 from app.features.paint.service import get_paint
 from app.features.policies.service import change_policy
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 from app.soccer.policy import TOUCHLINE
 from tests.unit.features.jobs.steps import Held, stopped_at_its_first_step
 from tests.unit.features.match_estimates.test_positions import match

@@ -14,8 +14,7 @@ from app.features.paint import jobs as proposals_job
 from app.features.paint import proposals as editing
 from app.features.paint.jobs import PROPOSALS, stop_and_forget
 from app.features.paint.proposals import get_proposals
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from tests.cameras import SIZE
 from tests.unit.features.jobs.steps import Held, stopped_at_its_first_step
 from tests.unit.features.paint.test_service import Here

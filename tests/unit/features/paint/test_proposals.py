@@ -38,8 +38,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.versions.frozen_queries import freeze_annotations, thaw_group
 from app.media.files import has_index
 from app.paint.view_proposal import ViewProposal
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from tests.cameras import SIZE
 from tests.unit.applications import lines_of
 from tests.unit.features.paint.test_service import Here

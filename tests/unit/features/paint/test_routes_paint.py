@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.features.imports.ingest import ingest
-from app.soccer.media import Media
+from app.soccer.group import Media
 from tests.waiting import SECONDS
 
 PAINT = "/api/v1/datasets/broadcast/paint"

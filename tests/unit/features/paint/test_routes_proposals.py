@@ -10,7 +10,7 @@ import cv2
 import pytest
 
 from app.features.imports.ingest import ingest
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.soccer.pitch import Pitch
 from tests.unit.paint.lawns import TRUE, drawn, lawn
 from tests.waiting import SECONDS

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.features.imports.ingest import ingest
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.soccer.pitch import Pitch
 from tests.cameras import SIZE
 from tests.unit.applications import lines_of

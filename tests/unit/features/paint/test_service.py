@@ -37,8 +37,7 @@ from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import ImagePoint
-from app.soccer.group import Group
-from app.soccer.media import Media
+from app.soccer.group import Group, Media
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.worker_pool import PoolTask

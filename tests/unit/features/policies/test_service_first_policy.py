@@ -8,8 +8,7 @@ import pytest
 
 from app.features.policies.service import first_policy
 from app.soccer.frames import ImageSize
-from app.soccer.group import Group, Station, View
-from app.soccer.media import Media
+from app.soccer.group import Group, Media, Station, View
 from app.soccer.policy import PAPER, TOUCHLINE
 
 SIZE = ImageSize(960, 540)

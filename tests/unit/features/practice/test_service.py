@@ -12,7 +12,7 @@ from app.errors import JobCancelled
 from app.features.datasets.service import get_dataset, list_datasets
 from app.features.practice.service import SampleDataset, make_sample_dataset
 from app.sample.order import SampleOrder
-from app.sample.truth import read_truth
+from app.sample.scene import read_truth
 from app.sample.write import SampleReport
 
 ORDER = SampleOrder(groups=2, seed=3, labels_only=True)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from app.evaluation.frame import Frame
-from app.evaluation.table import Table
+from app.evaluation.result import Table
 from app.features.predictions.evaluation_run import AcceptedTruth
 from app.soccer.frames import Box, ImageSize
 

@@ -11,13 +11,13 @@ import pytest
 from sqlalchemy import text, update
 from structlog.testing import capture_logs
 
-from app.db.store import Store
-from app.db.stored_responses import (
+from app.db.idempotency import (
     StoredResponse,
     StoredResponseModel,
     find_response,
     insert_response,
 )
+from app.db.store import Store
 from app.errors import DamagedError
 from app.features.datasets.service import delete_dataset, list_datasets
 from app.features.jobs.queries import NewJob, insert_job, update_job

@@ -19,8 +19,8 @@ from app.features.verdicts import service as module
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
+from app.soccer.group import REASONS
 from app.soccer.policy import PAPER
-from app.soccer.reasons import REASONS
 
 BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 

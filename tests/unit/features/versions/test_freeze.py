@@ -23,7 +23,7 @@ from app.features.versions.service import list_versions, thaw
 from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.soccer.media import Media
+from app.soccer.group import Media
 from app.soccer.policy import STRICT
 from app.soccer.split import Split
 from tests.databases import content, said_for_sqlite
