@@ -65,6 +65,8 @@ class PoolTask:
             return result.result()
         finally:
             self.leave()
+            # Of one that is given up nobody asks for the error.
+            result.cancel()
 
     def run(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import time
 from collections.abc import Iterator
@@ -141,6 +142,26 @@ class TestResultUnless:
         task = PoolTask(lambda error: error)
         assert asyncio.run(task.result_unless_client_gone(gone)) is None
         assert task.future.cancelled()
+
+    def test_nothing_is_told_of_the_end_of_a_task_that_was_given_up(
+        self, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        async def gone() -> bool:
+            return True
+
+        async def ask() -> None:
+            task = PoolTask(lambda error: error)
+            # It runs: its worker is killed later, which ends it with an error.
+            assert task.future.set_running_or_notify_cancel()
+            assert await task.result_unless_client_gone(gone) is None
+            task.future.set_exception(CancelledError())
+            await asyncio.sleep(0)
+            gc.collect()
+            await asyncio.sleep(0)
+
+        asyncio.run(ask())
+        gc.collect()
+        assert caplog.records == []
 
 
 class TestCounts:
