@@ -35,7 +35,7 @@ function Counts({ stretch: { summary, before }, old }) {
 
 /** @param {{one: RecordingJson, cameras: Cameras}} props */
 export function CameraCard({ one, cameras }) {
-	const { stretch, job, error, busy, before } = cameras;
+	const { stretch, frames, job, error, busy, before } = cameras;
 	const fresh = stretch ? stretch.drawn.filter((frame) => !stretch.summary.annotated.includes(frame)) : [];
 	const useless = stretch?.summary.unusable ?? [];
 	const shown = stretch?.summary.pitch;
@@ -47,8 +47,8 @@ export function CameraCard({ one, cameras }) {
 			${fresh.length ? html`<p role="status">${fresh.length === 1 ? `Frame ${fresh[0]} has` : `${plural(fresh.length, 'frame')} have`} lines since. Track again, and the shot follows them.</p>` : null}
 			${useless.length ? html`<p class="form__error">Frame ${useless.join(', ')} has too few lines for a camera, and was not used.</p>` : null}
 			${shown?.other ? html`
-				<p role="status">Its frames show another pitch than the match has: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}.</p>
-				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Solves the groups of this match on that pitch, and tracks the shot again; Statistics restores the size before'} onClick=${cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
+				<p role="status">Its frames show another pitch than its match has${frames ? ` (${pitchSize({ length: frames.pitch[0], width: frames.pitch[1] })})` : ''}: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}. With that size groups of the match are solved again, and the shot is tracked again.</p>
+				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Statistics restores the size before'} onClick=${cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
 			<p class="buttons">
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens its lines'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>

@@ -116,7 +116,7 @@ function Stage({ one, seconds, cameras, balls }) {
 	const { frame, address } = seen.value;
 	return html`
 		<section class="film__stage" aria-label="Frame" data-frame=${frame}>
-			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}<${CameraLines} cameras=${cameras} /><${BallOverlay} one=${one} balls=${balls} cameras=${cameras} /></div>
+			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}<${CameraLines} cameras=${cameras} /><${BallOverlay} one=${one} balls=${balls} cameras=${cameras} />${frame === wanted.value || playTrouble.value ? null : html`<p class="film__coming">Frame ${wanted.value} is on its way.</p>`}</div>
 			<p class="film__time">
 				<button class="button" type="button" aria-pressed=${speed.value !== 0} onClick=${toggleRunning}>${speed.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
 				<strong class="mono" data-timecode>${timecode(seconds(wanted.value), one.fps ?? 25)}</strong>
