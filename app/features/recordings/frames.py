@@ -28,17 +28,19 @@ LIMITS = WorkerLimits(memory=1536 * 2**20, processor=120.0, silence=120.0)
 """For one frame; where key frames are far apart, many are decoded on the way to it."""
 WAITING = 64
 """Frames that may wait; one more is told to come back."""
-BEHIND, AHEAD = 10, 4
-"""Frames that are decoded with one that is jumped to, so that steps back find them, and frames that
-are decoded before somebody asks, while one steps or plays."""
+BEHIND, MOST_BEHIND, AHEAD = 10, 64, 4
+"""Frames that are decoded with one that is jumped to, so that steps back find them; those that are decoded together for
+somebody who goes on backwards, as each of them is reached from its key frame; and frames that are decoded before somebody
+asks, while one steps or plays."""
 STEP = 6
 """Frames that are passed over at once on the way to one that nobody waits for: who asks meanwhile waits so long."""
 THUMBNAIL = 320
 """Pixels of width up to which pictures are kept in the cache: a strip shows hundreds at once."""
 MOST_OPEN = 2
 """Recordings that the process keeps open."""
-KEPT_BYTES = 96 * 2**20
-"""Of the decoded frames of each: 36 of 720p, 16 of 1080p. With all else the process stays below 400 MB."""
+KEPT_BYTES, READY_BYTES = 72 * 2**20, 24 * 2**20
+"""Of the decoded frames of each, 27 of 720p and 12 of 1080p, and of the JPEGs that wait to be asked for. With all else the
+process stays below 400 MB."""
 
 
 class RecordingFrames:
@@ -89,14 +91,31 @@ class RecordingFrames:
 
 @dataclass
 class _Open:
-    """A recording that the process keeps open; the frame that was asked for last, which way that was, and the frames
-    that are decoded before somebody asks, in their order."""
+    """A recording that the process keeps open; the frame that was asked for last, its width, how many frames in a row it
+    has gone that way (backwards: below 0), the frames that are decoded before somebody asks, in their order, and
+    those that are, as JPEG."""
 
     reader: RecordingReader
     count: int
     last: int = -1
+    width: int | None = None
     way: int = 1
     planned: list[int] = field(default_factory=list)
+    ready: OrderedDict[tuple[int, int | None], bytes] = field(default_factory=OrderedDict)
+    ready_bytes: int = 0
+
+    def has(self, number: int) -> bool:
+        """Whether a frame can be given at once."""
+        return (number, self.width) in self.ready or self.reader.has(number)
+
+    def make_ready(self, number: int) -> None:
+        """Keep a frame that is decoded as somebody will ask for it."""
+        data = _encoded(self.reader.read(number), self.width)
+        self.ready[number, self.width] = data
+        self.ready_bytes += len(data)
+        while self.ready_bytes > READY_BYTES:
+            _, oldest = self.ready.popitem(last=False)
+            self.ready_bytes -= len(oldest)
 
 
 _OPEN: OrderedDict[tuple[str, str], _Open] = OrderedDict()
@@ -117,7 +136,7 @@ def read_jpeg(path: Path, sha256: str, number: int, width: int | None, settings:
     if is_small:
         with suppress(OSError):
             return place.read_bytes()
-    data = _encoded(_read(path, sha256, number, settings), width)
+    data = _read(path, sha256, number, width, settings)
     if is_small:
         # A full disk costs the cache and no picture.
         with suppress(OSError):
@@ -132,26 +151,33 @@ def read_ahead(path: Path, sha256: str, number: int, settings: Settings) -> bool
         found = _opened(path, sha256, settings)
         if found.way > 0:
             following = range(number + 1, min(number + 1 + AHEAD, found.count))
-            found.planned = [one for one in following if not found.reader.has(one)]
-        elif not found.planned and not found.reader.has(before := max(number - BEHIND // 2, 0)):
-            found.planned = list(range(max(before - BEHIND, 0), before + 1))
+            found.planned = [one for one in following if not found.has(one)]
+        elif not found.planned:
+            together = min(max(BEHIND, -found.way), MOST_BEHIND)
+            before = max(number - together // 2, 0)
+            if not found.has(before):
+                asked_next = range(max(before - together, 0), max(number, 1))
+                found.planned = [one for one in asked_next if not found.has(one)]
         if found.planned and found.reader.prefetch(found.planned[0], STEP):
-            del found.planned[0]
+            found.make_ready(found.planned.pop(0))
         return bool(found.planned)
     return False
 
 
-def _read(path: Path, sha256: str, number: int, settings: Settings) -> Image:
+def _read(path: Path, sha256: str, number: int, width: int | None, settings: Settings) -> bytes:
     found = _opened(path, sha256, settings)
     follows = 0 < number - found.last <= 2 * AHEAD
+    found.width = width
+    is_kept = found.has(number)
     way = 1 if number >= found.last else -1
-    is_kept = found.reader.has(number)
-    if way != found.way or not (follows or is_kept):
+    if way * found.way < 0 or not (follows or is_kept):
         found.planned.clear()
+        found.way = 0
     if not follows and not is_kept:
         _read_up_to(found.reader, number)
-    found.way, found.last = way, number
-    return found.reader.read(number)
+    found.way, found.last = found.way + way, number
+    ready = found.ready.get((number, width))
+    return _encoded(found.reader.read(number), width) if ready is None else ready
 
 
 def _read_up_to(reader: RecordingReader, number: int) -> None:

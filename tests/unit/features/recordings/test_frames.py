@@ -86,6 +86,32 @@ class TestReadJpeg:
             assert shown(read_jpeg(*film, number, None, settings)) == number
             assert decoded == []
 
+    def test_the_longer_somebody_goes_back_the_more_is_decoded_together(
+        self, film: tuple[Path, str], settings: Settings, decoded: list[int]
+    ) -> None:
+        read_jpeg(*film, 119, None, settings)
+        for number in range(118, 50, -1):
+            while read_ahead(*film, number + 1, settings):
+                pass
+            assert shown(read_jpeg(*film, number, None, settings)) == number
+        turns = np.flatnonzero(np.diff(decoded) != 1)
+        assert np.diff(turns)[0] == BEHIND + 1
+        assert np.diff(turns).max() > 2 * BEHIND
+        assert len(decoded) == len(set(decoded))
+
+    def test_what_is_decoded_before_somebody_asks_is_ready_in_its_width_and_not_without_bound(
+        self, film: tuple[Path, str], settings: Settings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "READY_BYTES", 2 * len(read_jpeg(*film, 30, 100, settings)))
+        while read_ahead(*film, 30, settings):
+            pass
+        (opened,) = module._OPEN.values()
+        assert 0 < len(opened.ready) < AHEAD
+        assert sum(map(len, opened.ready.values())) == opened.ready_bytes <= module.READY_BYTES
+        assert {width for _, width in opened.ready} == {100}
+        asked = next(iter(opened.ready))[0]
+        assert read_jpeg(*film, asked, 100, settings) == opened.ready[asked, 100]
+
     def test_a_jump_back_is_made_in_steps_between_which_others_are_answered(
         self, film: tuple[Path, str], settings: Settings, decoded: list[int]
     ) -> None:
