@@ -52,6 +52,8 @@ LEAST_SUPPORTED, LEAST_OF_USUAL, LEAST_WEAKEST = 0.30, 0.6, 0.25
 MOST_ERROR_PX = 0.6
 PATCHY_WEAKEST, PATCHY_OF_USUAL, PATCHY_PX, RATHER = 0.5, 0.9, 0.3, 1.1
 """Where less has paint another camera is looked for, and how much better that has to agree."""
+AGAIN_AFTER = 4
+"""Frames after which it is sought once more farther off where that was in vain."""
 SAID_ONCE = 4.0
 """How many places on the grass the background tells."""
 MOST_BRIDGED = 20
@@ -59,9 +61,9 @@ MOST_BRIDGED = 20
 USUAL_DECAY = 0.995
 LIKELY, LIKELY_WEAKEST, MOST_UNSURE = 0.65, 0.25, 12
 """Support of a camera that is likely, also by its weakest marking, and how many of these are kept."""
-PROPOSED_AFTER, PROPOSED_EVERY, PATCHY_EVERY, CLEARLY = 3, 5, 12, 1.1
+PROPOSED_AFTER, PROPOSED_EVERY, PATCHY_EVERY, PATCHY_LEAST_OFTEN, CLEARLY = 3, 5, 12, 48, 1.1
 """Frames without paint from which on a camera is proposed, between two tries, and between two where the camera has
-paint, but less than usual: then another has to agree clearly better."""
+paint, but less than usual: ever more of them while that is in vain, and another has to agree clearly better."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,11 @@ class TrackedFrame:
     covariance: FloatArray | None = None
     error_px: float | None = None
     weakest: float = 1.0
+
+    @property
+    def score(self) -> float:
+        """How well its camera agrees with the paint, and its weakest marking with it, 0 to 1."""
+        return 0.0 if self.seen is None else self.seen.product * min(1.0, 0.5 + self.weakest)
 
 
 @dataclass(frozen=True)
@@ -143,6 +150,8 @@ class Follower:
         usual: Share of the markings with paint in the frames so far.
         tried: Frame in which a camera was proposed last, in vain.
         unsure: Frames with a camera that is likely and not certain.
+        patchy_every: Frames between two tries to propose another camera for one that has paint.
+        sought: Frame in which paint was sought farther off in vain.
     """
 
     pitch: Pitch
@@ -152,6 +161,8 @@ class Follower:
     usual: float = 0.0
     tried: int | None = None
     unsure: list[Likely] = field(default_factory=list)
+    patchy_every: int = PATCHY_EVERY
+    sought: int | None = None
 
     def start(
         self, picture: Picture, camera: Camera, covariance: FloatArray | None
@@ -178,23 +189,29 @@ class Follower:
         found = self._followed(picture, match)
         if match is None:
             # What is shown now is another picture than the one that was tried.
-            self.tried = None
+            self.tried, self.patchy_every = None, PATCHY_EVERY
         if found.outcome is TRACKED and found.seen is not None:
-            if self._is_patchy(found):
-                again = self.propose(picture, PATCHY_EVERY)
-                least = CLEARLY * found.seen.product
-                if again is not None and again.seen is not None and again.seen.product > least:
-                    found = again
-            return self._now(found)
+            return self._now(self._another(picture, found) if self._is_patchy(found) else found)
         if found.outcome is LOST or found.age >= PROPOSED_AFTER:
             again = self.propose(picture)
             if again is not None:
                 return self._now(again)
         return self._now(found)
 
+    def _another(self, picture: Picture, found: TrackedFrame) -> TrackedFrame:
+        """The frame with the camera that the paint alone says where that agrees clearly better."""
+        if self._was_tried(picture, self.patchy_every):
+            return found
+        again = self.propose(picture, self.patchy_every)
+        if again is not None and _product(again) > CLEARLY * _product(found):
+            self.patchy_every = PATCHY_EVERY
+            return again
+        self.patchy_every = min(2 * self.patchy_every, PATCHY_LEAST_OFTEN)
+        return found
+
     def propose(self, picture: Picture, every: int = PROPOSED_EVERY) -> TrackedFrame | None:
         """A frame whose camera the paint alone says; None where it does not, or was asked lately."""
-        if self.tried is not None and abs(picture.number - self.tried) < every:
+        if self._was_tried(picture, every):
             return None
         self.tried = picture.number
         try:
@@ -214,6 +231,10 @@ class Follower:
             picture.number, picture.time, TRACKED, found.camera, found.snapped, found.agreement,
             is_key=True,
         )  # fmt: skip
+
+    def _was_tried(self, picture: Picture, every: int) -> bool:
+        """Whether a camera was proposed, in vain, in one of so many frames before."""
+        return self.tried is not None and abs(picture.number - self.tried) < every
 
     def _followed(self, picture: Picture, match: BackgroundMatches | None) -> TrackedFrame:
         last = self.last
@@ -259,17 +280,25 @@ class Follower:
                 weakest = weakest_marking(picture.reading, snapped, self.pitch)
             most = reach.most_moved_px * unit * float(np.sqrt(1 + self.age))
             why = self._why_not(snapped, seen, weakest, unit, most)
-            score = seen.product * (1.0 if why is None else 0.5) * min(1.0, 0.5 + weakest)
+            outcome = TRACKED if why is None else BRIDGED
+            found = replace(
+                predicted, outcome=outcome, camera=snapped.camera, snapped=snapped, seen=seen,
+                age=0, weakest=weakest,
+            )  # fmt: skip
+            score = found.score * (1.0 if why is None else 0.5)
+            if best is not None and told is None:
+                self.sought = None if score > best_score * RATHER else picture.number
             if score > best_score * (1.0 if best is None else RATHER):
-                outcome = TRACKED if why is None else BRIDGED
-                best_score, told = score, why
-                best = replace(
-                    predicted, outcome=outcome, camera=snapped.camera, snapped=snapped, seen=seen,
-                    age=0, weakest=weakest,
-                )  # fmt: skip
-            if told is None and not self._is_patchy(best):
+                best_score, told, best = score, why, found
+            if told is None and not self._is_worth_more(best, picture):
                 break
         return best, told
+
+    def _is_worth_more(self, found: TrackedFrame | None, picture: Picture) -> bool:
+        """Whether paint is sought farther off for a camera that has paint."""
+        if self.sought is not None and abs(picture.number - self.sought) < AGAIN_AFTER:
+            return False
+        return self._is_patchy(found)
 
     def _is_patchy(self, found: TrackedFrame | None) -> bool:
         """Whether a camera has less paint, or worse, than one that is right would have."""
@@ -322,6 +351,10 @@ class Follower:
             self.usual = max(share, USUAL_DECAY * self.usual)
             self.known = [*self.known[:1], found.camera]
         return found
+
+
+def _product(frame: TrackedFrame) -> float:
+    return 0.0 if frame.seen is None else frame.seen.product
 
 
 def predicted_covariance(

@@ -26,12 +26,13 @@ from app.tracking.follow import (
     LOST,
     MOST_BRIDGED,
     NO_CAMERA,
+    RATHER,
     TRACKED,
     Follower,
     TrackedFrame,
 )
 from app.tracking.motion import BackgroundMatches, match_background, rotate_camera
-from app.tracking.picture import Picture, grey_of, read_frame, read_frames
+from app.tracking.picture import AHEAD, Picture, grey_of, read_frame, read_frames
 
 TRIALS, ASKED = 2, 4
 """Likely cameras that are followed where none is certain, and frames in which each is asked for again."""
@@ -109,9 +110,14 @@ def _follow_both_ways(
 ) -> tuple[Shot, Follower]:
     """Every frame from its neighbours, and who followed them."""
     shot, follower = _follow_on(clip, given, pitch, policy, tell)
+    first = [*shot.frames]
     for start, end in _runs(shot.frames):
         if end < len(shot.frames):
-            _follow_back(clip, shot, start, end, pitch, policy)
+            _follow_run(clip, shot, range(end - 1, start - 1, -1), pitch, policy)
+    for start, end in _runs(shot.frames):
+        # What was found backwards may be followed forwards.
+        if start > 0 and shot.frames[start - 1] is not first[start - 1]:
+            _follow_run(clip, shot, range(start, end), pitch, policy)
     _bridge(shot.frames, shot.matches)
     _drop_unconfirmed(clip, shot.frames, pitch, policy)
     return shot, follower
@@ -185,18 +191,36 @@ def _runs(frames: Sequence[TrackedFrame]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _follow_back(
-    clip: Clip, shot: Shot, start: int, end: int, pitch: Pitch, policy: CalibrationPolicy
+def _follow_run(
+    clip: Clip, shot: Shot, run: range, pitch: Pitch, policy: CalibrationPolicy
 ) -> None:
-    """Follow a run from the frame behind it to its start; what is better than before is kept."""
+    """Follow a run from the frame beside its first one; what is better than before is kept.
+
+    Where its last frame does not tie to the one behind it, one of both is wrong: it is followed on
+    for as long as it agrees better with the paint than what is there.
+
+    Args:
+        run: Numbers of its frames, in the order in which they are followed.
+    """
     frames, matches = shot.frames, shot.matches
-    later = frames[end]
+    before = frames[run[0] - run.step]
     known = [frame.camera for frame in frames if frame.is_key and frame.camera is not None]
-    follower = Follower(pitch, policy, known, later, later.seen.supported if later.seen else 0.0)
-    for picture in _backwards(clip, start, end):
-        match = matches[picture.number + 1]
-        found = follower.step(picture, None if match is None else match.reversed())
-        frames[picture.number] = _better(frames[picture.number], found)
+    follower = Follower(pitch, policy, known, before, before.seen.supported if before.seen else 0.0)
+    for picture in _from_run_on(clip, run):
+        number = picture.number
+        match = matches[number if run.step > 0 else number + 1]
+        if match is not None and run.step < 0:
+            match = match.reversed()
+        there, last = frames[number], follower.last
+        if number in run:
+            frames[number] = _better(there, follower.step(picture, match))
+            continue
+        if there.is_key or last is None or _ties(last.camera, there.camera, [match]):
+            break
+        found = follower.step(picture, match)
+        if found.outcome != TRACKED or found.score < RATHER * there.score:
+            break
+        frames[number] = found
 
 
 def _better(one: TrackedFrame, other: TrackedFrame) -> TrackedFrame:
@@ -204,10 +228,15 @@ def _better(one: TrackedFrame, other: TrackedFrame) -> TrackedFrame:
     return min(one, other, key=lambda frame: (rank[frame.outcome], frame.age))
 
 
-def _backwards(clip: Clip, start: int, end: int) -> Iterator[Picture]:
-    """Frames from before ``end`` down to ``start``."""
-    while end > start:
-        low = max(start, end - CHUNK)
+def _from_run_on(clip: Clip, run: range) -> Iterator[Picture]:
+    """The frames of a run, and those behind it, in the order of the run."""
+    if run.step > 0:
+        yield from read_frames(clip.frames(run.start))
+        return
+    end = run.start + 1
+    while end > 0:
+        least, most = (run[-1], CHUNK) if end > run[-1] else (0, AHEAD)
+        low = max(least, end - most)
         yield from reversed(list(read_frames(clip.frames(low, end))))
         end = low
 

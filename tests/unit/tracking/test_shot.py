@@ -1,0 +1,87 @@
+"""Runs of frames that are followed once more from one of their ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from app.geometry.resection import PAN, camera_from_parameters, parameters_from_camera
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
+from app.tracking.clip import Clip
+from app.tracking.follow import LOST, TRACKED, TrackedFrame
+from app.tracking.shot import Shot, _follow_run, follow_shot
+from tests.tripod_films import Film
+
+PITCH, POLICY = Pitch(), CalibrationPolicy()
+RUN = range(3, 6)
+NEAR_PX = 4.0
+
+
+@pytest.fixture(scope="module")
+def followed(film: Film, tmp_path_factory: pytest.TempPathFactory) -> tuple[Clip, Shot]:
+    """The film, and its frames as they are followed."""
+    clip = Clip.open(film.write(tmp_path_factory.mktemp("film")))
+    return clip, follow_shot(clip, {}, PITCH, POLICY)
+
+
+def lost(shot: Shot) -> Shot:
+    """A shot whose run has no cameras."""
+    frames = [
+        TrackedFrame(frame.number, frame.time, LOST) if frame.number in RUN else frame
+        for frame in shot.frames
+    ]
+    return Shot(frames, shot.matches)
+
+
+def turned(frame: TrackedFrame, clip: Clip) -> TrackedFrame:
+    """A frame whose camera looks two degrees past what it sees, and agrees with little of its paint."""
+    assert frame.camera is not None and frame.seen is not None
+    half = clip.work.diagonal / 2
+    parameters = parameters_from_camera(frame.camera, half)
+    parameters[PAN] += 0.035
+    camera = camera_from_parameters(parameters, frame.camera.principal_point, half)
+    return replace(frame, camera=camera, seen=replace(frame.seen, supported=0.3), is_key=False)
+
+
+def off_px(film: Film, clip: Clip, frame: TrackedFrame) -> float:
+    assert frame.camera is not None
+    return film.off_px(frame.number, clip.as_shown(frame.camera))
+
+
+@pytest.mark.parametrize("run", [RUN, RUN[::-1]], ids=["forwards", "backwards"])
+def test_a_run_is_followed_from_either_end(
+    followed: tuple[Clip, Shot], film: Film, run: range
+) -> None:
+    clip, shot = followed[0], lost(followed[1])
+    before = [*shot.frames]
+    _follow_run(clip, shot, run, PITCH, POLICY)
+    for number in RUN:
+        assert shot.frames[number].outcome == TRACKED
+        assert off_px(film, clip, shot.frames[number]) < NEAR_PX
+    # Its last frame ties to the one behind it: nothing else is touched.
+    for number in set(range(len(before))) - set(RUN):
+        assert shot.frames[number] is before[number]
+
+
+@pytest.mark.parametrize("run", [RUN, RUN[::-1]], ids=["forwards", "backwards"])
+def test_wrong_cameras_behind_a_run_give_way_to_those_that_agree_better(
+    followed: tuple[Clip, Shot], film: Film, run: range
+) -> None:
+    clip, shot = followed[0], lost(followed[1])
+    behind = run[-1] + run.step
+    wrong = turned(shot.frames[behind], clip)
+    assert off_px(film, clip, wrong) > 5 * NEAR_PX
+    shot.frames[behind] = wrong
+    _follow_run(clip, shot, run, PITCH, POLICY)
+    assert shot.frames[behind].outcome == TRACKED
+    assert off_px(film, clip, shot.frames[behind]) < NEAR_PX
+
+
+def test_an_annotated_frame_never_gives_way(followed: tuple[Clip, Shot]) -> None:
+    clip, shot = followed[0], lost(followed[1])
+    key = replace(turned(shot.frames[RUN.stop], clip), is_key=True)
+    shot.frames[RUN.stop] = key
+    _follow_run(clip, shot, RUN, PITCH, POLICY)
+    assert shot.frames[RUN.stop] is key
