@@ -14,7 +14,7 @@ from html import escape
 from pathlib import Path
 
 from app.canonical import digest_of
-from app.folders import own_folder
+from app.config import own_folder
 from app.http.headers import content_security_policy
 
 FOLDER = "built"
