@@ -19,24 +19,18 @@ from app import serve as service
 from app.errors import NotFoundError, ReviewError
 from app.features.batches import commands as batches
 from app.features.datasets import commands as datasets
-from app.features.exports import commands as files
-from app.features.file_tools import commands as lines
-from app.features.integrity import commands as backup
-from app.features.integrity import commands as doctor
+from app.features.exports import commands as exports
+from app.features.file_tools import commands as file_tools
+from app.features.integrity import commands as integrity
 from app.features.maintenance import commands as maintenance
-from app.features.match_estimates import commands as picture
-from app.features.match_estimates import commands as pitch
-from app.features.match_estimates import commands as positions
-from app.features.match_estimates import noise_commands as noise
-from app.features.match_estimates import noise_commands as rig
+from app.features.match_estimates import commands as match_estimates
 from app.features.paint import commands as paint
-from app.features.paint import commands as propose
-from app.features.people import commands as users
-from app.features.policies import commands as policy
-from app.features.practice import commands as sample
+from app.features.people import commands as people
+from app.features.policies import commands as policies
+from app.features.practice import commands as practice
 from app.features.predictions import commands as predictions
 from app.features.predictions import evaluation_commands as evaluation
-from app.features.solve import commands as solving
+from app.features.solve import commands as solve
 from app.features.verdicts import commands as verdicts
 from app.features.versions import commands as versions
 from app.finite import quoted
@@ -74,34 +68,27 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-PARTS = (
+for part in (
     service,
-    sample,
-    files,
-    solving,
-    rig,
+    practice,
+    exports,
+    solve,
     verdicts,
-    lines,
-    propose,
-    noise,
+    file_tools,
     paint,
-    pitch,
-    positions,
-    picture,
+    match_estimates,
     versions,
     evaluation,
     predictions,
-    doctor,
+    integrity,
     maintenance,
-    backup,
     cluster,
-)
-for part in PARTS:
+):
     app.add_typer(part.commands)
 app.add_typer(datasets.commands, name="datasets")
 app.add_typer(batches.commands, name="batch")
-app.add_typer(policy.commands, name="policy")
-app.add_typer(users.commands, name="users")
+app.add_typer(policies.commands, name="policy")
+app.add_typer(people.commands, name="users")
 
 
 def _print_version(wanted: bool) -> None:

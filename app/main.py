@@ -57,19 +57,16 @@ from app.http import openapi
 from app.http.access import Access
 from app.http.bodies import MAX_JSON_BYTES
 from app.http.errors import install_handlers
-from app.http.headers import SecurityHeaders
+from app.http.headers import KnownHosts, SameOrigin, SecurityHeaders
 from app.http.idempotency import Idempotency
 from app.http.metrics import SharedNumbers, install_metrics
 from app.http.openapi import describe
-from app.http.origin import KnownHosts, SameOrigin
-from app.http.pages import install_pages
+from app.http.pages import STATIC, Site, install_pages
 from app.http.request_limits import THREADS, ClassLimiters
 from app.http.request_log import RequestLog
-from app.http.requests import HeadAsGet, OneLength, OneRange
+from app.http.requests import HeadAsGet, OneLength, OneRange, refuse_unknown_parameters
 from app.http.route import Gate, Route, answer_no_route, require_permissions
 from app.http.services import Services
-from app.http.site import STATIC, Site
-from app.http.strict_parameters import refuse_unknown_parameters
 from app.http.team import Team, allowed_hosts
 
 PREFIX = "/api/v1"

@@ -59,10 +59,9 @@ def serve(
     _require_safe(settings)
     from app.db.dialects.dialect import dialect_of, require_processes
     from app.db.locks import server_lock
+    from app.features.maintenance.upkeep import file_sizes
     from app.features.people.service import require_no_people
-    from app.features.upkeep.service import file_sizes
-    from app.http.server import listen, run
-    from app.http.web_processes import serve_with
+    from app.http.server import listen, run, serve_with
     from app.log import log_to_stderr
     from app.main import create_app
     from app.workers.executors import server_pool
@@ -92,13 +91,13 @@ def serve(
 
 def _require_safe(settings: Settings) -> None:
     """Refuse to serve where strangers could come in, or passwords would be read on their way."""
-    from app.features.maintenance.service import exposure_of
+    from app.features.maintenance.service import exposure_warning
     from app.features.people.sign_on_rules import read_rules
     from app.mail import read_mail_server
 
     read_rules(settings)
     read_mail_server(settings)
-    problem = exposure_of(settings)
+    problem = exposure_warning(settings)
     if problem is not None:
         raise typer.BadParameter(problem)
 

@@ -65,10 +65,10 @@ class Session(Connection):
     def rows(
         self, kind: type[Row], statement: Executable, values: Mapping[str, Any] | None = None
     ) -> Sequence[Row]:
-        """What a statement finds that asks for all columns of a table.
+        """What a statement finds that asks for all columns of a table, or for those of a named tuple.
 
         Args:
-            kind: The table; a row reads as its model does, and follows no changes.
+            kind: The table or named tuple; a row reads as that does, and follows no changes.
             statement: What is asked.
             values: Of its parameters.
         """

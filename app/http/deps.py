@@ -15,7 +15,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.people.visibility_queries import Visibility
 from app.finite import MAX_ID
-from app.http.access import login_of, visibility_of, whole_visibility_of
+from app.http.access import current_login, current_visibility, current_whole_visibility
 from app.http.errors import PreconditionRequiredError
 from app.http.services import Services
 from app.soccer.actors import LOCAL_USER, script_name
@@ -56,7 +56,7 @@ async def get_actor(
     Raises:
         InputError: The name cannot be one, or a person is known who would hide behind it.
     """
-    login = login_of(request.scope)
+    login = current_login(request.scope)
     if login is not None:
         if name is not None:
             raise InputError(
@@ -70,12 +70,12 @@ async def get_actor(
 
 async def get_visibility(request: Request) -> Visibility:
     """What whoever asks sees."""
-    return visibility_of(request.scope)
+    return current_visibility(request.scope)
 
 
 async def get_whole_visibility(request: Request) -> Visibility:
     """What whoever asks sees and nothing of which is hidden from them."""
-    return whole_visibility_of(request.scope)
+    return current_whole_visibility(request.scope)
 
 
 async def require_if_match(

@@ -1,14 +1,16 @@
-"""Which HTTP status belongs to which error, and nothing else knows."""
+"""HTTP status and document of each error; a stale change gets the current state."""
 
 from __future__ import annotations
 
 import errno
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import structlog
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from app.errors import (
@@ -31,12 +33,18 @@ from app.errors import (
     TooManyPointsError,
     TooManyTriesError,
 )
-from app.http.access import visibility_of
-from app.http.event_schemas import PresenceDocument
+from app.http.access import current_visibility
 from app.http.headers import SCHEME as BEARER
-from app.http.headers import bearer_of
-from app.http.problem import SCHEME, TITLES, FieldProblem, make_problem, problem_response
-from app.http.strict_parameters import UNKNOWN, sentence_about
+from app.http.headers import bearer_token
+from app.http.problem import (
+    SCHEME,
+    TITLES,
+    FieldProblem,
+    PresenceDocument,
+    make_problem,
+    problem_response,
+)
+from app.http.requests import UNKNOWN, sentence_about
 
 log = structlog.get_logger("touchline.api")
 
@@ -60,6 +68,39 @@ STATUSES: tuple[tuple[type[ReviewError], int], ...] = (
 RETRY_SECONDS = "5"
 
 
+_OBJECT, _LIST = "must be an object", "must be a list"
+_WHOLE, _NUMBER = "must be a whole number", "must be a number"
+_PLAIN = {
+    "dict_type": _OBJECT,
+    "model_type": _OBJECT,
+    "model_attributes_type": _OBJECT,
+    "dataclass_type": _OBJECT,
+    "list_type": _LIST,
+    "tuple_type": _LIST,
+    "none_required": "must be null",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "string_type": "must be a text",
+    "string_too_short": "must have {min_length} characters or more",
+    "string_too_long": "must have {max_length} characters or less",
+    "too_short": "must have {min_length} items or more, and has {actual_length}",
+    "too_long": "must have {max_length} items or less, and has {actual_length}",
+    "int_type": _WHOLE,
+    "int_parsing": _WHOLE,
+    "int_from_float": _WHOLE,
+    "float_type": _NUMBER,
+    "float_parsing": _NUMBER,
+    "finite_number": "must be a finite number",
+    "greater_than": "must be more than {gt}",
+    "greater_than_equal": "must be {ge} or more",
+    "less_than": "must be less than {lt}",
+    "less_than_equal": "must be {le} or less",
+    "missing": "is missing",
+    "string_pattern_mismatch": "has characters that are not allowed here, or lacks some",
+}
+"""What is said instead of the framework's words, which are Python's."""
+
+
 class PreconditionRequiredError(ReviewError):
     """A change without If-Match: it could overwrite what its sender never saw."""
 
@@ -77,7 +118,7 @@ class StaleStateError(ReviewError):
         self.etag = error.current_etag
 
 
-def status_of(error: ReviewError) -> int:
+def http_status(error: ReviewError) -> int:
     """The HTTP status of an error of the tree."""
     special = {PreconditionRequiredError: 428, StaleStateError: 412}
     if type(error) in special:
@@ -105,10 +146,10 @@ def install_handlers(app: FastAPI) -> None:
 
 async def _review_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ReviewError)
-    status = status_of(error)
+    status = http_status(error)
     hint = error.hint
     if isinstance(error, NotFoundError) and error.known:
-        hint = hint or error.nearest(visibility_of(request.scope).sees)
+        hint = hint or error.nearest(current_visibility(request.scope).sees)
     problem = make_problem(
         status,
         error.message,
@@ -121,7 +162,7 @@ async def _review_error(request: Request, error: Exception) -> Response:
     if isinstance(error, TooManyTriesError):
         headers["Retry-After"] = str(error.seconds)
     if status == 401:
-        headers["WWW-Authenticate"] = SCHEME if bearer_of(request.scope) is None else BEARER
+        headers["WWW-Authenticate"] = SCHEME if bearer_token(request.scope) is None else BEARER
     current = None
     if isinstance(error, StaleStateError):
         headers["ETag"], current = error.etag, error.current
@@ -183,39 +224,6 @@ def _problem_sentence(request: Request, detail: dict[str, Any]) -> str:
     return text[:1].lower() + text[1:]
 
 
-_OBJECT, _LIST = "must be an object", "must be a list"
-_WHOLE, _NUMBER = "must be a whole number", "must be a number"
-_PLAIN = {
-    "dict_type": _OBJECT,
-    "model_type": _OBJECT,
-    "model_attributes_type": _OBJECT,
-    "dataclass_type": _OBJECT,
-    "list_type": _LIST,
-    "tuple_type": _LIST,
-    "none_required": "must be null",
-    "bool_type": "must be true or false",
-    "bool_parsing": "must be true or false",
-    "string_type": "must be a text",
-    "string_too_short": "must have {min_length} characters or more",
-    "string_too_long": "must have {max_length} characters or less",
-    "too_short": "must have {min_length} items or more, and has {actual_length}",
-    "too_long": "must have {max_length} items or less, and has {actual_length}",
-    "int_type": _WHOLE,
-    "int_parsing": _WHOLE,
-    "int_from_float": _WHOLE,
-    "float_type": _NUMBER,
-    "float_parsing": _NUMBER,
-    "finite_number": "must be a finite number",
-    "greater_than": "must be more than {gt}",
-    "greater_than_equal": "must be {ge} or more",
-    "less_than": "must be less than {lt}",
-    "less_than_equal": "must be {le} or less",
-    "missing": "is missing",
-    "string_pattern_mismatch": "has characters that are not allowed here, or lacks some",
-}
-"""What is said instead of the framework's words, which are Python's."""
-
-
 def _pointer_of_location(location: Sequence[int | str]) -> str:
     """JSON pointer (RFC 6901) of the place; the first part says body, query or header."""
     parts = [part for part in location[1:] if part != "[key]"]
@@ -231,3 +239,16 @@ async def _http_exception(request: Request, error: Exception) -> Response:
     }.get(error.status_code, TITLES.get(error.status_code, ("", "the request failed"))[1])
     problem = make_problem(error.status_code, detail)
     return problem_response(problem, error.headers)
+
+
+@contextmanager
+def current_state(load: Callable[[], BaseModel]) -> Iterator[None]:
+    """Turn a ``StaleRevisionError`` into one that carries the present document.
+
+    Args:
+        load: Reads the present document; called only when it is needed.
+    """
+    try:
+        yield
+    except StaleRevisionError as error:
+        raise StaleStateError(error, load().model_dump_json()) from error

@@ -12,8 +12,7 @@ from fastapi.responses import StreamingResponse
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import reads_blind
 from app.http.deps import AppServices, SeesWhole
-from app.http.event_schemas import EVENTS
-from app.http.events import Listener, first_event
+from app.http.events import EVENTS, Listener, first_event
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import STREAMS, limit

@@ -19,7 +19,7 @@ from time import monotonic
 
 import structlog
 from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from app.db.store import Store
 from app.errors import OverloadedError, StorageError
@@ -37,16 +37,9 @@ from app.features.queue.changes import (
     read_solved_since,
 )
 from app.http.documents import json_of
-from app.http.event_schemas import (
-    DatasetEvent,
-    GroupEvent,
-    MaintenanceEvent,
-    PresenceDocument,
-    WorkEvent,
-)
+from app.http.problem import PresenceDocument
 
 log = structlog.get_logger("touchline.events")
-
 PAUSE = 0.05
 """Seconds between two looks at the log while commits follow each other."""
 POLL = 2.0
@@ -61,10 +54,53 @@ RETRY_MS = 1000
 """How long a browser waits before it comes back."""
 PING_SECONDS = 15.0
 """Between two words to a listener whom there is nothing to tell, lest a proxy thinks it gone."""
-
-
 _ID = re.compile(rb"^id: \d+$", re.MULTILINE)
 """How an event says its id."""
+
+
+class GroupEvent(BaseModel):
+    """A group has changed; whoever shows it under another ETag reads it again."""
+
+    group: int
+    dataset: str | None
+    etag: str | None
+    kind: str = Field(
+        description="What happened: a kind as in the history of the group, or `solved`."
+    )
+    actor: str | None
+
+
+class DatasetEvent(BaseModel):
+    """A dataset as a whole has changed: its policy, its groups, or whether it exists."""
+
+    dataset: str | None = Field(description="Name of the dataset; null when it is deleted.")
+    kind: str
+    actor: str | None
+
+
+class WorkEvent(BaseModel):
+    """A group of a batch was opened, left, taken over or handed in."""
+
+    batch: int
+    group: int
+    dataset: str | None
+    here: list[PresenceDocument] = Field(description="People who have the group open now.")
+
+
+class MaintenanceEvent(BaseModel):
+    """The notice of maintenance is another one."""
+
+    banner: Banner | None = Field(description="Null: it was taken away.")
+
+
+EVENTS: dict[str, type[BaseModel]] = {
+    "group": GroupEvent,
+    "dataset": DatasetEvent,
+    "job": JobDocument,
+    "work": WorkEvent,
+    "maintenance": MaintenanceEvent,
+}
+"""What the data of each kind of event is."""
 
 
 @dataclass

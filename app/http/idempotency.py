@@ -34,8 +34,8 @@ from app.db.idempotency import (
 from app.db.store import Store
 from app.errors import BusyError, OverloadedError, StorageError
 from app.http.deps import ACTOR_HEADER
+from app.http.documents import KEYED_REQUEST, stored_form
 from app.http.problem import make_problem, problem_response
-from app.http.respond import KEYED_REQUEST, stored_form
 
 log = structlog.get_logger("touchline.api")
 

@@ -20,7 +20,7 @@ from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentato
 
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.upkeep.service import Home, read_home
+from app.features.maintenance.upkeep import Home, read_home
 from app.http.events import Counts
 from app.http.pages import ELSEWHERE
 from app.http.request_limits import ClassLimiters

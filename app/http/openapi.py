@@ -13,12 +13,12 @@ from fastapi.openapi.utils import get_fields_from_routes, get_openapi
 from pydantic import BaseModel
 from starlette.responses import JSONResponse
 
-from app.http.cookies import SESSION
-from app.http.event_schemas import EVENTS
+from app.http.events import EVENTS
+from app.http.headers import SESSION
 from app.http.permissions import Action, Where, may
 from app.http.problem import Problem
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
-from app.http.route import Route, routes_of
+from app.http.route import Route, list_routes
 
 Schema = Mapping[str, Any]
 _DEEP = 12
@@ -220,7 +220,7 @@ def _make_document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=[{"name": name, "description": text} for name, text in TAGS.items()],
     )
-    routes = dict(routes_of(app))
+    routes = dict(list_routes(app))
     _complete_operations(document, routes)
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):

@@ -27,7 +27,7 @@ from app.features.people.ownership import (
 )
 from app.features.people.ownership import OwnedKind as OwnedKind
 from app.features.people.roles import Action as Action
-from app.features.people.roles import DatasetRoles, Role, require
+from app.features.people.roles import DatasetRoles, Role, require_permission
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.fields import reads_hidden_work
 from app.finite import MAX_ID, quoted
@@ -106,7 +106,7 @@ def open_to_all(endpoint: E) -> E:
     return _mark_permission(OPEN)(endpoint)
 
 
-def permission_of(endpoint: Callable[..., Any]) -> Permission | None:
+def find_permission(endpoint: Callable[..., Any]) -> Permission | None:
     """Who may ask a route, by the function that answers; None: nobody has said."""
     found: Permission | None = getattr(endpoint, _PERMISSION, None)
     return found
@@ -199,7 +199,7 @@ def require_allowed(store: Store, subject: RequestSubject, login: Login) -> list
     return owned
 
 
-def missing(store: Store, owned: list[OwnedMention]) -> NotFoundError | None:
+def missing_error(store: Store, owned: list[OwnedMention]) -> NotFoundError | None:
     """That something is not there of what a request names, or not for its reader; both sound alike."""
     for item in owned:
         named = item.mention.named
@@ -251,22 +251,22 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
     if roles.is_admin or action is None:
         return
     if where is Where.EVERYWHERE or _names_operator_folder(subject):
-        require(roles.everywhere, action, ALL)
+        require_permission(roles.everywhere, action, ALL)
     elif where is Where.OWN and roles.limited:
-        require(Role.NONE, action, ALL)
+        require_permission(Role.NONE, action, ALL)
     elif not subject.mentions and action is Action.ADMINISTER:
-        require(roles.everywhere, action)
+        require_permission(roles.everywhere, action)
     elif not subject.mentions and not (where is Where.SOMEWHERE and action is Action.READ):
-        require(roles.highest, action)
+        require_permission(roles.highest, action)
     for item in owned:
         if item.mention.named.kind is OwnedKind.NEW_DATASET:
             _require_may_make(item.ownership, roles, action)
         elif item.ownership is not None:
             here = HERE if roles.single and item.ownership.dataset is not None else ""
             role = role_at(item.ownership, roles, login.owner)
-            require(role, action, here)
+            require_permission(role, action, here)
             if reads_hidden_work_of(subject):
-                require(role, Action.REVIEW, here)
+                require_permission(role, Action.REVIEW, here)
             whole = item.mention.named.kind in WHOLE or permission.whole
             if whole and item.ownership.dataset in roles.blind:
                 raise ForbiddenError(
@@ -308,9 +308,9 @@ def _require_may_make(present: Ownership | None, roles: DatasetRoles, action: Ac
     """What is made where it is not there; whoever cannot know that it is, is not told."""
     role = roles.everywhere if present is None else roles.role_in(present.dataset)
     if role is not Role.NONE or present is None:
-        require(role, action, HERE if present is not None and roles.single else ALL)
+        require_permission(role, action, HERE if present is not None and roles.single else ALL)
         return
-    require(roles.everywhere, action, ALL)
+    require_permission(roles.everywhere, action, ALL)
     raise ForbiddenError(
         "there is a dataset of that name, in which you have no role", hint="Choose another name."
     )

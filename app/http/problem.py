@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 from pydantic import BaseModel, Field
 from starlette.responses import Response
 
-from app.http.event_schemas import PresenceDocument
+from app.http.documents import Document
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -19,6 +20,13 @@ class FieldProblem(BaseModel):
 
     pointer: str = Field(description="JSON pointer into the body, or `/name` of a parameter.")
     detail: str
+
+
+class PresenceDocument(Document):
+    """Somebody who has a group of a batch open."""
+
+    person: str
+    since: datetime
 
 
 class Problem(BaseModel):

@@ -24,8 +24,8 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import Scope
 
 from app.admission import hold_admission
-from app.http.access import login_of
-from app.http.origin import SAFE_METHODS
+from app.http.access import current_login
+from app.http.headers import SAFE_METHODS
 from app.http.problem import make_problem, problem_response
 
 E = TypeVar("E", bound=Callable[..., Any])
@@ -305,7 +305,7 @@ class ClassLimiters:
 
 
 @asynccontextmanager
-async def turn(door: ClassLimiter | None, scope: Scope) -> AsyncIterator[Response | None]:
+async def wait_for_turn(door: ClassLimiter | None, scope: Scope) -> AsyncIterator[Response | None]:
     """A request's turn, once it comes; what its sender is told instead where too many wait already.
 
     The turn ends when the answer is there, for sending it to a slow client takes nobody's place; and
@@ -314,7 +314,7 @@ async def turn(door: ClassLimiter | None, scope: Scope) -> AsyncIterator[Respons
     if door is None:
         yield None
         return
-    login = login_of(scope)
+    login = current_login(scope)
     who = "" if login is None else login.name
     if not await door.enter(who):
         yield _busy_response(scope, door.lane)

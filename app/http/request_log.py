@@ -20,7 +20,7 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.http.access import ASKS
-from app.http.origin import SAFE_METHODS
+from app.http.headers import SAFE_METHODS
 from app.http.problem import make_problem, problem_response
 from app.http.team import Team
 from app.soccer.actors import LOCAL_USER

@@ -1,9 +1,20 @@
-"""Requests brought into the one form that the routes expect: one length, one Range, HEAD as GET."""
+"""Requests in one form: one length, one Range, HEAD as GET, and no unknown or repeated parameters."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import Any, get_args
 
+from fastapi import Request
+from fastapi.dependencies.utils import get_dependant, get_flat_params
+from fastapi.exceptions import RequestValidationError
+from fastapi.params import Path, Query
+from fastapi.routing import APIRoute
+from pydantic import TypeAdapter
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -11,6 +22,18 @@ from app.http.problem import make_problem, problem_response
 
 _HEAD = "touchline.head"
 _ONE_RANGE = re.compile(rb"bytes=(\d{1,18}-\d{0,18}|-\d{1,18})")
+
+
+UNKNOWN = "extra_forbidden"
+"""What the framework calls a field that a body does not have."""
+REPEATED = "repeated"
+"""What we call a parameter that is there more than once."""
+_ONCE = "is there more than once; no parameter is a list"
+_NO_NUMBER = "must be a number in plain digits"
+_INT = re.compile(r"0|-?[1-9][0-9]*")
+_FLOAT = re.compile(r"-?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?")
+_FIELDS: dict[Callable[..., Any], frozenset[str]] = {}
+"""Of each route by its function, once somebody misspelt one."""
 
 
 class HeadAsGet:
@@ -89,3 +112,86 @@ class OneRange:
                 await send(message)
 
         await self.app(scope, receive, send_or_refuse)
+
+
+async def refuse_unknown_parameters(request: Request) -> None:
+    """Refuse a query parameter that its route does not read, or of which it would read one alone.
+
+    Raises:
+        RequestValidationError: There is one; a misspelt ``dry_run`` must not become a deed. Or a number
+            is spelled as Python's ``int`` reads it and nobody writes it: ``1_0``, ``+1``, `` 1``.
+    """
+    route = request.scope["route"]
+    known = _parameter_names(route)
+    given = Counter(name for name, _ in request.query_params.multi_items())
+    problems = [
+        {"type": REPEATED if name in known else UNKNOWN, "loc": ("query", name), "msg": _ONCE}
+        for name, times in given.items()
+        if name not in known or times > 1
+    ]
+    for place, name, spelling in _number_parameters(route.path_format, route.endpoint):
+        sent = request.path_params if place == "path" else request.query_params
+        if name in sent and not spelling.fullmatch(str(sent[name])):
+            problems.append({"type": "value_error", "loc": (place, name), "msg": _NO_NUMBER})
+    if problems:
+        raise RequestValidationError(problems)
+
+
+def sentence_about(request: Request, location: tuple[int | str, ...]) -> str:
+    """What to say of a name that nobody knows, at its place in the request."""
+    place, name = location[0], str(location[-1])
+    route = request.scope["route"]
+    known = _parameter_names(route) if place == "query" else _body_field_names(route)
+    what = "parameter" if place == "query" else "field"
+    nearest = get_close_matches(name, known, n=1)
+    meant = f"; did you mean {nearest[0]}?" if nearest else ""
+    return f"there is no such {what}{meant}"
+
+
+def _parameter_names(route: APIRoute) -> frozenset[str]:
+    return _names_read_by_endpoint(route.path_format, route.endpoint)
+
+
+@lru_cache(maxsize=256)
+def _names_read_by_endpoint(path: str, endpoint: Callable[..., Any]) -> frozenset[str]:
+    dependant = get_dependant(path=path, call=endpoint)
+    found = get_flat_params(dependant)
+    return frozenset(item.alias for item in found if isinstance(item.field_info, Query))
+
+
+@lru_cache(maxsize=256)
+def _number_parameters(
+    path: str, endpoint: Callable[..., Any]
+) -> tuple[tuple[str, str, re.Pattern[str]], ...]:
+    """Place, name and spelling of each parameter of a route that is a number."""
+    found = []
+    for item in get_flat_params(get_dependant(path=path, call=endpoint)):
+        info, kind = item.field_info, item.field_info.annotation
+        place = "query" if isinstance(info, Query) else "path" if isinstance(info, Path) else ""
+        kinds = {kind, *get_args(kind)}
+        if place and kinds & {int, float} and bool not in kinds:
+            found.append((place, item.alias, _FLOAT if float in kinds else _INT))
+    return tuple(found)
+
+
+def _body_field_names(route: APIRoute) -> frozenset[str]:
+    """Every name that stands anywhere in the body of a route."""
+    if route.body_field is None:
+        return frozenset()
+    if route.endpoint not in _FIELDS:
+        body: Any = route.body_field.field_info.annotation
+        # To make a schema takes milliseconds, in which nobody is answered.
+        _FIELDS[route.endpoint] = frozenset(_property_names(TypeAdapter(body).json_schema()))
+    return _FIELDS[route.endpoint]
+
+
+def _property_names(schema: Any) -> Iterator[str]:
+    if isinstance(schema, dict):
+        properties = schema.get("properties")
+        if isinstance(properties, dict):
+            yield from properties
+        for part in schema.values():
+            yield from _property_names(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            yield from _property_names(part)

@@ -21,7 +21,7 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from app.features.people.logins import Login
-from app.http.access import Access, actor_of
+from app.http.access import Access, actor_name
 from app.http.bodies import (
     BYTES,
     MAX_STRANGERS_BYTES,
@@ -31,10 +31,10 @@ from app.http.bodies import (
     require_bytes,
     require_json_type,
 )
+from app.http.headers import SAFE_METHODS
 from app.http.idempotency import Idempotency, RequestDigest
-from app.http.origin import SAFE_METHODS
-from app.http.permissions import OwnedMention, Permission, RequestSubject, permission_of
-from app.http.request_limits import ClassLimiters, request_class, turn
+from app.http.permissions import OwnedMention, Permission, RequestSubject, find_permission
+from app.http.request_limits import ClassLimiters, request_class, wait_for_turn
 from app.soccer.actors import LOCAL_USER
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -71,7 +71,7 @@ class Route(APIRoute):
     permission: Permission
 
     def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any):
-        permission = permission_of(endpoint)
+        permission = find_permission(endpoint)
         if permission is None:
             raise TypeError(f"{path}: say who may ask it, with @may below the route")
         self.permission = permission
@@ -153,7 +153,7 @@ class Route(APIRoute):
         return await gate.idempotency.answer(
             request,
             digest,
-            actor_of(request.scope, LOCAL_USER),
+            actor_name(request.scope, LOCAL_USER),
             hidden or _hides_nothing,
             partial(self._answer_within_limits, gate, read, handler),
         )
@@ -181,7 +181,7 @@ class Route(APIRoute):
         self, gate: Gate, request: Request, handler: Handler
     ) -> Response:
         door = gate.doors.of(self.lane, request.scope)
-        async with turn(door, request.scope) as refusal:
+        async with wait_for_turn(door, request.scope) as refusal:
             return refusal or await handler(request)
 
 
@@ -243,7 +243,7 @@ def require_permissions(app: FastAPI) -> None:
             raise TypeError(f"{context.path}: make it by a router with route_class=Route")
 
 
-def routes_of(app: FastAPI) -> Iterator[tuple[str, Route]]:
+def list_routes(app: FastAPI) -> Iterator[tuple[str, Route]]:
     """Every route of an application, by its methods and its address."""
     for context in iter_route_contexts(app.routes):
         if isinstance(context.original_route, Route):

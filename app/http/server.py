@@ -1,20 +1,31 @@
-"""The server process: one socket, one uvicorn."""
+"""Server processes: one socket, and one uvicorn or several web processes behind it."""
 
 from __future__ import annotations
 
 import errno
 import gc
+import os
+import signal
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Thread
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+from tempfile import TemporaryDirectory
+from threading import Event, Thread
+from typing import Any
 
+import structlog
 import uvicorn
 from fastapi import FastAPI
+from prometheus_client.multiprocess import mark_process_dead
 
+from app.config import Settings
 from app.errors import InputError
 from app.http.connections import Connection
+from app.http.metrics import MULTIPROCESS
 from app.solving.solve import warm_up
 
 WAITING = 256
@@ -28,9 +39,19 @@ for one answer, and Python's own 5 ms add up."""
 
 ANSWER_SECONDS = 8
 """So long open requests are answered by a server that stops; it has ended two seconds later."""
-USUAL = (700, 10, 100)
+GC_THRESHOLDS = (700, 10, 100)
 """New objects before the collector looks at them, and how often it looks at older ones, as Python has it; but
 at all of them a tenth as often: that takes 40 ms when caches are full, and nobody is answered meanwhile."""
+
+
+log = structlog.get_logger("touchline")
+ServeUntilStopped = Callable[[Settings, socket.socket], None]
+"""Serves until its process is told to stop."""
+POLL_SECONDS = 0.2
+RESTART_SECONDS = 1.0
+"""Before a process is started in the place of one that died."""
+STOP_SECONDS = 30.0
+"""So long a process may take to stop."""
 
 
 @contextmanager
@@ -75,14 +96,14 @@ def run(app: FastAPI, server: socket.socket) -> None:
 
 
 def settle() -> None:
-    """Load the solver, and then count what is there among what stays; what comes now is as ``USUAL``.
+    """Load the solver, and then count what is there among what stays; what comes now is as ``GC_THRESHOLDS``.
 
     A full collection would walk through all of it: 0.12 s in which nobody is answered, each time.
     """
     warm_up()
     gc.collect()
     gc.freeze()
-    gc.set_threshold(*USUAL)
+    gc.set_threshold(*GC_THRESHOLDS)
 
 
 def make_server(app: FastAPI) -> Server:
@@ -122,3 +143,96 @@ class Server(uvicorn.Server):
         """Stop; open event streams and uploads end at once, and jobs while requests are answered."""
         self._app.state.services.stop()
         await super().shutdown(sockets)
+
+
+def serve_with(
+    count: int, part: ServeUntilStopped, settings: Settings, listening: socket.socket
+) -> None:
+    """Serve with so many processes until this one is told to stop.
+
+    Args:
+        count: How many.
+        part: What each of them does; a function of a module.
+        settings: Of the server.
+        listening: The socket that all of them take connections from.
+    """
+    arguments = (part, settings, listening)
+    with _stop_event() as stopping, _shared_metrics() as metrics:
+        running = [_start_process(*arguments) for _ in range(count)]
+        try:
+            while not stopping.is_set():
+                wait([process.sentinel for process in running], timeout=POLL_SECONDS)
+                for place, process in enumerate(running):
+                    if not process.is_alive() and not stopping.is_set():
+                        log.error("a process of the server died", process=process.pid)
+                        # What it has counted stays counted; what it was at is over.
+                        mark_process_dead(process.pid, metrics)  # type: ignore[no-untyped-call]
+                        stopping.wait(RESTART_SECONDS)
+                        running[place] = _start_process(*arguments)
+        finally:
+            _stop_processes(running)
+
+
+def _start_process(
+    part: ServeUntilStopped, settings: Settings, listening: socket.socket
+) -> BaseProcess:
+    process = get_context("spawn").Process(target=_run_process, args=(part, settings, listening))
+    process.start()
+    return process
+
+
+def _stop_processes(running: list[BaseProcess]) -> None:
+    for process in running:
+        process.terminate()
+    for process in running:
+        process.join(STOP_SECONDS)
+        if process.is_alive():
+            log.error("a process of the server did not stop", process=process.pid)
+            process.kill()
+
+
+@contextmanager
+def _shared_metrics() -> Iterator[str]:
+    """A folder in which the processes count together: ``/metrics`` of any of them adds up all.
+
+    The library reads the variable when it is imported, which the processes do once they run.
+    """
+    with TemporaryDirectory(prefix="touchline-metrics-") as folder:
+        os.environ[MULTIPROCESS] = folder
+        try:
+            yield folder
+        finally:
+            del os.environ[MULTIPROCESS]
+
+
+@contextmanager
+def _stop_event() -> Iterator[Event]:
+    """Set once this process is asked to end."""
+    stopping = Event()
+
+    def stop(*_: Any) -> None:
+        stopping.set()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield stopping
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _run_process(part: ServeUntilStopped, settings: Settings, listening: socket.socket) -> None:
+    """One process."""
+    Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        part(settings, listening)
+    except KeyboardInterrupt:
+        # Ctrl+C reaches all processes of a terminal.
+        sys.exit(130)
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)

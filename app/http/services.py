@@ -14,14 +14,13 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import BusyError
 from app.features.agreement.service import compare_left
-from app.features.exports.folder import ExportFolder
-from app.features.exports.jobs import resume_exports
-from app.features.groups.large_edit_routes import LargeGroupSolver
-from app.features.groups.preview_routes import PreviewSolver
+from app.features.exports.jobs import ExportFolder, resume_exports
+from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.features.groups.view_paint import PaintFollower
 from app.features.imports.jobs import resume_imports
 from app.features.jobs.service import Jobs, Pool
 from app.features.jobs.shared import SharedJobs
+from app.features.maintenance.upkeep import Upkeep
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG
 from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.policies.noise import NoiseStore
@@ -35,7 +34,6 @@ from app.features.recordings.jobs import resume_recordings
 from app.features.solve.jobs import resume_solving, solve_leftovers
 from app.features.tracks.jobs import TRACKS
 from app.features.tracks.link_ball import resume_ball_links
-from app.features.upkeep.service import Upkeep
 from app.features.versions.jobs import resume_versions
 from app.features.webhooks.sender import WebhookSender
 from app.features.what_if.service import YieldStore

@@ -10,7 +10,7 @@ from starlette.responses import RedirectResponse, StreamingResponse
 
 from app.config import Settings
 from app.http.deps import etag_matches
-from app.http.headers import saved_as
+from app.http.headers import content_disposition
 from app.object_store.address import split_address, unseal
 from app.object_store.store import ChangedObjectError, ObjectStore, Stored, open_store
 
@@ -49,7 +49,7 @@ def stored_file(settings: Settings, sealed: str, name: str, request: Request) ->
         "ETag": stored.etag,
         "Accept-Ranges": "bytes",
         "Cache-Control": "private, no-cache",
-        "Content-Disposition": saved_as(name),
+        "Content-Disposition": content_disposition(name),
     }
     if etag_matches(request, stored.etag):
         return Response(status_code=304, headers=headers)

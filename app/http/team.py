@@ -1,19 +1,24 @@
-"""Team: what a server has that many people log in to, and one that somebody runs alone has not."""
+"""Server of a team: sessions, tokens and sign-on of its people, and limits on attempts to log in."""
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
+from limits import RateLimitItem, parse
+from limits.storage import MemoryStorage
+from limits.strategies import MovingWindowRateLimiter
 
 from app.config import Settings
 from app.db.store import Store
-from app.errors import ConflictError, NotLoggedInError
+from app.errors import ConflictError, NotLoggedInError, TooManyTriesError
 from app.features.people.access_tokens import AccessTokens
-from app.features.people.devices import CHALLENGE_LASTS, Devices
+from app.features.people.devices import CHALLENGE_LASTS, Attempts, Devices
 from app.features.people.devices import LASTS as DEVICE_LASTS
 from app.features.people.logins import LASTS, Login, LoginMethod, Logins
 from app.features.people.passkeys import Passkeys, PasskeySite
@@ -21,7 +26,7 @@ from app.features.people.second_factor import SecondFactors
 from app.features.people.sign_on import LASTS as BEGUN_LASTS
 from app.features.people.sign_on import SignOn
 from app.features.people.sign_on_rules import read_rules
-from app.http.cookies import (
+from app.http.headers import (
     DEVICE,
     PASSKEY,
     SESSION,
@@ -30,11 +35,88 @@ from app.http.cookies import (
     cookie_values,
     read_cookie,
 )
-from app.http.tries import Tries
 from app.mail import MailServer, read_mail_server
+
+NAME_LIMIT = parse("10/minute")
+"""From one address, or from one browser in which the person has logged in before."""
+NAME_LIMIT_ALL_ADDRESSES = parse("100/hour")
+"""From all addresses together: a password is guessed no faster by many machines. Browsers in which the
+person has logged in before are not counted, and not refused, so nobody can lock them out."""
+ADDRESS_LIMIT = parse("60/minute")
+"""Many people may come from one address in the morning; each name has a limit of its own."""
+CODE_LIMIT = parse("20/hour")
+"""Codes of second factors: there are but a million, and three of them are right at a time."""
+TOKEN_LIMIT = parse("60/minute")
+"""Tokens that are none. Apart from passwords: a forgotten script keeps nobody from logging in."""
+CHALLENGE_LIMIT = parse("120/minute")
+"""Challenges for passkeys, which cost the server some bytes for five minutes."""
+
 
 LANDING = "/login"
 """The page to which the provider sends people back."""
+
+
+class AttemptLimits:
+    """Counts attempts to log in, in the memory of this process, or in the database where others take them, too."""
+
+    def __init__(self, store: Store | None = None) -> None:
+        shared = store is not None and store.sharing.is_shared
+        self._shared = Attempts(store) if store is not None and shared else None
+        self._windows = MovingWindowRateLimiter(MemoryStorage())
+
+    def count_login(self, address: str, name: str | None = None, device: str | None = None) -> None:
+        """Count an attempt; whether it would have been right makes no difference.
+
+        Args:
+            address: Where it comes from.
+            name: Whose password it is.
+            device: The browser that it comes from, if the person has logged in there before.
+
+        Raises:
+            TooManyTriesError: There were too many of this name, or from this address.
+        """
+        self._count_attempt(ADDRESS_LIMIT, "address", address)
+        if name is None:
+            return
+        name = name.strip().lower()[:200]
+        if device is not None:
+            self._count_attempt(NAME_LIMIT, "device", name, device)
+            return
+        self._count_attempt(NAME_LIMIT, "name", name, address)
+        self._count_attempt(NAME_LIMIT_ALL_ADDRESSES, "name", name)
+
+    def count_code(self, name: str) -> None:
+        """Count a code of a second factor.
+
+        Raises:
+            TooManyTriesError: There were too many of this name.
+        """
+        self._count_attempt(CODE_LIMIT, "code", name.strip().lower()[:200])
+
+    def count_token(self, address: str) -> None:
+        """Count a token that is not valid; those that are count nothing.
+
+        Raises:
+            TooManyTriesError: There were too many from this address.
+        """
+        self._count_attempt(TOKEN_LIMIT, "token", address)
+
+    def count_challenge(self, address: str) -> None:
+        """Count a challenge for a passkey.
+
+        Raises:
+            TooManyTriesError: There were too many from this address.
+        """
+        self._count_attempt(CHALLENGE_LIMIT, "challenge", address)
+
+    def _count_attempt(self, limit: RateLimitItem, *key: str) -> None:
+        if self._shared is not None:
+            wait = self._shared.hit("/".join(key), limit.amount, limit.get_expiry())
+            if wait is not None:
+                raise TooManyTriesError(max(1, math.ceil(wait)))
+        elif not self._windows.hit(limit, *key):
+            ends = self._windows.get_window_stats(limit, *key).reset_time
+            raise TooManyTriesError(max(1, math.ceil(ends - time.time())))
 
 
 @dataclass(frozen=True)
@@ -49,7 +131,7 @@ class Team:
         sign_on: The provider by which they come in; None: there is none.
         url: The address that people open; None: the one that they came by.
         proxies: Who is believed whom they forward.
-        tries: Counts who tries too often.
+        attempts: Limits how often passwords, codes and tokens are tried.
         devices: Browsers in which people have logged in before.
         mail: Sends invitations; None: links are shown.
     """
@@ -61,7 +143,7 @@ class Team:
     sign_on: SignOn | None
     url: str | None
     proxies: frozenset[str]
-    tries: Tries
+    attempts: AttemptLimits
     devices: Devices
     mail: MailServer | None
 
@@ -84,7 +166,7 @@ class Team:
             SignOn(store, logins, rules) if rules else None,
             settings.url,
             frozenset(settings.proxies),
-            Tries(store),
+            AttemptLimits(store),
             Devices(store),
             read_mail_server(settings),
         )
@@ -122,7 +204,7 @@ class Team:
         device = None
         if name is not None and (token := read_cookie(request.scope, self._device_cookie(name))):
             device = self.devices.recognise(name, token)
-        self.tries.count(self.address(request), name, device)
+        self.attempts.count_login(self.address(request), name, device)
 
     def device_values(self, name: str) -> dict[str, Any]:
         """How a browser is told that it is a known one of a person, who has just logged in there."""
@@ -205,7 +287,7 @@ class Team:
         try:
             return self.tokens.find(token)
         except NotLoggedInError:
-            self.tries.count_token(self.address(request))
+            self.attempts.count_token(self.address(request))
             raise
 
     def base(self, request: Request) -> str:

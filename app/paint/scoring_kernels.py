@@ -78,9 +78,7 @@ def offset_from(camera, place, inside, px, py):
 
 
 @compiled
-def write_unexplained_paint(
-    parameters, points, shapes, nearest, origin, cell, reach, half_diagonal, cost
-):
+def unexplained(parameters, points, shapes, nearest, origin, cell, reach, half_diagonal, cost):
     """Writes the mean truncated distance of the paint to the nearest marking, 0 to 1."""
     for b in range(len(parameters)):
         camera = unpack_camera(parameters[b], half_diagonal)
@@ -99,7 +97,7 @@ def write_unexplained_paint(
 
 
 @compiled
-def write_unsupported_markings(
+def unsupported(
     parameters, samples, spacing, distance, field, center, reach, half_diagonal, result
 ):  # fmt: skip
     """Writes mean truncated distance of visible markings to paint, their length, and off grass.
@@ -143,7 +141,7 @@ def write_unsupported_markings(
 
 
 @compiled
-def refine_rows(
+def refine(
     parameters, points, shapes, nearest, origin, cell, scales, mean, sigma, half_diagonal
 ):  # fmt: skip
     """Moves each camera so that the paint comes to lie on the nearest markings.
@@ -180,11 +178,11 @@ def refine_rows(
                         g[i] += wj * offset[0, row]
                         for k in range(8):
                             H[i, k] += wj * jacobian[0, row, k]
-            take_damped_step(H, g, parameters[b])
+            descend(H, g, parameters[b])
 
 
 @compiled
-def take_damped_step(H, g, parameters):
+def descend(H, g, parameters):
     """Adds the damped step -H^-1 g, by Cholesky decomposition of H's lower half."""
     L = np.zeros((8, 8))
     step = np.empty(8)

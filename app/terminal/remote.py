@@ -119,7 +119,7 @@ def policy_values(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:
 
 def set_policy(client: Client, dataset: str, policy: Policy) -> dict[str, Any]:
     """Let the server judge a dataset by another policy; the job that solves what is stale then."""
-    from app.features.policies.text import policy_to_yaml
+    from app.features.policies.service import policy_to_yaml
 
     place = f"datasets/{part(dataset)}/policy"
     present = client.get(place)

@@ -151,7 +151,7 @@ def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> No
         InputError: The folder cannot be written.
         UnsafePathError: The server names what would lie outside of it.
     """
-    from app.features.predictions.folder import write_parts
+    from app.features.predictions.evaluation import write_parts
 
     place = f"evaluations/{values['id']}"
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from app.errors import GeometryError
 from app.paint.grass import field_of_play
-from app.paint.propose import propose_camera
+from app.paint.propose import propose
 
 ShotKind = Literal["main", "replay", "closeup", "other"]
 
@@ -53,7 +53,7 @@ def look_at(image: npt.NDArray[np.uint8]) -> LookedAt:
     if grass < GRASS_MAIN:
         return LookedAt(grass, False)
     try:
-        return LookedAt(grass, propose_camera(image).outcome == "proposed")
+        return LookedAt(grass, propose(image).outcome == "proposed")
     except (GeometryError, np.linalg.LinAlgError):
         return LookedAt(grass, False)
 

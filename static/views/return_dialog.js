@@ -8,7 +8,7 @@ import { question } from '../state/return_group.js';
 import { FormDialog } from './dialog.js';
 import { FormError } from './form_error.js';
 
-/** As the server has it (app/features/independent_annotations/return_work.py). */
+/** As the server has it (app/features/independent_annotations/adopt.py). */
 const MAX_REASON = 500;
 
 export function ReturnDialog() {

@@ -19,8 +19,8 @@ import pysqlite3.dbapi2 as sqlite3
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.queue.service import list_groups, neighbours
-from app.features.queue.statistics import statistics
+from app.features.queue.service import find_neighbours, list_groups
+from app.features.queue.statistics import read_statistics
 from app.features.what_if.funnel import get_yield
 from app.features.what_if.service import YieldStore
 from app.features.what_if.statistics import StatisticsStore
@@ -101,7 +101,7 @@ def _statistics(store: Store) -> dict[str, float]:
         kept.statistics(1)
         found[what] = 1000 * (time.perf_counter() - start)
     found["statistics"] = _spent(lambda: kept.statistics(1))
-    found["statistics of sigma<0.3"] = _spent(lambda: statistics(store, 1, "sigma<0.3"))
+    found["statistics of sigma<0.3"] = _spent(lambda: read_statistics(store, 1, "sigma<0.3"))
     return found
 
 
@@ -110,7 +110,7 @@ def _page(store: Store, query: str, start: int = 0) -> float:
 
 
 def _place(store: Store, query: str, group: int) -> float:
-    return _spent(lambda: neighbours(store, group, query))
+    return _spent(lambda: find_neighbours(store, group, query))
 
 
 def _spent(work: Callable[[], object]) -> float:

@@ -25,7 +25,7 @@ from tests.e2e.service import run_touchline, serving
 TURNS = 12
 JOINED = service.SERVE
 MODULES = (
-    "from app.http.site import JoinedModules; JoinedModules.read = staticmethod(lambda folder: None); "
+    "from app.http.pages import JoinedModules; JoinedModules.read = staticmethod(lambda folder: None); "
     + service.SERVE
 )
 PLACES = {

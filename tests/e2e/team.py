@@ -17,9 +17,8 @@ from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.independent_annotations.service import begin_annotation
 from app.features.people import links
-from app.features.people.members import give_role
 from app.features.people.roles import Role
-from app.features.people.service import find_person, invite
+from app.features.people.service import find_person, give_role, invite
 from app.features.verdicts.service import set_verdict
 
 OpenPage = Callable[..., Page]

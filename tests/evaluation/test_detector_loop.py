@@ -19,9 +19,9 @@ from app.features.datasets.tables import ViewModel
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.imports.sources import Source, import_source
-from app.features.predictions.accept import AcceptRequest, accept
-from app.features.predictions.detect import DetectRequest, OnnxModel, detect
-from app.features.predictions.evaluation import tables_of
+from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
+from app.features.predictions.detect import DetectRequest, OnnxModel, run_detector
+from app.features.predictions.evaluation import run_tables
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.service import delete_predictions, view_predictions
 from app.features.solutions.service import solve_dataset
@@ -69,7 +69,7 @@ def detected(store: Store, model: OnnxModel):
         calls.append((done, total))
 
     request = DetectRequest("tiny", min_score=0.3)
-    found = detect(store, "drawn", model, request, actor="ann", progress=progress)
+    found = run_detector(store, "drawn", model, request, actor="ann", progress=progress)
     return found, calls
 
 
@@ -124,7 +124,7 @@ class TestDetect:
         # YOLO counts from the corner of the first pixel.
         seen = [Detection(Box(100.5, 50.5, 8, 8), 0.9)]
         monkeypatch.setattr(OnnxModel, "detect", lambda *_, **__: seen)
-        found = detect(store, "drawn", model, DetectRequest("fixed"), actor="ann")
+        found = run_detector(store, "drawn", model, DetectRequest("fixed"), actor="ann")
         view = next(iter(_states(store)[0].view_ids.values()))
         boxes = next(boxes for item, boxes in view_predictions(store, view) if item == found)
         assert [(box.x, box.y, box.width) for box in boxes] == [(100, 50, 8)]
@@ -137,7 +137,7 @@ class TestDetect:
     def test_they_can_be_evaluated(self, store, detected) -> None:
         request = EvaluationRequest(predictions=detected[0].id)
         found = run_evaluation(store, "drawn", request, actor="ann")
-        table = next(item for item in tables_of(found) if item.name == "detection")
+        table = next(item for item in run_tables(found) if item.name == "detection")
         assert 0 < table.cell("all", "recall").value <= 1
 
     def test_a_person_accepts_one_and_it_is_solved(self, store, detected) -> None:
@@ -147,7 +147,7 @@ class TestDetect:
         assert cleared.solution.ball is None or len(cleared.solution.ball.views) < len(
             state.group.views
         )
-        report = accept(store, "drawn", AcceptRequest(detected[0].id), actor="ann")
+        report = accept_predicted_balls(store, "drawn", AcceptRequest(detected[0].id), actor="ann")
         assert (report.views, report.groups) == (1, 1)
         after = load(store, state.id)
         assert after.group.view(view).ball.predicted_by == "tiny"
@@ -165,7 +165,7 @@ class TestDetect:
                 update(ViewModel).where(ViewModel.id == views[0]).values(media_path="/gone.zip")
             )
         request = DetectRequest("partly", query="number:1", min_score=0.3)
-        found = detect(store, "drawn", model, request, actor="ann")
+        found = run_detector(store, "drawn", model, request, actor="ann")
         (problem,) = found.report["problems"]
         assert "gone.zip" in problem["problem"]
 

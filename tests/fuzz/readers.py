@@ -30,7 +30,7 @@ from app.features.imports.sources import (
     _read_groups,
     import_source,
 )
-from app.features.policies.text import MAX_CHARACTERS, policy_from_yaml
+from app.features.policies.service import MAX_CHARACTERS, policy_from_yaml
 from app.features.queue.query import parse_query
 from app.finite import json_text
 from app.formats.export_formats import FORMATS, WriteOptions, write_format

@@ -17,7 +17,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.features.imports.edits_export import export_edits
 from app.features.imports.ingest import ingest
-from app.features.policies.text import policy_to_yaml
+from app.features.policies.service import policy_to_yaml
 from app.formats.camera_json import camera_to_json
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image, ImageOps
 
 from app.config import Settings
-from app.features.exports.images import ExportImages
+from app.features.exports.source import ExportImages
 from app.features.file_tools.paint import read_pictures
 from app.features.predictions.detect import _picture
 from app.formats.report import Report

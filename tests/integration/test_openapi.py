@@ -30,9 +30,9 @@ from schemathesis.specs.openapi import negative
 from app.config import Settings
 from app.db.store import Store
 from app.features.batches.service import NewBatch, make_batch
-from app.features.comments.service import begin_thread, reply
+from app.features.comments.service import add_reply, begin_thread
 from app.features.exports.jobs import request_export
-from app.features.groups.history import history
+from app.features.groups.history import read_history
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
 from app.features.imports.upload_queries import UploadWriter
@@ -49,7 +49,7 @@ from app.features.recordings.shots import Shot, get_shots, put_shots
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station
 from app.features.tracks.service import get_track
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.webhooks.messages import Kind
 from app.features.webhooks.service import make_webhook, send_ping
 from app.formats.report import Report
@@ -122,7 +122,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
         )
         assert (str(job.id), services.jobs.wait(job.id, 60).state) == (name, "done")
     add_evaluations(store)
-    freeze(store, "small", FreezeRequest("v1", groups="passing"), actor="local")
+    freeze_dataset(store, "small", FreezeRequest("v1", groups="passing"), actor="local")
     for _ in range(2):
         webhook, _secret = make_webhook(store, "small", HOOK, [Kind.JUDGED], actor="local")
         send_ping(store, "small", webhook.id, actor="local")
@@ -131,7 +131,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
     add_recordings(store)
     assert add_flight(store) == 1
     talk = begin_thread(store, 1, "Is this the ball?", actor="local")
-    reply(store, 1, talk.id, "It is.", actor="local")
+    add_reply(store, 1, talk.id, "It is.", actor="local")
     yield app
     app.state.services.close()
     store.close()
@@ -302,7 +302,7 @@ class Attack:
         if case.operation.path.endswith("/threads") and case.method == "POST":
             case.body = {"text": "one"}
         if "entry" in path:
-            path["entry"] = str(history(self.store, 1)[0].id)
+            path["entry"] = str(read_history(self.store, 1)[0].id)
         if "/audit/" in case.operation.path:
             path["ending"] = "csv"
 

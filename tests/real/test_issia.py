@@ -13,7 +13,7 @@ import pytest
 from app.config import Settings
 from app.db.store import Store
 from app.features.datasets.service import get_dataset
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.state import GroupState, read_states
 from app.features.imports.ingest import ingest
 from app.features.queue.service import list_ids
@@ -107,7 +107,7 @@ class TestExport:
         ingest(store, "issia", few, source=str(DATA), actor="test")
         solve_dataset(store, "issia")
         out = tmp_path / "out"
-        export(store, "issia", "issia-3d", out, everything=True)
+        export_dataset(store, "issia", "issia-3d", out, everything=True)
         with (out / "ISSIA-3D.csv").open(newline="") as file:
             rows = list(csv.DictReader(file))
         assert [int(row["frame"]) for row in rows] == sorted(int(group.key) for group in few)

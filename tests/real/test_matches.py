@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.features.file_tools.matches import shares_of
+from app.features.file_tools.matches import match_shares
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize
@@ -39,7 +39,7 @@ def files():
 @pytest.fixture(scope="module")
 def shares(files):
     places = [place_of(calibrate(it.lines, Pitch(), SIZE, POLICY), SIZE) for it in files]
-    return shares_of(files, places, None)
+    return match_shares(files, places, None)
 
 
 class TestShares:

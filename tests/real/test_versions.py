@@ -15,13 +15,13 @@ from sqlalchemy import select
 from app.config import Settings
 from app.db.store import Store
 from app.features.datasets.tables import GroupModel
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
 from app.features.imports.merge import merge_edits
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.verify import verify
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.issia_reader import IssiaOptions, open_issia
@@ -64,7 +64,7 @@ def homes(tmp_path_factory: pytest.TempPathFactory):
     solve_dataset(one, "issia")
     reject(one)
     carried = tmp_path_factory.mktemp("carried") / "issia.zip"
-    export(one, "issia", "touchline", carried)
+    export_dataset(one, "issia", "touchline", carried)
     report = Report()
     merge_edits(two, "other", carried, report, DEFAULT_LIMITS, source="a", actor="ben")
     assert report.problems == []
@@ -86,14 +86,14 @@ def reject(store: Store) -> None:
 def versions(homes):
     one, two = homes
     return (
-        freeze(one, "issia", FROZEN, actor="ann"),
-        freeze(two, "other", FROZEN, actor="ben"),
+        freeze_dataset(one, "issia", FROZEN, actor="ann"),
+        freeze_dataset(two, "other", FROZEN, actor="ben"),
     )
 
 
 class TestFreeze:
     def test_as_many_groups_as_pass_are_in_it(self, whole) -> None:
-        version = freeze(whole, "issia", FROZEN, actor="ann")
+        version = freeze_dataset(whole, "issia", FROZEN, actor="ann")
         assert version.counts["groups"] == 1687
         assert version.counts["left_out"]["rejected: other"] == 1
         splits = version.counts["splits"]
@@ -114,9 +114,9 @@ class TestExport:
         files = []
         for store, version in zip(homes, versions, strict=True):
             out = tmp_path / f"{version.dataset}.zip"
-            export(store, version.dataset, "issia-3d", out, version="v1")
+            export_dataset(store, version.dataset, "issia-3d", out, version="v1")
             files.append(content(out))
-        export(homes[0], "issia", "issia-3d", tmp_path / "again.zip", version="v1")
+        export_dataset(homes[0], "issia", "issia-3d", tmp_path / "again.zip", version="v1")
         assert (tmp_path / "again.zip").read_bytes() == (tmp_path / "issia.zip").read_bytes()
         assert {name: text for name, text in files[0].items() if name != "manifest.json"} == {
             name: text for name, text in files[1].items() if name != "manifest.json"

@@ -22,10 +22,9 @@ from app.features.imports.ingest import ingest
 from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.logins import Logins
-from app.features.people.members import give_role
 from app.features.people.ownership import OwnedKind
 from app.features.people.roles import Role
-from app.features.people.service import invite
+from app.features.people.service import give_role, invite
 from app.features.recordings.queries import insert_recording
 from app.features.solutions.service import solve_dataset
 from app.main import create_app

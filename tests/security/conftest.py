@@ -24,7 +24,7 @@ from app.features.people import links as passwords
 from app.features.people.roles import Role
 from app.formats.issia_writer import write_issia
 from app.formats.soccernet_v3_writer import write_soccernet_v3
-from app.http import access, tries
+from app.http import access
 from app.http.server import listen, make_server
 from app.main import create_app
 from tests.e2e.service import NOBODY, run_touchline, serving
@@ -199,8 +199,8 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
         patch.setattr(passwords, "HASHER", cheap)
         patch.setattr(access, "LOOK_SECONDS", 0.05)
         # Everybody of these tests comes from one address within a minute.
-        patch.setattr(tries, "OF_AN_ADDRESS", parse("1000/minute"))
-        patch.setattr(tries, "CHALLENGES_OF_AN_ADDRESS", parse("1000/minute"))
+        patch.setattr("app.http.team.ADDRESS_LIMIT", parse("1000/minute"))
+        patch.setattr("app.http.team.CHALLENGE_LIMIT", parse("1000/minute"))
         passwords._placeholder_hash.cache_clear()
         app = create_app(settings)
         with listen("127.0.0.1", 0) as (socket, address):

@@ -80,7 +80,7 @@ class Team:
         self.cookies[name] = cookie_in(self.log_in(name))
         return self.cookies[name]
 
-    def forget_tries(self) -> None:
+    def forget_attempts(self) -> None:
         """As if nobody had tried anything yet, where the database has what was tried."""
         with self.store.write(lasting=False) as session:
             session.execute(delete(AttemptModel))

@@ -17,7 +17,7 @@ import pytest
 
 from app.features.imports.ingest import ingest
 from app.features.independent_annotations import known_truth as mixing
-from app.features.independent_annotations.queries import GOLD, annotations_in
+from app.features.independent_annotations.queries import GOLD, read_annotations
 from app.features.people.roles import Role
 from app.features.solutions.service import solve_dataset
 from app.soccer.group import Media
@@ -201,7 +201,7 @@ def play(team: Apart, person: str, batch: int) -> Played:
         played.found.append(found)
         played.pictures.append(pictures_of(team, person, document))
     with team.store.read() as session:
-        takes = {take.copy_id: take for take in annotations_in(session, 1, person)}
+        takes = {take.copy_id: take for take in read_annotations(session, 1, person)}
     for copy in played.copies:
         played.gold.append(takes[copy].kind == GOLD)
         played.originals.append(takes[copy].group_id)
@@ -310,7 +310,7 @@ class TestGold:
         person, cheat = "olaf", played
         ask = made.team.ask
         with made.team.store.read() as session:
-            before = annotations_in(session, 1, person)
+            before = read_annotations(session, 1, person)
         for copy in (cheat.copies[cheat.gold.index(True)], cheat.copies[cheat.gold.index(False)]):
             document = ask(person, "GET", f"/groups/{copy}").json()
             etag = {"If-Match": document["etag"]}
@@ -337,13 +337,13 @@ class TestGold:
             (one,) = ask(person, "POST", f"/datasets/{dataset}/edits", bulk).json()["items"]
             assert (one["outcome"], one["status"]) == ("refused", 409)
         with made.team.store.read() as session:
-            assert annotations_in(session, 1, person) == before
+            assert read_annotations(session, 1, person) == before
 
     def test_every_refused_change_of_a_copy_reads_the_same(
         self, made: Gold, played: Played
     ) -> None:
         with made.team.store.read() as session:
-            takes = {take.copy_id: take for take in annotations_in(session, 1, "olaf")}
+            takes = {take.copy_id: take for take in read_annotations(session, 1, "olaf")}
         gold = played.copies[played.gold.index(True)]
         ordinary = played.copies[played.gold.index(False)]
         assert (takes[gold].settled, takes[ordinary].settled is None) == (None, False)

@@ -21,12 +21,11 @@ from app.db.store import Store
 from app.features.imports.ingest import ensure_dataset
 from app.features.people import links
 from app.features.people.devices import LASTS, Devices
-from app.features.people.members import give_role
 from app.features.people.roles import LEAST, Role, Scope
-from app.features.people.service import change_person, find_person, renew_link
-from app.http import access, tries
+from app.features.people.service import change_person, find_person, give_role, renew_link
+from app.http import access
 from app.http.pages import PAGES
-from app.http.route import routes_of
+from app.http.route import list_routes
 from tests.security.asking import Answer, assert_guarded
 from tests.security.table import MISSING, TABLE, Row, rows
 from tests.security.team import API, BYTES, DEVICE, GUARDED, HIDDEN, SECRET, Team, asked, cookie_in
@@ -53,7 +52,7 @@ the body of no shape."""
 class TestTable:
     def test_the_reviewed_table_and_what_the_routes_say_are_the_same(self, team: Team) -> None:
         reviewed = {str(row): row.role for row in rows()}
-        said = {name: route.permission.action for name, route in routes_of(team.app)}
+        said = {name: route.permission.action for name, route in list_routes(team.app)}
         decided = {
             name: "everybody" if action is None else LEAST[action].value
             for name, action in said.items()
@@ -64,7 +63,7 @@ class TestTable:
         assert decided == reviewed
 
     def test_nothing_is_open_but_the_application_and_the_way_in(self, team: Team) -> None:
-        opened = {name for name, route in routes_of(team.app) if route.permission.action is None}
+        opened = {name for name, route in list_routes(team.app) if route.permission.action is None}
         data = {route for route in opened if API in route}
         assert data == {
             f"GET {API}/session",
@@ -294,8 +293,8 @@ class TestSessions:
         team.add("guessed", Role.VIEWER)
         name, _, token = cookie_in(team.log_in("guessed"), DEVICE).partition("=")
         known, foreign = f"{name}={token}", cookie_in(team.log_in("viewer"), DEVICE)
-        monkeypatch.setattr(tries, "OF_A_NAME_BY_STRANGERS", parse("4/hour"))
-        team.forget_tries()
+        monkeypatch.setattr("app.http.team.NAME_LIMIT_ALL_ADDRESSES", parse("4/hour"))
+        team.forget_attempts()
         wrong = [team.log_in("guessed", "wrong wrong wrong").status for _ in range(5)]
         assert wrong[-1] == 429
         assert team.log_in("guessed").status == 429, "nor does the right password help a stranger"
@@ -310,7 +309,7 @@ class TestSessions:
         assert team.log_in("guessed", Cookie=known).status == 200
         told = [team.log_in("guessed", "wrong wrong wrong", Cookie=known).status for _ in range(10)]
         assert told[-1] == 429, "a known browser has an end of its tries, too"
-        team.forget_tries()
+        team.forget_attempts()
         devices = team.app.state.team.devices
         assert devices.recognise("guessed", token)
         late = Devices(team.store, lambda: datetime.now(UTC) + LASTS + timedelta(seconds=1))

@@ -20,7 +20,6 @@ from app.features.people.passkeys import PasskeySite
 from app.features.people.roles import Role
 from app.features.people.second_factor import SecondFactors
 from app.features.people.service import find_person
-from app.http import tries
 from app.http.team import Team as WayIn
 from tests.authenticator import Authenticator
 from tests.security.asking import Answer, assert_guarded
@@ -55,7 +54,7 @@ class TestSecondFactor:
     def test_the_code_is_asked_for_and_its_tries_are_counted(
         self, team: Team, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(tries, "CODES_OF_A_NAME", parse("4/hour"))
+        monkeypatch.setattr("app.http.team.CODE_LIMIT", parse("4/hour"))
         totp, codes = self.enrolled(team, "wary")
         asked = self.tell(team, "wary")
         assert (asked.status, json.loads(asked.body)["pointer"]) == (401, "/code")

@@ -241,7 +241,7 @@ class TestSecondFactor:
     ) -> None:
         # Counted in the database, as processes do that share one.
         attempts = Attempts(door.team.store)
-        monkeypatch.setattr(door.team.app.state.team.tries, "_shared", attempts)
+        monkeypatch.setattr(door.team.app.state.team.attempts, "_shared", attempts)
         door.provider.who |= {"amr": ["pwd", "mfa"], "acr": "high"}
         address, cookie = door.begin()
         told = door.back(address)

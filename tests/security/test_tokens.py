@@ -18,8 +18,7 @@ from app.features.people.access_tokens import new_token_text
 from app.features.people.roles import Role, Scope
 from app.features.people.service import change_person, find_person
 from app.features.people.tables import AccessTokenModel
-from app.http import tries
-from app.http.headers import bearer_of
+from app.http.headers import bearer_token
 from tests.security.asking import Answer, assert_guarded
 from tests.security.team import API, BYTES, Team
 from tests.waiting import SECONDS
@@ -71,7 +70,7 @@ class TestTokens:
         assert self.ask(team, "Basic eDp5", Cookie=cookie).status == 200, "a proxy asked for it"
         both = [("authorization", bearer), ("authorization", team.bearer("read"))]
         raw = [(name.encode(), value.encode()) for name, value in both]
-        assert bearer_of({"type": "http", "headers": raw}) == ""
+        assert bearer_token({"type": "http", "headers": raw}) == ""
 
     def test_a_page_of_another_site_is_refused_with_a_token_too(self, team: Team) -> None:
         bearer = team.bearer("lead")
@@ -244,8 +243,8 @@ class TestTokens:
     def test_guesses_are_counted_and_good_tokens_are_not(
         self, team: Team, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(tries, "TOKENS_OF_AN_ADDRESS", parse("4/minute"))
-        team.forget_tries()
+        monkeypatch.setattr("app.http.team.TOKEN_LIMIT", parse("4/minute"))
+        team.forget_attempts()
         guesses = [self.ask(team, f"Bearer {new_token_text()}") for _ in range(5)]
         assert [answer.status for answer in guesses] == [401] * 4 + [429]
         assert 0 < int(guesses[-1].headers["retry-after"]) <= 60

@@ -20,7 +20,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.integrity.database import examine
+from app.features.integrity.database import examine_database
 from app.formats.manifest import MANIFEST
 from tests.e2e.service import ROOT, SERVE, run_touchline
 from tests.starting import Process
@@ -165,7 +165,7 @@ def differences(calm: Path, killed: Path) -> list[str]:
     faults = [f"{name} differ" for name in one if one[name] != two[name]]
     store = Store.open(Settings(home=killed))
     try:
-        return faults + [check.sentence for check in examine(store) if not check.ok]
+        return faults + [check.sentence for check in examine_database(store) if not check.ok]
     finally:
         store.close()
 

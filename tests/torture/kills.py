@@ -26,7 +26,7 @@ from app.config import Settings
 from app.db.log import read_log
 from app.db.store import Store
 from app.features.datasets.service import list_datasets
-from app.features.integrity.database import examine
+from app.features.integrity.database import examine_database
 from tests.e2e.service import ROOT, SERVE, free_port, run_touchline
 from tests.starting import Process
 from tests.torture.connection import API
@@ -330,6 +330,6 @@ def compare(home: Path, people: list[Client]) -> list[str]:
                     faults.append(
                         f"{person.dataset}: {said} of {kind} acknowledged, {found} in the log"
                     )
-        return faults + [check.sentence for check in examine(store) if not check.ok]
+        return faults + [check.sentence for check in examine_database(store) if not check.ok]
     finally:
         store.close()

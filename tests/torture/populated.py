@@ -16,10 +16,10 @@ from app.db.store import Store
 from app.features.datasets.service import list_datasets
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
-from app.features.integrity.database import examine
+from app.features.integrity.database import examine_database
 from app.features.verdicts.queries import read_verdicts
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import list_versions
 from app.features.versions.verify import verify
 from app.soccer.annotation import BallAnnotation
@@ -32,7 +32,7 @@ def people_work(settings: Settings, *, freezes: bool = True) -> None:
     """Freeze each dataset, then move a ball and judge in each of its groups."""
     with closing(Store.open(settings)) as store:
         for dataset in list_datasets(store) if freezes else ():
-            freeze(store, dataset.id, FreezeRequest("first", groups="passing"), actor="ann")
+            freeze_dataset(store, dataset.id, FreezeRequest("first", groups="passing"), actor="ann")
         for group_id in _ids(store):
             state = load(store, group_id)
             edit = SetBall(state.group.views[0].key, BALL)
@@ -59,7 +59,7 @@ def said(settings: Settings) -> dict[str, Any]:
             "versions": [(one.name, one.hash, one.policy, one.counts) for one in versions],
             "rebuilt": [verify(store, one.id).differences for one in versions],
             "log": log,
-            "checks": [check.sentence for check in examine(store) if not check.ok],
+            "checks": [check.sentence for check in examine_database(store) if not check.ok],
         }
 
 

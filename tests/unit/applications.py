@@ -24,11 +24,10 @@ from app.http.bodies import MAX_JSON_BYTES
 from app.http.errors import install_handlers
 from app.http.headers import SecurityHeaders
 from app.http.idempotency import Idempotency
-from app.http.pages import install_pages
+from app.http.pages import Site, install_pages
 from app.http.request_limits import ClassLimiters
 from app.http.route import Gate
 from app.http.services import Services
-from app.http.site import Site
 from app.main import create_app
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import Group, Media, Station, View

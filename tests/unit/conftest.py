@@ -85,7 +85,7 @@ ON_BOTH = frozenset(
         "features/queue/test_queries_conditions.py",
         "features/queue/test_queries_listing.py",
         "db/test_log.py",
-        "features/datasets/test_orphan_queries.py",
+        "features/datasets/test_queries_orphans.py",
         "features/groups/test_queries.py",
         "features/verdicts/test_queries_verdicts.py",
     }
@@ -100,7 +100,7 @@ WHEN_ALL = ON_BOTH | {
     "features/batches/test_work.py",
     "features/groups/test_revision_queries.py",
     "features/datasets/test_queries_datasets.py",
-    "features/groups/test_etag_queries.py",
+    "features/groups/test_revision_queries_etags.py",
     "features/jobs/test_queries.py",
     "features/groups/test_projection_queries.py",
     "features/datasets/test_queries_removal.py",

@@ -20,8 +20,8 @@ from app.features.groups.state import GroupState
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
 from app.features.queue.service import list_groups
+from app.features.solutions.queries import SolutionModel
 from app.features.solutions.service import solve_dataset
-from app.features.solutions.tables import SolutionModel
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint

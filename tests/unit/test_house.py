@@ -25,7 +25,6 @@ VALUES = {
     "groups.digest",
     "imports.upload_quota",
     "solutions.codec",
-    "solutions.summary",
 }
 """Values and rules that queries and services share: they ask no database."""
 WITHOUT_HTTP = {"tables", "values", "queries", "service"}

@@ -104,7 +104,7 @@ class TestServe:
     def test_several_processes_over_a_file_are_refused(
         self, run: Run, home: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("app.http.web_processes.serve_with", lambda *_arguments: None)
+        monkeypatch.setattr("app.http.server.serve_with", lambda *_arguments: None)
         code, out, err = run("serve", "--port", "0", "--workers", "2")
         assert (code, out) == (1, "")
         assert "PostgreSQL alone" in err

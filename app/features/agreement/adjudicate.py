@@ -7,19 +7,23 @@ from dataclasses import dataclass
 
 from app.db.store import Store
 from app.errors import ForbiddenError, NotFoundError
-from app.features.agreement.compare import Comparison, compare_states, read_limits
-from app.features.agreement.queries import OPEN, agreements_of, agreements_on
-from app.features.agreement.service import settle, submitted_annotations
+from app.features.agreement.queries import OPEN, list_agreements, list_group_agreements
+from app.features.agreement.service import (
+    Comparison,
+    adopt_and_settle,
+    compare_states,
+    read_limits,
+    submitted_annotations,
+)
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved
 from app.features.groups.view_paint import PaintFollower
-from app.features.independent_annotations.adopt import adopt_annotation
+from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
-from app.features.independent_annotations.return_work import return_annotation
 from app.features.independent_annotations.service import DisclosedAnnotation
-from app.features.people.members import list_members
-from app.features.people.roles import Action, lets
+from app.features.people.roles import Action, role_allows
+from app.features.people.service import list_members
 from app.finite import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
@@ -63,7 +67,7 @@ def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
     """The groups of a dataset that wait for a decision, those that disagree most first."""
     number = dataset_id(store, dataset)
     with store.read() as session:
-        rows = agreements_of(session, number, state=OPEN)
+        rows = list_agreements(session, number, state=OPEN)
     found = []
     for row in rows:
         batch = row.batch_id or None
@@ -86,7 +90,9 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
     """
     original = load_solved(store, group_id)
     with store.read() as session:
-        row = next((one for one in agreements_on(session, group_id) if one.state == OPEN), None)
+        row = next(
+            (one for one in list_group_agreements(session, group_id) if one.state == OPEN), None
+        )
         limits = read_limits(session, original.dataset_id)
     if row is None:
         raise NotFoundError(f"nothing of group {group_id} waits for a decision")
@@ -108,7 +114,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
     )
 
 
-def decide(
+def decide_case(
     store: Store,
     group_id: int,
     annotation_id: int,
@@ -136,7 +142,7 @@ def decide(
     )
     if place is None:
         raise NotFoundError(f"annotation {annotation_id} is not one that waits for a decision here")
-    return settle(
+    return adopt_and_settle(
         store,
         group_id,
         case.batch,
@@ -164,12 +170,12 @@ def adopt_into_group(
     with store.read() as session:
         waits = any(
             (row.state, row.batch_id) == (OPEN, annotation.batch_id or 0)
-            for row in agreements_on(session, annotation.group_id)
+            for row in list_group_agreements(session, annotation.group_id)
         )
     if not waits:
         return adopt_annotation(store, annotation.id, actor=actor, paint=paint)
     ready = submitted_annotations(store, annotation.group_id, annotation.batch_id)
-    return settle(
+    return adopt_and_settle(
         store,
         annotation.group_id,
         annotation.batch_id,
@@ -209,7 +215,7 @@ def _possible_judges(
     return [
         one.name
         for one in list_members(store, dataset)
-        if lets(one.role, Action.REVIEW) and one.name not in takers
+        if role_allows(one.role, Action.REVIEW) and one.name not in takers
     ]
 
 

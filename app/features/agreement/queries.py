@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Select, delete, func, insert, select, update
+from sqlalchemy import ForeignKey, Index, LargeBinary, Select, delete, func, insert, select, update
+from sqlalchemy.orm import Mapped, mapped_column
 
-from app.db.session import Session
-from app.features.agreement.tables import AgreementLimitsModel, AgreementModel
+from app.db.session import Base, Session
 from app.features.batches.tables import BatchModel
 from app.features.independent_annotations.queries import INDEPENDENT
 from app.features.independent_annotations.tables import IndependentAnnotationModel
@@ -16,12 +16,61 @@ from app.features.queue.tables import QueueModel
 
 AGREED, OPEN, DECIDED = "agreed", "open", "decided"
 """States of an agreement."""
+
+
+class AgreementModel(Base):
+    """What the annotations of a group that were submitted came to; ``batch_id`` is 0 for no batch.
+
+    ``state`` is ``agreed``, ``open`` (it waits for somebody to decide) or ``decided``. ``takes`` names
+    what was compared, ``pairs`` is how far they lie apart (compressed JSON), ``worst`` how many
+    times its limit the worst disagreement is, ``disagreements`` how many there are. ``take_id`` is
+    the one that was taken, ``outcome`` ``take`` or ``start`` (it was gone on from).
+    """
+
+    __tablename__ = "agreement"
+    __table_args__ = (Index("agreement_dataset", "dataset_id", "state"),)
+
+    group_id: Mapped[int] = mapped_column(
+        ForeignKey("groups.id", ondelete="CASCADE"), primary_key=True
+    )
+    batch_id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id", ondelete="CASCADE"))
+    state: Mapped[str]
+    takes: Mapped[str]
+    pairs: Mapped[bytes] = mapped_column(LargeBinary)
+    worst: Mapped[float]
+    disagreements: Mapped[int]
+    found: Mapped[str]
+    outcome: Mapped[str | None]
+    take_id: Mapped[int | None]
+    decided: Mapped[str | None]
+    decided_by: Mapped[str | None]
+
+
+class AgreementLimitsModel(Base):
+    """How far annotations of a dataset's groups may lie apart and still agree; no row: defaults."""
+
+    __tablename__ = "agreement_limits"
+
+    dataset_id: Mapped[int] = mapped_column(
+        ForeignKey("dataset.id", ondelete="CASCADE"), primary_key=True
+    )
+    line_px: Mapped[float]
+    markings: Mapped[int]
+    ball_px: Mapped[float]
+    diameter_px: Mapped[float]
+    ball_m: Mapped[float]
+    jac: Mapped[float]
+    changed: Mapped[str]
+    changed_by: Mapped[str]
+
+
 _ROWS = select(*AgreementModel.__table__.columns, QueueModel.number, QueueModel.status).join(
     QueueModel, QueueModel.group_id == AgreementModel.group_id
 )
 
 
-def agreements_of(
+def list_agreements(
     session: Session, dataset_id: int, *, batch_id: int | None = None, state: str | None = None
 ) -> Sequence[Any]:
     """What the groups of a dataset came to, each with its ``number`` and ``status``; the worst first.
@@ -41,7 +90,7 @@ def agreements_of(
     return session.execute(_ROWS.where(*where).order_by(*order)).all()
 
 
-def agreements_on(session: Session, group_id: int) -> Sequence[Any]:
+def list_group_agreements(session: Session, group_id: int) -> Sequence[Any]:
     """What a group came to in each batch, what waits for a decision first."""
     order = (AgreementModel.state != OPEN, AgreementModel.batch_id)
     return session.execute(_ROWS.where(AgreementModel.group_id == group_id).order_by(*order)).all()
@@ -55,12 +104,12 @@ def put_agreement(session: Session, values: Mapping[str, Any]) -> None:
     session.execute(insert(table), [dict(values)])
 
 
-def groups_that_came_to(state: str) -> Select[int]:
+def list_groups_in_states(state: str) -> Select[int]:
     """Ids of the groups whose annotations came to a state, in any batch."""
     return select(AgreementModel.group_id).where(AgreementModel.state == state)
 
 
-def states_of(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
+def read_group_states(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """What groups came to, what waits for a decision first; those that were not compared are left out."""
     rows = session.execute(
         select(AgreementModel.group_id, AgreementModel.state)
@@ -138,7 +187,7 @@ def required_verdicts(session: Session, batch_id: int) -> int | None:
     return verdicts
 
 
-def limits_of(session: Session, dataset_id: int) -> Any | None:
+def find_limits(session: Session, dataset_id: int) -> Any | None:
     """The limits of a dataset; None: nobody has set any."""
     columns = [
         column

@@ -1,9 +1,10 @@
-"""Weigh: compare the annotations of a group once enough are submitted, and settle what agrees."""
+"""Agreement: submitted annotations of the same frames are compared, and settled where they agree."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from itertools import combinations
 from typing import Any
 
 import structlog
@@ -12,28 +13,31 @@ from app.db.json_columns import pack
 from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import ReviewError, StorageError
-from app.evaluation.annotation_distance import GroupDistance
-from app.features.agreement.compare import KIND, Comparison, compare_states, read_limits
+from app.errors import InputError, ReviewError, StorageError
+from app.evaluation.agreement_limits import AgreementLimits, Disagreement, disagreements
+from app.evaluation.annotation_distance import GroupDistance, compare_annotations
 from app.features.agreement.queries import (
     AGREED,
     DECIDED,
     OPEN,
-    agreements_on,
     decide_agreement,
+    find_limits,
+    list_group_agreements,
     never_adopted,
     never_compared,
     put_agreement,
+    put_limits,
     required_verdicts,
     settle_rest,
 )
 from app.features.batches.completion_queries import settle_in_batch
 from app.features.batches.own_annotations import adopt_submitted
 from app.features.batches.service import get_batch
+from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
-from app.features.groups.submit import solve_and_keep
+from app.features.groups.submit import load_solved, solve_and_keep
 from app.features.groups.view_paint import PaintFollower
-from app.features.independent_annotations.adopt import adopt_annotation, give_verdict_of
+from app.features.independent_annotations.adopt import adopt_annotation, copy_verdict_to_original
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
     IndependentAnnotation,
@@ -41,15 +45,118 @@ from app.features.independent_annotations.queries import (
 )
 from app.features.independent_annotations.service import find_annotation_of_copy
 from app.features.solutions.codec import to_json
-from app.features.webhooks.queries import DISPUTED, announce, stamp
+from app.features.webhooks.queries import DISPUTED, announce, time_suffix
 from app.soccer.actors import SCRIPT
 
+KIND = "agreement"
+"""Kind of the log's entries about agreement; they change no group."""
 log = structlog.get_logger("touchline.agreement")
-
 REQUIRED = 2
 """Annotations that are compared where no batch says how many."""
 BY_ITSELF = f"{SCRIPT}agreement"
 """Who takes over what agrees."""
+
+
+@dataclass(frozen=True)
+class AnnotationPair:
+    """Two of several annotations, by their places in the list, from 0.
+
+    Attributes:
+        distance: How far they lie apart.
+        disagreements: What goes beyond the limits, the worst first.
+    """
+
+    a: int
+    b: int
+    distance: GroupDistance
+    disagreements: tuple[Disagreement, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Annotations of the same frames.
+
+    Attributes:
+        states: The groups, solved.
+        pairs: Every two of them, those that disagree most first.
+        limits: How far they may lie apart.
+        worst_views: Keys of the views, the one with most to look at first.
+    """
+
+    states: tuple[GroupState, ...]
+    pairs: tuple[AnnotationPair, ...]
+    limits: AgreementLimits
+    worst_views: tuple[str, ...]
+
+
+def compare_groups(store: Store, group_ids: Sequence[int], limits: AgreementLimits) -> Comparison:
+    """Groups of the same frames beside each other; saves nothing.
+
+    Raises:
+        NotFoundError: There is no such group.
+        InputError: They have no view in common.
+    """
+    return compare_states([load_solved(store, number) for number in group_ids], limits)
+
+
+def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Comparison:
+    """The same of groups that are read already.
+
+    Raises:
+        InputError: Two of them have no view in common.
+    """
+    pairs = []
+    for a, b in combinations(range(len(states)), 2):
+        first, second = states[a], states[b]
+        distance = compare_annotations(first.group, second.group, first.solution, second.solution)
+        if not distance.views:
+            raise InputError(
+                f"{first.key} and {second.key} have no view in common",
+                hint="Compare two annotations of the same frames.",
+                pointer="/with",
+            )
+        verdicts = (_verdict_of(first), _verdict_of(second))
+        pairs.append(AnnotationPair(a, b, distance, disagreements(distance, verdicts, limits)))
+    pairs.sort(key=lambda pair: (-_largest_weight(pair.disagreements), -len(pair.disagreements)))
+    return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
+
+
+def _verdict_of(state: GroupState) -> str | None:
+    verdict = state.verdict.state
+    return None if verdict == "unreviewed" else verdict
+
+
+def _largest_weight(found: Sequence[Disagreement]) -> float:
+    return max((item.weight for item in found), default=0.0)
+
+
+def _worst_views(states: Sequence[GroupState], pairs: Sequence[AnnotationPair]) -> tuple[str, ...]:
+    """Views by the weight of what is said of them, then by the largest distance in them."""
+    order: dict[str, tuple[float, float]] = {view.key: (0, 0) for view in states[0].group.views}
+    for pair in pairs:
+        for view in pair.distance.views:
+            in_view = [item for item in pair.disagreements if item.view == view.view]
+            weight, apart = order.get(view.view, (0.0, 0.0))
+            order[view.view] = (max(weight, _largest_weight(in_view)), max(apart, view.largest_px))
+    return tuple(sorted(order, key=lambda key: [-value for value in order[key]]))
+
+
+def read_limits(session: Session, dataset: int) -> AgreementLimits:
+    """The limits of a dataset, by its id; the defaults where nobody has set any."""
+    row = find_limits(session, dataset)
+    return AgreementLimits() if row is None else AgreementLimits(**row._mapping)
+
+
+def set_limits(
+    store: Store, dataset: str | int, limits: AgreementLimits, *, actor: str
+) -> AgreementLimits:
+    """Let other limits count for whatever is submitted from now on."""
+    number, at = dataset_id(store, dataset), now()
+    with store.write() as session:
+        put_limits(session, number, {**asdict(limits), "changed": at, "changed_by": actor})
+        append(session, [Entry(KIND, actor, at, {"did": "limits", **asdict(limits)}, number)])
+        session.respond(limits)
+    return limits
 
 
 @dataclass(frozen=True)
@@ -118,7 +225,7 @@ def compare_submitted(
     values = _agreement_columns(original, annotations, found)
     if not any(pair.disagreements for pair in found.pairs):
         try:
-            settle(
+            adopt_and_settle(
                 store,
                 group_id,
                 batch_id,
@@ -174,7 +281,7 @@ def submitted_annotations(
     return sorted(found, key=lambda annotation: (annotation.submitted or "", annotation.id))
 
 
-def settle(
+def adopt_and_settle(
     store: Store,
     group_id: int,
     batch_id: int | None,
@@ -218,14 +325,14 @@ def settle(
         append(session, [Entry(KIND, actor, at, body, dataset, group_id)])
         if judge:
             note = f"as {taken.person} judged it"
-            give_verdict_of(session, taken, actor=actor, note=note)
+            copy_verdict_to_original(session, taken, actor=actor, note=note)
 
     return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=done)
 
 
 def _stored_agreement(session: Session, group_id: int, batch_id: int | None) -> Any | None:
     """What a group came to in a batch, where its annotations were compared already."""
-    rows = agreements_on(session, group_id)
+    rows = list_group_agreements(session, group_id)
     return next((row for row in rows if row.batch_id == (batch_id or 0)), None)
 
 
@@ -256,7 +363,7 @@ def _announce_disagreement(
         session,
         values["dataset_id"],
         DISPUTED,
-        f"group{group_id}_disputed{stamp(at)}",
+        f"group{group_id}_disputed{time_suffix(at)}",
         actor=BY_ITSELF,
         at=at,
         batch_id=annotations[0].batch_id,

@@ -18,9 +18,8 @@ from app.evaluation.rater_agreement import (
     fleiss_kappa,
     krippendorff_alpha,
 )
-from app.features.agreement.compare import read_limits
-from app.features.agreement.queries import AGREED, DECIDED, OPEN, agreements_of
-from app.features.agreement.service import AnnotationComparison, StoredComparison
+from app.features.agreement.queries import AGREED, DECIDED, OPEN, list_agreements
+from app.features.agreement.service import AnnotationComparison, StoredComparison, read_limits
 from app.features.datasets.service import dataset_id
 from app.features.solutions.codec import from_json
 from app.formats.csv_text import csv_line
@@ -106,7 +105,7 @@ class _ComparedGroup:
         return dict(sorted(verdicts.items()))
 
 
-def agreement_of(store: Store, dataset: str | int, batch: int | None = None) -> Agreement:
+def summarize_agreement(store: Store, dataset: str | int, batch: int | None = None) -> Agreement:
     """How far people agree in a dataset.
 
     Args:
@@ -116,7 +115,7 @@ def agreement_of(store: Store, dataset: str | int, batch: int | None = None) -> 
     """
     number = dataset_id(store, dataset)
     with store.read() as session:
-        rows = agreements_of(session, number, batch_id=batch)
+        rows = list_agreements(session, number, batch_id=batch)
         limits = read_limits(session, number)
     read = [
         _ComparedGroup(row, from_json(StoredComparison, unpack(row.pairs)).pairs) for row in rows

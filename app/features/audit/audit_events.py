@@ -9,9 +9,9 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
-from app.features.people.alias_queries import find_alias, insert_alias
 from app.features.people.queries import person_by_id
 from app.features.people.roles import PERSON, require_no_token
+from app.features.people.visibility_queries import find_alias, insert_alias
 from app.soccer.actors import LOCAL_USER
 
 DEED = "deed"
@@ -52,13 +52,13 @@ def record_audit_event(
         session.respond(None)
 
 
-def adopted_by(store: Store) -> str | None:
+def find_owner_of_local_work(store: Store) -> str | None:
     """As whose the work of the single user is shown; None where it was given to nobody."""
     with store.read() as session:
         return find_alias(session, LOCAL_USER)
 
 
-def adopt(store: Store, person_id: int, *, actor: str) -> str:
+def assign_local_work(store: Store, person_id: int, *, actor: str) -> str:
     """Show what was done until now without an account as a person's; returns their name.
 
     Raises:

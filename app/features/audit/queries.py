@@ -12,8 +12,7 @@ from app.db.json_columns import unpack
 from app.db.log import LogModel
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
-from app.features.people.alias_queries import shown_actor
-from app.features.people.visibility_queries import Visibility
+from app.features.people.visibility_queries import Visibility, shown_actor
 from app.soccer.actors import TOKEN
 
 

@@ -9,31 +9,47 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import StreamingResponse
+from pydantic import Field
 from starlette.responses import Response
 
 from app.features.audit import service as audit
 from app.features.audit.queries import AuditQuery
-from app.features.audit.schemas import AuditDocument
 from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.finite import MAX_ID
 from app.formats.csv_text import csv_line
-from app.http.access import login_of
+from app.http.access import current_login
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
-from app.http.documents import json_of
+from app.http.documents import ListDocument, json_of
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.route import Route
 
 router = APIRouter(prefix="/audit", tags=["users"], route_class=Route)
 COLUMNS = tuple(field.name for field in fields(AuditEntry))
+Search = Annotated[
+    str,
+    Query(
+        alias="q",
+        max_length=200,
+        description="Words that all stand in an entry: its sentence, person, dataset or group.",
+    ),
+]
+
+
+class AuditDocument(ListDocument[AuditEntry]):
+    """Entries, the newest first."""
+
+    next: Annotated[str, Field(coerce_numbers_to_str=True)] | None = Field(
+        description="`cursor` of the next page; null on the last one."
+    )
 
 
 async def get_led(request: Request) -> Visibility:
     """The datasets whose audit whoever asks may read."""
-    login = login_of(request.scope)
+    login = current_login(request.scope)
     return EVERYTHING if login is None else login.roles.led_datasets()
 
 
@@ -77,14 +93,6 @@ def _time_text(at: datetime | None) -> str | None:
 
 
 Asked = Annotated[AuditQuery, Depends(audit_query)]
-Search = Annotated[
-    str,
-    Query(
-        alias="q",
-        max_length=200,
-        description="Words that all stand in an entry: its sentence, person, dataset or group.",
-    ),
-]
 
 
 @router.get("", operation_id="getAudit", response_model=AuditDocument, responses=responses(404))

@@ -15,27 +15,28 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, HeldGroupError, NotFoundError
 from app.features.batches.own_annotations import (
-    as_seen,
+    find_own_annotation,
+    list_returned_groups,
     next_own,
-    own_of,
     own_total,
-    returned_to,
     submit_own,
     takes_part,
+    visible_batch,
 )
 from app.features.batches.queries import (
-    end_lease_of,
+    WaitingGroup,
     end_leases,
+    end_person_lease,
+    find_batch_group,
     forget_ended,
-    group_in,
     keep_lease,
-    leases_on,
+    list_group_leases,
     mark_submitted,
     waiting_group,
 )
 from app.features.batches.service import WORK, Batch, Part, Presence, read_batch
+from app.features.independent_annotations.adopt import checked_reason, log_return
 from app.features.independent_annotations.queries import IndependentAnnotation
-from app.features.independent_annotations.return_work import checked_reason, log_return
 from app.features.independent_annotations.service import ReturnedGroup, read_returned
 from app.features.people.visibility_queries import is_blind
 
@@ -123,7 +124,7 @@ class Leases:
             batch = _open_batch(session, batch_id)
             if not takes_part(batch, worker.parts(batch)):
                 return self._next(session, batch, worker, after)
-            back = returned_to(session, batch, worker.name)
+            back = list_returned_groups(session, batch, worker.name)
             mine = next((group for group in back if group != after), None)
             if mine is not None:
                 row = _group(session, batch, mine)
@@ -163,7 +164,7 @@ class Leases:
         """
         with self._store.write(lasting=False) as session:
             batch = _open_batch(session, batch_id)
-            own = own_of(session, batch, group, worker.name)
+            own = find_own_annotation(session, batch, group, worker.name)
             if own is not None:
                 return _copy_lease(session, batch, own, worker)
             _require_given(session, batch, group, worker)
@@ -182,8 +183,8 @@ class Leases:
             NotFoundError: There is no such batch.
         """
         with self._store.write(lasting=False) as session:
-            batch = as_seen(session, read_batch(session, batch_id, with_here=False))
-            end_lease_of(session, batch_id, group, worker.name)
+            batch = visible_batch(session, read_batch(session, batch_id, with_here=False))
+            end_person_lease(session, batch_id, group, worker.name)
             return Lease(batch, group, here=_presences(session, batch, group, self._now()))
 
     def submit(
@@ -198,7 +199,7 @@ class Leases:
         """
         with self._store.read() as session:
             batch = _open_batch(session, batch_id)
-            own = own_of(session, batch, group, worker.name)
+            own = find_own_annotation(session, batch, group, worker.name)
         if own is not None:
             lease = Lease(batch, group)
             with self._store.write() as session:
@@ -250,14 +251,14 @@ class Leases:
         self, session: Session, batch_id: int, group: int, worker: BatchMember
     ) -> Lease:
         """The response once somebody's lease has ended with what they said of the group."""
-        end_lease_of(session, batch_id, group, worker.name)
-        batch = as_seen(session, read_batch(session, batch_id))
+        end_person_lease(session, batch_id, group, worker.name)
+        batch = visible_batch(session, read_batch(session, batch_id))
         lease = Lease(batch, group, here=_presences(session, batch, group, self._now()))
         session.respond(lease)
         return lease
 
     def _renewed(
-        self, session: Session, batch: Batch, row: Any, part: Part, worker: BatchMember
+        self, session: Session, batch: Batch, row: WaitingGroup, part: Part, worker: BatchMember
     ) -> Lease:
         at, group = self._clock(), row.group_id
         until = text_of(at + LASTS)
@@ -299,7 +300,7 @@ def open_for(
         ConflictError: The batch is given to others.
     """
     parts = _need_parts(batch, worker)
-    row = None if after is None else group_in(session, batch.id, after)
+    row = None if after is None else find_batch_group(session, batch.id, after)
     place = 0 if row is None else int(row.place)
     for part in (Part.ANNOTATOR, Part.REVIEWER):
         if part not in parts:
@@ -328,13 +329,13 @@ def _blocking_leases(
     """The leases of others that stand in somebody's way; none where each has a copy of their own."""
     if batch.verdicts > 1:
         return []
-    return [row for row in leases_on(session, group, at) if row.person != worker.name]
+    return [row for row in list_group_leases(session, group, at) if row.person != worker.name]
 
 
 def _presences(session: Session, batch: Batch, group: int, at: str) -> tuple[Presence, ...]:
     return tuple(
         Presence(group, row.person, row.taken, row.seen)
-        for row in leases_on(session, group, at)
+        for row in list_group_leases(session, group, at)
         if row.batch_id == batch.id or batch.verdicts == 1
     )
 
@@ -343,7 +344,7 @@ def _open_batch(session: Session, batch_id: int) -> Batch:
     batch = read_batch(session, batch_id, with_here=False)
     if not batch.is_open:
         raise ConflictError(f'the batch "{batch.name}" is closed')
-    return as_seen(session, batch)
+    return visible_batch(session, batch)
 
 
 def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
@@ -356,7 +357,7 @@ def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
     return parts
 
 
-def _part_in(parts: set[Part], row: Any) -> Part:
+def _part_in(parts: set[Part], row: WaitingGroup) -> Part:
     """What somebody with these parts does with a group of a batch, as far as it is by now."""
     if Part.ANNOTATOR in parts and (row.submitted is None or Part.REVIEWER not in parts):
         return Part.ANNOTATOR
@@ -371,7 +372,7 @@ def _require_given(session: Session, batch: Batch, group: int, worker: BatchMemb
     """
     if not is_blind(batch.dataset_id) or not takes_part(batch, worker.parts(batch)):
         return
-    if group not in returned_to(session, batch, worker.name):
+    if group not in list_returned_groups(session, batch, worker.name):
         raise _no_group(batch, group)
 
 
@@ -380,7 +381,7 @@ def _no_group(batch: Batch, group: int) -> NotFoundError:
 
 
 def _group(session: Session, batch: Batch, group: int) -> Any:
-    row = group_in(session, batch.id, group)
+    row = find_batch_group(session, batch.id, group)
     if row is None:
         raise _no_group(batch, group)
     return row

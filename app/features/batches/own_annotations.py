@@ -10,7 +10,7 @@ from dataclasses import replace
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.batches.queries import groups_of, groups_returned
+from app.features.batches.queries import list_returned_rows, read_batch_groups
 from app.features.batches.queries import mark_submitted as hand_in_group
 from app.features.batches.service import Batch, Part, get_batch, list_batches
 from app.features.independent_annotations.adopt import adopt_annotation
@@ -29,7 +29,7 @@ from app.features.independent_annotations.queries import (
 )
 from app.features.independent_annotations.service import read_annotation
 from app.features.independent_annotations.submission_queries import require_open, submit_copy
-from app.features.people.visibility_queries import READER, judges_in
+from app.features.people.visibility_queries import READER, sees_all_work
 from app.features.queue.fields import reads_hidden_work
 from app.soccer.actors import person_of
 
@@ -64,9 +64,9 @@ def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation |
     return begin_next(store, terms, person=person)
 
 
-def returned_to(session: Session, batch: Batch, person: str) -> list[int]:
+def list_returned_groups(session: Session, batch: Batch, person: str) -> list[int]:
     """Groups whose annotation somebody submitted, was taken over, and was returned to them."""
-    return [row.group_id for row in groups_returned(session, [batch.id], person_of(person))]
+    return [row.group_id for row in list_returned_rows(session, [batch.id], person_of(person))]
 
 
 def own_left(session: Session, batch: Batch, person: str) -> int:
@@ -74,7 +74,7 @@ def own_left(session: Session, batch: Batch, person: str) -> int:
     that they have back included."""
     name = person_of(person)
     begun, free = count_left(session, batch.id, batch.dataset_id, name, batch.verdicts)
-    left = begun + free + len(returned_to(session, batch, person))
+    left = begun + free + len(list_returned_groups(session, batch, person))
     if batch.gold_every is None:
         return left
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
@@ -83,13 +83,13 @@ def own_left(session: Session, batch: Batch, person: str) -> int:
     return left + count_gold_left(kinds, batch.gold_every, free, fresh)
 
 
-def as_seen(session: Session, batch: Batch) -> Batch:
+def visible_batch(session: Session, batch: Batch) -> Batch:
     """A batch as whoever asks may see it.
 
     Of one that they annotate blind they see their own part alone: counts of the groups change with
     what is submitted of them, and not with what is submitted of a gold group.
     """
-    if reads_hidden_work(batch.query) and not judges_in(batch.dataset_id):
+    if reads_hidden_work(batch.query) and not sees_all_work(batch.dataset_id):
         batch = replace(batch, query="")
     reader = READER.get()
     if reader is None or batch.id not in reader.batches.get(batch.dataset_id, ()):
@@ -101,7 +101,7 @@ def own_part(session: Session, batch: Batch, person: str) -> Batch:
     """A batch with the counts of somebody's own annotations: what they submitted is done."""
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
     name = person_of(person)
-    back = set(returned_to(session, batch, person))
+    back = set(list_returned_groups(session, batch, person))
     done = [
         annotation.submitted
         for annotation in annotations
@@ -121,21 +121,21 @@ def seen_batches(store: Store, dataset: str | int) -> list[Batch]:
     """The batches of a dataset as whoever asks may see them."""
     found = list_batches(store, dataset)
     with store.read() as session:
-        return [as_seen(session, batch) for batch in found]
+        return [visible_batch(session, batch) for batch in found]
 
 
 def seen_batch(store: Store, batch_id: int) -> Batch:
     """A batch as whoever asks may see it; raises NotFoundError where there is none."""
     batch = get_batch(store, batch_id)
     with store.read() as session:
-        return as_seen(session, batch)
+        return visible_batch(session, batch)
 
 
 def _waiting(session: Session, batch: Batch) -> list[int]:
     """The groups of a batch that wait; what was submitted otherwise waits for its reviewer."""
     return [
         row.group_id
-        for row in groups_of(session, batch.id)
+        for row in read_batch_groups(session, batch.id)
         if row.settled is None and row.submitted is None
     ]
 
@@ -177,7 +177,9 @@ def adopt_submitted(store: Store, batch: Batch, person: str) -> None:
         adopt_annotation(store, row.id, actor=person, also=note if waits else None)
 
 
-def own_of(session: Session, batch: Batch, group: int, person: str) -> IndependentAnnotation | None:
+def find_own_annotation(
+    session: Session, batch: Batch, group: int, person: str
+) -> IndependentAnnotation | None:
     """The own annotation of a person in a batch whose copy a group is; None: it is none."""
     row = annotation_of_copy(session, group)
     if row is None or (row.batch_id, row.person) != (batch.id, person_of(person)):

@@ -13,21 +13,27 @@ from typing import Any
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.features.batches.leases import BatchMember
-from app.features.batches.own_annotations import as_seen, own_left, own_part, takes_part
+from app.features.batches.own_annotations import own_left, own_part, takes_part, visible_batch
 from app.features.batches.queries import (
     batches_that_wait,
     datasets_with_batches,
     entries_of_work,
-    groups_of,
-    groups_returned,
     last_work,
+    list_returned_rows,
+    read_batch_groups,
 )
 from app.features.batches.service import Batch, Part, read_batch, read_batches
 from app.features.datasets.service import dataset_id
 from app.features.independent_annotations.queries import annotations_of_batch, open_annotations
 from app.features.independent_annotations.service import ReturnedGroup, read_returned
 from app.features.people.visibility_queries import EVERYTHING, Visibility
-from app.features.webhooks.queries import STALLED, announce, listeners, stamp, webhooks_on
+from app.features.webhooks.queries import (
+    STALLED,
+    announce,
+    list_active_webhooks,
+    list_listeners,
+    time_suffix,
+)
 from app.soccer.actors import person_of
 
 BY_ITSELF = "script:batches"
@@ -79,8 +85,8 @@ def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> Stall | Non
 def notify_of_stalls(store: Store, at: datetime) -> int:
     """Tell webhooks of the batches that have stalled, of each stall once; returns how many messages."""
     with store.read() as session:
-        wanted = {row.dataset_id for row in webhooks_on(session)}
-        datasets = [one for one in sorted(wanted) if listeners(session, one, STALLED)]
+        wanted = {row.dataset_id for row in list_active_webhooks(session)}
+        datasets = [one for one in sorted(wanted) if list_listeners(session, one, STALLED)]
         found = _stalls(session, datasets, at, store.settings.stalled_hours)
     if not found:
         return 0
@@ -97,7 +103,7 @@ def _stalls(
 
 
 def _notify_of_stall(session: Session, batch: Batch, stall: Stall, at: datetime) -> int:
-    event = f"batch{batch.id}_{stall.why}{stamp(stall.since)}"
+    event = f"batch{batch.id}_{stall.why}{time_suffix(stall.since)}"
     details = {"why": str(stall.why), "since": stall.since}
     return announce(
         session,
@@ -182,7 +188,7 @@ def my_work(
                 left = own_left(session, batch, worker.name) if own else _count_left(batch, parts)
                 back = _returned_groups(session, batch, worker.name)
                 seen = own_part(session, batch, worker.name) if own else batch
-                found.append(MyBatch(as_seen(session, seen), sorted(parts), left, back))
+                found.append(MyBatch(visible_batch(session, seen), sorted(parts), left, back))
         return found
 
 
@@ -190,7 +196,7 @@ def _returned_groups(session: Session, batch: Batch, name: str) -> list[Returned
     """What of a batch somebody has back, in its order."""
     person = person_of(name)
     rows = (
-        *groups_returned(session, [batch.id], person),
+        *list_returned_rows(session, [batch.id], person),
         *open_annotations(session, [batch.id], person),
     )
     waiting = [row.group_id for row in rows]
@@ -218,7 +224,9 @@ def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> T
     since = stall.since if stall is not None and stall.why is StallReason.IDLE else None
     entries = entries_of_work(session, batch.id, batch.created)
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
-    return TeamBatch(batch, since, _paces(entries, groups_of(session, batch.id), annotations))
+    return TeamBatch(
+        batch, since, _paces(entries, read_batch_groups(session, batch.id), annotations)
+    )
 
 
 def _paces(entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[Any]) -> list[Pace]:

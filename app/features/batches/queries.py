@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import (
     BindParameter,
@@ -36,7 +36,7 @@ from app.features.batches.tables import (
 from app.features.datasets.tables import DatasetModel
 from app.features.independent_annotations.tables import IndependentAnnotationModel
 from app.features.people.tables import PersonModel
-from app.features.people.visibility_queries import seen_in
+from app.features.people.visibility_queries import visible_groups_condition
 from app.features.queue.tables import QueueModel
 from app.features.tracks.tables import TrackModel
 from app.soccer.choices import BatchState
@@ -98,12 +98,12 @@ _DONE_KINDS = ("edit", "undo", "redo", "verdict")
 """Entries of the log that show that somebody works on a group."""
 
 
-def batch_of(session: Session, batch_id: int) -> Any | None:
+def find_batch(session: Session, batch_id: int) -> Any | None:
     """A batch by its id, with the name of its ``dataset``."""
     return session.execute(_BATCH, {"id": batch_id}).one_or_none()
 
 
-def batches_of(session: Session, dataset_ids: Collection[int]) -> Sequence[Any]:
+def find_dataset_batches(session: Session, dataset_ids: Collection[int]) -> Sequence[Any]:
     """The batches of datasets, with the names of those; open ones and those that are due first come first."""
     order = (BatchModel.state.desc(), BatchModel.due.is_(None), BatchModel.due, BatchModel.id)
     mine = BatchModel.dataset_id.in_(dataset_ids)
@@ -156,9 +156,18 @@ def set_people(session: Session, batch_id: int, part: str, person_ids: Iterable[
         session.execute(insert(table), rows)
 
 
-def people_of(session: Session, batch_ids: Collection[int]) -> Sequence[Any]:
-    """Rows (batch_id, part, id, name) of the people whom batches were given to, by name."""
-    return session.execute(_PEOPLE, {"ids": list(batch_ids)}).all()
+class BatchPersonRow(NamedTuple):
+    """A person to whom a batch was given, and for which part."""
+
+    batch_id: int
+    part: str
+    id: int
+    name: str
+
+
+def list_batch_people(session: Session, batch_ids: Collection[int]) -> Sequence[BatchPersonRow]:
+    """The people to whom batches were given, by name."""
+    return session.rows(BatchPersonRow, _PEOPLE, {"ids": list(batch_ids)})
 
 
 def insert_groups(session: Session, batch_id: int, group_ids: Sequence[int]) -> None:
@@ -208,7 +217,7 @@ def groups_given(session: Session, dataset_id: int) -> set[int]:
     return set(session.scalars(statement))
 
 
-def groups_of(session: Session, batch_id: int) -> Sequence[Any]:
+def read_batch_groups(session: Session, batch_id: int) -> Sequence[Any]:
     """Every group of a batch in order, with its ``number``."""
     statement = (
         select(
@@ -222,27 +231,51 @@ def groups_of(session: Session, batch_id: int) -> Sequence[Any]:
     return session.execute(statement).all()
 
 
-def group_in(session: Session, batch_id: int, group_id: int) -> BatchGroupModel | None:
+def find_batch_group(session: Session, batch_id: int, group_id: int) -> BatchGroupModel | None:
     """A group of a batch."""
     return session.row(BatchGroupModel, _GROUP, {"batch": batch_id, "group": group_id})
 
 
-def groups_returned(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
-    """Rows (batch_id, group_id) of what was returned to a person and waits for them, in order."""
+class BatchGroupRow(NamedTuple):
+    """A group of a batch."""
+
+    batch_id: int
+    group_id: int
+
+
+def list_returned_rows(
+    session: Session, batch_ids: Collection[int], person: str
+) -> Sequence[BatchGroupRow]:
+    """Groups that were returned to a person and wait for them, in order."""
     table = BatchGroupModel
     back = (table.submitted_by == person, table.submitted.is_(None), table.settled.is_(None))
     statement = select(table.batch_id, table.group_id).where(table.batch_id.in_(batch_ids), *back)
-    return session.execute(statement.order_by(table.batch_id, table.place)).all()
+    return session.rows(BatchGroupRow, statement.order_by(table.batch_id, table.place))
 
 
-def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, Any]:
-    """Of each batch ``groups`` (or tracks), ``submitted`` (and not settled), ``settled``, and ``last``,
-    when something of it was done last."""
+class WorkCount(NamedTuple):
+    """How much of a batch is done.
+
+    Attributes:
+        groups: Its groups or tracks.
+        submitted: Of these, those that are submitted and not settled.
+        last: When something of it was done last.
+    """
+
+    batch_id: int
+    groups: int
+    submitted: int
+    settled: int
+    last: str | None
+
+
+def count_work(session: Session, batch_ids: Collection[int]) -> dict[int, WorkCount]:
+    """How much of each batch is done, by its id."""
     ids = {"ids": list(batch_ids)}
     return {
         row.batch_id: row
         for count in (_COUNT, _COUNT_TRACKS)
-        for row in session.execute(count, ids)
+        for row in session.rows(WorkCount, count, ids)
     }
 
 
@@ -264,6 +297,14 @@ def mark_submitted(
     session.execute(update(BatchGroupModel).where(*where).values(**values))
 
 
+class WaitingGroup(NamedTuple):
+    """A group of a batch that somebody may take, and whether it was submitted."""
+
+    group_id: int
+    submitted: str | None
+    submitted_by: str | None
+
+
 def waiting_group(
     session: Session,
     batch_id: int,
@@ -273,8 +314,8 @@ def waiting_group(
     *,
     submitted: bool | None,
     after: int,
-) -> Any | None:
-    """The group (group_id, submitted, submitted_by) that a person would take next, if there is one.
+) -> WaitingGroup | None:
+    """The group that a person would take next, if there is one.
 
     Args:
         session: A write session, so that nobody else takes it meanwhile.
@@ -290,9 +331,9 @@ def waiting_group(
     """
     given = {"batch": batch_id, "person": person, "at": at, "after": after}
     waiting = _waiting(submitted, bool(after))
-    if seen := seen_in(dataset_id, BatchGroupModel.group_id):
+    if seen := visible_groups_condition(dataset_id, BatchGroupModel.group_id):
         waiting = waiting.where(*seen)
-    return session.execute(waiting, given).one_or_none()
+    return session.row(WaitingGroup, waiting, given)
 
 
 @cache
@@ -327,12 +368,12 @@ def _leased(*where: ColumnElement[bool]) -> ColumnElement[bool]:
     return exists().where(LeaseModel.group_id == BatchGroupModel.group_id, *where)
 
 
-def leases_on(session: Session, group_id: int, at: str) -> Sequence[LeaseModel]:
+def list_group_leases(session: Session, group_id: int, at: str) -> Sequence[LeaseModel]:
     """The leases on a group that last, the oldest first."""
     return session.rows(LeaseModel, _LEASES_ON, {"group": group_id, "at": at})
 
 
-def leases_of(session: Session, batch_ids: Collection[int], at: str) -> Sequence[LeaseModel]:
+def list_leases(session: Session, batch_ids: Collection[int], at: str) -> Sequence[LeaseModel]:
     """The leases in batches that last."""
     return session.rows(LeaseModel, _LEASES_IN, {"ids": list(batch_ids), "at": at})
 
@@ -350,7 +391,7 @@ def end_leases(session: Session, ids: Collection[int]) -> None:
     session.execute(delete(LeaseModel).where(LeaseModel.id.in_(ids)))
 
 
-def end_lease_of(session: Session, batch_id: int, group_id: int, person: str) -> bool:
+def end_person_lease(session: Session, batch_id: int, group_id: int, person: str) -> bool:
     """End a person's lease; whether there was one."""
     where = (
         LeaseModel.batch_id == batch_id,
@@ -366,12 +407,20 @@ def forget_ended(session: Session, at: str) -> None:
     session.execute(_ENDED, {"at": at})
 
 
-def entries_of_work(session: Session, batch_id: int, since: str) -> Sequence[Any]:
-    """Rows (actor, at, group_id, kind) of the log about a batch's groups, and people's own copies of
-    them, since some time, in order."""
+class WorkEntry(NamedTuple):
+    """An entry of the log about a group of a batch."""
+
+    actor: str
+    at: str
+    group_id: int
+    kind: str
+
+
+def entries_of_work(session: Session, batch_id: int, since: str) -> Sequence[WorkEntry]:
+    """Entries of the log about a batch's groups, and people's own copies of them, since some time, in order."""
     columns = (LogModel.actor, LogModel.at, LogModel.group_id, LogModel.kind)
     statement = select(*columns).where(*_worked_on(batch_id), LogModel.at >= since)
-    return session.execute(statement.order_by(LogModel.at)).all()
+    return session.rows(WorkEntry, statement.order_by(LogModel.at))
 
 
 def last_work(session: Session, batch_id: int) -> str | None:
@@ -393,7 +442,7 @@ def groups_in_batches(batch_ids: Collection[int]) -> Select[int]:
     return select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id.in_(batch_ids))
 
 
-def place_in(batch_id: int) -> ColumnElement[Any]:
+def place_column(batch_id: int) -> ColumnElement[Any]:
     """The place of a row of the queue in a batch; NULL where it is in none of it."""
     return (
         select(BatchGroupModel.place)

@@ -27,14 +27,14 @@ from app.features.batches.schemas import (
 from app.features.batches.service import Batch, NewBatch
 from app.features.independent_annotations.schemas import ReturnReason
 from app.features.people.logins import Login
-from app.features.people.roles import lets
-from app.http.access import login_of
+from app.features.people.roles import role_allows
+from app.http.access import current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
+from app.http.documents import as_document, document, no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import EDITS, LOOKS, limit
-from app.http.respond import as_document, document, no_content, responds
 from app.http.route import Route
 from app.http.services import Services
 from app.soccer.actors import LOCAL_USER
@@ -53,7 +53,7 @@ class BatchMembers:
         if self.login is None:
             return BatchMember(LOCAL_USER, alone=True)
         role = self.login.roles.role_in(dataset_id)
-        annotates, reviews = (lets(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
+        annotates, reviews = (role_allows(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
         return BatchMember(self.login.name, annotates, reviews)
 
     def of_batch(self, store: Store, batch: int) -> BatchMember:
@@ -62,7 +62,7 @@ class BatchMembers:
 
 
 async def _workers(request: Request) -> BatchMembers:
-    return BatchMembers(login_of(request.scope))
+    return BatchMembers(current_login(request.scope))
 
 
 Members = Annotated[BatchMembers, Depends(_workers)]

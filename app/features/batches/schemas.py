@@ -21,7 +21,7 @@ from app.features.independent_annotations.service import ReturnedGroup
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
-from app.http.event_schemas import PresenceDocument
+from app.http.problem import PresenceDocument
 from app.soccer.choices import BatchState
 
 Name = Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]

@@ -16,27 +16,27 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.batches.queries import (
     CLOSED,
     OPEN,
-    batch_of,
-    batches_of,
     count_work,
     delete_batch,
+    find_batch,
+    find_dataset_batches,
     groups_given,
-    groups_of,
     insert_batch,
     insert_groups,
     insert_tracks,
-    leases_of,
-    people_of,
+    list_batch_people,
+    list_leases,
+    read_batch_groups,
     set_people,
     tracks_given,
     update_batch,
 )
 from app.features.datasets.service import checked_title, dataset_id
-from app.features.independent_annotations.gold_queries import gold_heads
+from app.features.independent_annotations.queries import gold_heads
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify
-from app.features.people.members import list_members
-from app.features.people.roles import Action, lets
+from app.features.people.roles import Action, role_allows
+from app.features.people.service import list_members
 from app.features.queue.queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, Query, parse_query
 from app.features.tracks.queries import list_rows
@@ -186,7 +186,7 @@ def get_batch(store: Store, batch_id: int) -> Batch:
 def dataset_of_batch(store: Store, batch_id: int) -> int:
     """Id of the dataset of a batch; raises NotFoundError when there is no such batch."""
     with store.read_one() as session:
-        row = batch_of(session, batch_id)
+        row = find_batch(session, batch_id)
     if row is None:
         raise NotFoundError(f"there is no batch {batch_id}")
     return int(row.dataset_id)
@@ -204,7 +204,7 @@ def list_batch_groups(store: Store, batch_id: int) -> list[BatchGroup]:
                 row.group_id, row.number, row.place, row.submitted, row.submitted_by,
                 row.settled, here[row.group_id],
             )
-            for row in groups_of(session, batch_id)
+            for row in read_batch_groups(session, batch_id)
         ]  # fmt: skip
 
 
@@ -225,7 +225,7 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         Part.REVIEWER: _ids(store, number, Part.REVIEWER, new.reviewers),
     }
     with store.write() as session:
-        if len(batches_of(session, [number])) >= MOST_BATCHES:
+        if len(find_dataset_batches(session, [number])) >= MOST_BATCHES:
             raise ConflictError(
                 f"a dataset has at most {MOST_BATCHES} batches", hint="Delete one that is closed."
             )
@@ -349,7 +349,7 @@ def read_batch(session: Session, batch_id: int, *, with_here: bool = True) -> Ba
 
     ``with_here``: False: nobody asks who has which group open.
     """
-    row = batch_of(session, batch_id)
+    row = find_batch(session, batch_id)
     if row is None:
         raise NotFoundError(f"there is no batch {batch_id}")
     return _batches(session, [row], with_here)[0]
@@ -357,18 +357,18 @@ def read_batch(session: Session, batch_id: int, *, with_here: bool = True) -> Ba
 
 def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
     """The batches of datasets within a session."""
-    return _batches(session, batches_of(session, dataset_ids))
+    return _batches(session, find_dataset_batches(session, dataset_ids))
 
 
 def _batches(session: Session, rows: Sequence[Any], with_here: bool = True) -> list[Batch]:
     ids = [row.id for row in rows]
     counts = count_work(session, ids)
     names: dict[tuple[int, str], list[str]] = defaultdict(list)
-    for row in people_of(session, ids):
-        names[row.batch_id, row.part].append(row.name)
+    for person in list_batch_people(session, ids):
+        names[person.batch_id, person.part].append(person.name)
     here: dict[int, list[Presence]] = defaultdict(list)
-    for row in leases_of(session, ids, now()) if with_here else ():
-        here[row.batch_id].append(Presence(row.group_id, row.person, row.taken, row.seen))
+    for lease in list_leases(session, ids, now()) if with_here else ():
+        here[lease.batch_id].append(Presence(lease.group_id, lease.person, lease.taken, lease.seen))
     found = []
     for row in rows:
         count = counts.get(row.id)
@@ -394,7 +394,9 @@ def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[i
     if not wanted:
         return []
     able = {
-        one.name: one.id for one in list_members(store, dataset) if lets(one.role, _NEEDS[part])
+        one.name: one.id
+        for one in list_members(store, dataset)
+        if role_allows(one.role, _NEEDS[part])
     }
     missing = sorted(wanted - set(able))
     if missing:

@@ -9,14 +9,19 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from app.db.log import Entry, append
+from app.db.check import Check, compared
+from app.db.dialects.dialect import dialect_in
+from app.db.json_columns import as_written
+from app.db.log import Entry, LogEntry, append, entries_of_kinds
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
+from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError, StorageError
 from app.features.comments.queries import StoredComment as StoredComment
 from app.features.comments.queries import StoredThread as StoredThread
 from app.features.comments.queries import (
     ThreadGroup,
+    ThreadRecord,
+    all_threads,
     change_comment,
     delete_thread,
     find_group,
@@ -29,7 +34,7 @@ from app.features.comments.queries import (
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify
 from app.features.people.logins import read_roles
-from app.features.people.queries import members, person_by_name
+from app.features.people.queries import MemberRow, person_by_name, read_members
 from app.features.people.roles import Role
 from app.soccer.actors import is_actor_of, person_of
 
@@ -40,6 +45,9 @@ LONGEST = 4000
 MOST = 200
 """Comments in one thread."""
 _MENTION = re.compile(r"(?<![\w@.-])@([a-z0-9](?:[a-z0-9._-]{0,38}[a-z0-9])?)", re.IGNORECASE)
+
+
+WRONG = "not as the log says"
 
 
 def names_in(text: str) -> list[str]:
@@ -63,7 +71,7 @@ def list_threads(store: Store, group_id: int) -> list[StoredThread]:
         return read_threads(session, group_id)
 
 
-def people_of(store: Store, group_id: int) -> list[str]:
+def list_mentionable_people(store: Store, group_id: int) -> list[str]:
     """Names of everybody who sees a group, and can be mentioned there.
 
     Raises:
@@ -71,7 +79,9 @@ def people_of(store: Store, group_id: int) -> list[str]:
     """
     with store.read() as session:
         group = _require_group(session, group_id)
-        return [row.name for row in members(session, group.dataset_id) if _can_read_dataset(row)]
+        return [
+            row.name for row in read_members(session, group.dataset_id) if _can_read_dataset(row)
+        ]
 
 
 def begin_thread(
@@ -102,7 +112,9 @@ def begin_thread(
         return _respond_with_thread(session, group_id, thread_id)
 
 
-def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str) -> StoredThread:
+def add_reply(
+    store: Store, group_id: int, thread_id: int, text: str, *, actor: str
+) -> StoredThread:
     """Say something in a thread; who spoke there before is told.
 
     Raises:
@@ -125,7 +137,7 @@ def reply(store: Store, group_id: int, thread_id: int, text: str, *, actor: str)
         return _respond_with_thread(session, group_id, thread_id)
 
 
-def resolve(
+def resolve_thread(
     store: Store, group_id: int, thread_id: int, resolved: bool, *, actor: str
 ) -> StoredThread:
     """Settle a thread, or open it again.
@@ -146,7 +158,7 @@ def resolve(
         return _respond_with_thread(session, group_id, thread_id)
 
 
-def change(
+def edit_comment(
     store: Store, group_id: int, thread_id: int, comment_id: int, text: str, *, actor: str
 ) -> StoredThread:
     """Give a comment of one's own another text; it is marked as edited.
@@ -174,7 +186,9 @@ def change(
         return _respond_with_thread(session, group_id, thread_id)
 
 
-def remove(store: Store, group_id: int, thread_id: int, comment_id: int, *, actor: str) -> None:
+def delete_comment(
+    store: Store, group_id: int, thread_id: int, comment_id: int, *, actor: str
+) -> None:
     """Delete a comment of one's own; a thread in which nothing else is said goes with it.
 
     Raises:
@@ -250,7 +264,7 @@ def _ids_of_readers(session: Session, group: ThreadGroup, names: Iterable[str]) 
     return found
 
 
-def _can_read_dataset(row: Any) -> bool:
+def _can_read_dataset(row: MemberRow) -> bool:
     here = row.everywhere if row.role is None or row.everywhere == Role.ADMIN else row.role
     return bool(here != Role.NONE)
 
@@ -302,3 +316,63 @@ def _require_own_comment(
                 raise ForbiddenError("only its author can change a comment", hint="Reply to it.")
             return comment
     raise NotFoundError(f"thread {thread_id} has no comment {comment_id}")
+
+
+def examine_threads(store: Store) -> Check:
+    """Compare every thread and comment with the log.
+
+    When a thread began and whom it mentions stands in the tables alone.
+    """
+    with store.read() as session:
+        return _compare_with_log(session, dialect_in(session).restoring)
+
+
+def _compare_with_log(session: Session, restore: str) -> Check:
+    try:
+        with as_written():
+            logged = logged_threads(entries_of_kinds(session, (COMMENT, "dataset_deleted")))
+    except StorageError as error:
+        return Check("threads", False, error.message, error.hint or restore)
+    present = all_threads(session)
+    keys = sorted(logged.keys() | present.keys())
+    apart = [str(key) for key in keys if logged.get(key) != present.get(key)]
+    return compared("threads", f"{len(present):,}, as the log says", apart, WRONG, restore)
+
+
+def logged_threads(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:
+    """The threads that follow from the log, by id.
+
+    Args:
+        entries: Of comments, and of datasets that were deleted, oldest first.
+    """
+    threads: dict[int, ThreadRecord] = {}
+    for entry in entries:
+        if entry.kind == COMMENT:
+            _apply_entry(threads, entry)
+        else:
+            gone = entry.dataset_id
+            threads = {key: one for key, one in threads.items() if one.dataset_id != gone}
+    return threads
+
+
+def _apply_entry(threads: dict[int, ThreadRecord], entry: LogEntry) -> None:
+    body, number = entry.body, entry.body["thread"]
+    if number not in threads:
+        threads[number] = _new_thread(entry)
+    thread, comment = threads[number], body.get("comment", 0)
+    match body["did"]:
+        case "said":
+            thread.comments[comment] = (entry.actor, entry.at, None, body["text"])
+        case "edited" | "deleted":
+            thread.comments[comment] = (*thread.comments[comment][:2], entry.at, body.get("text"))
+        case "resolved":
+            thread.resolved = (entry.at, entry.actor)
+        case "reopened":
+            thread.resolved = (None, None)
+    if all(text is None for *_, text in thread.comments.values()):
+        del threads[number]
+
+
+def _new_thread(entry: LogEntry) -> ThreadRecord:
+    x, y = entry.body.get("at", (None, None))
+    return ThreadRecord(entry.dataset_id, entry.group_id, entry.body.get("view"), x, y)

@@ -5,9 +5,12 @@ They also find the dataset that a named thing belongs to, and delete all that be
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from sqlalchemy import (
     ColumnElement,
@@ -21,28 +24,34 @@ from sqlalchemy import (
     insert,
     or_,
     select,
+    true,
     update,
 )
 
 from app.canonical import canonical
-from app.db.dialects.statements import DeferReferences, insert_or_replace
+from app.config import Settings
+from app.db.dialects.statements import DeferReferences, insert_or_replace, items_of, texts_in
+from app.db.home import DAY, last_written
 from app.db.json_columns import as_written, parse
 from app.db.session import COPIES_USED, Session, UsedIdModel
 from app.features.batches.tables import BatchModel
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
-from app.features.findings.tables import DismissalModel
+from app.features.findings.queries import DismissalModel
 from app.features.groups.codecs import policy_from_json, policy_to_json
-from app.features.jobs.tables import JobModel
+from app.features.imports.upload_queries import list_uploads
+from app.features.jobs.queries import JobModel
 from app.features.people.visibility_queries import COPIES
 from app.features.predictions.tables import EvaluationModel, PredictionSetModel
-from app.features.recordings.tables import RecordingModel
-from app.features.saved_views.tables import SavedViewModel
-from app.features.solutions.tables import SolutionModel
+from app.features.queue.tables import QueueModel
+from app.features.recordings.tables import RecordingModel, ShotCamerasModel
+from app.features.saved_views.queries import SavedViewModel
+from app.features.solutions.queries import CalibrationModel, SolutionModel
 from app.features.tables import Base
 from app.features.tracks.tables import TrackModel
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.features.versions.tables import VersionModel
 from app.finite import MAX_ID
+from app.object_store.address import is_address
 from app.soccer.policy import Policy
 
 _DIGITS = 19
@@ -50,8 +59,46 @@ _DIGITS = 19
 _ROWS = select(*DatasetModel.__table__.columns)
 
 
+_ID: Any = bindparam("id")
+_DATASET_OF: Mapping[str, Select[Any]] = {
+    "group": select(GroupModel.dataset_id).where(GroupModel.id == _ID),
+    "view": select(GroupModel.dataset_id)
+    .join(ViewModel, ViewModel.group_id == GroupModel.id)
+    .where(ViewModel.id == _ID),
+    "station": select(StationModel.dataset_id).where(StationModel.id == _ID),
+    "predictions": select(PredictionSetModel.dataset_id).where(PredictionSetModel.id == _ID),
+    "evaluation": select(EvaluationModel.dataset_id).where(EvaluationModel.id == _ID),
+    "saved view": select(SavedViewModel.dataset_id).where(SavedViewModel.id == _ID),
+    "recording": select(RecordingModel.dataset_id).where(RecordingModel.id == _ID),
+    "track": select(TrackModel.dataset_id).where(TrackModel.id == _ID),
+    "work": select(BatchModel.dataset_id).where(BatchModel.id == _ID),
+    "batch": select(VerdictBatchModel.dataset_id).where(VerdictBatchModel.id == _ID),
+}
+_GONE = and_(JobModel.dataset_id.is_not(None), JobModel.dataset_id.not_in(select(DatasetModel.id)))
+_JOB = select(JobModel.dataset_id, JobModel.actor, JobModel.kind).where(JobModel.id == _ID, ~_GONE)
+_TABLES = Base.metadata.tables
+_COUNTED = {
+    "groups": "groups",
+    "views": "view",
+    "verdicts": "verdict",
+    "saved_views": "saved_view",
+    "recordings": "recording",
+    "tracks": "track",
+    "versions": "version",
+    "predictions": "prediction_set",
+    "evaluations": "evaluation",
+}
+"""What a person is told of, by the name of its table."""
+_ACCESS = ("dataset_role", "access_token", "webhook")
+"""Who may, or hears, what in a dataset; nothing that was said of its groups."""
+_KEY = CalibrationModel.key
+_items = items_of(SolutionModel.calibrations)
+_NAMED = select(_items.c.value).select_from(SolutionModel).join(_items, true())
+_UNUSED = select(_KEY).where(_KEY.not_in(_NAMED))
+
+
 @lru_cache(maxsize=64)
-def policy_of(text: str) -> Policy:
+def policy_from_row(text: str) -> Policy:
     """The policy of a dataset's row; one value a text, however often it is asked for."""
     with as_written():
         return policy_from_json(parse(text))
@@ -142,65 +189,46 @@ def _policy_columns(policy: Policy) -> dict[str, str]:
     return {"policy": canonical(policy_to_json(policy)), "policy_hash": policy.hash}
 
 
-_ID: Any = bindparam("id")
-_DATASET_OF: Mapping[str, Select[Any]] = {
-    "group": select(GroupModel.dataset_id).where(GroupModel.id == _ID),
-    "view": select(GroupModel.dataset_id)
-    .join(ViewModel, ViewModel.group_id == GroupModel.id)
-    .where(ViewModel.id == _ID),
-    "station": select(StationModel.dataset_id).where(StationModel.id == _ID),
-    "predictions": select(PredictionSetModel.dataset_id).where(PredictionSetModel.id == _ID),
-    "evaluation": select(EvaluationModel.dataset_id).where(EvaluationModel.id == _ID),
-    "saved view": select(SavedViewModel.dataset_id).where(SavedViewModel.id == _ID),
-    "recording": select(RecordingModel.dataset_id).where(RecordingModel.id == _ID),
-    "track": select(TrackModel.dataset_id).where(TrackModel.id == _ID),
-    "work": select(BatchModel.dataset_id).where(BatchModel.id == _ID),
-    "batch": select(VerdictBatchModel.dataset_id).where(VerdictBatchModel.id == _ID),
-}
-_GONE = and_(JobModel.dataset_id.is_not(None), JobModel.dataset_id.not_in(select(DatasetModel.id)))
-_JOB = select(JobModel.dataset_id, JobModel.actor, JobModel.kind).where(JobModel.id == _ID, ~_GONE)
-
-
-def dataset_of(session: Session, kind: str, identity: int) -> int | None:
+def owning_dataset_id(session: Session, kind: str, identity: int) -> int | None:
     """Id of the dataset of a group, view, station and so on; None where there is no such thing."""
     found: int | None = session.scalar(_DATASET_OF[kind], {"id": identity})
     return found
 
 
-def owner_of_job(session: Session, job_id: int) -> Any | None:
-    """``dataset_id`` (or None), ``actor`` and ``kind`` of a job; None where there is none.
+class JobOwner(NamedTuple):
+    """Whose a job is: a dataset's, or who asked for it where it has none."""
+
+    dataset_id: int | None
+    actor: str
+    kind: str
+
+
+def owner_of_job(session: Session, job_id: int) -> JobOwner | None:
+    """Whose a job is; None where there is none.
 
     A job whose dataset is gone is nobody's: admins alone, who ask for no owner, see it.
     """
-    return session.execute(_JOB, {"id": job_id}).one_or_none()
+    return session.row(JobOwner, _JOB, {"id": job_id})
 
 
-def versions_like(session: Session, text: str) -> Sequence[Any]:
-    """``id``, ``dataset_id``, ``name`` and ``hash`` of the versions that a text may name."""
+class VersionName(NamedTuple):
+    """What a version can be named by."""
+
+    id: int
+    dataset_id: int
+    name: str
+    hash: str
+
+
+def versions_like(session: Session, text: str) -> Sequence[VersionName]:
+    """The versions that a text may name."""
     if "\0" in text:
         return []
     fits = [VersionModel.name == text, VersionModel.hash.startswith(text, autoescape=True)]
     if text.isascii() and text.isdigit() and len(text) < 19:
         fits.append(VersionModel.id == int(text))
     columns = (VersionModel.id, VersionModel.dataset_id, VersionModel.name, VersionModel.hash)
-    return session.execute(select(*columns).where(or_(*fits))).all()
-
-
-_TABLES = Base.metadata.tables
-_COUNTED = {
-    "groups": "groups",
-    "views": "view",
-    "verdicts": "verdict",
-    "saved_views": "saved_view",
-    "recordings": "recording",
-    "tracks": "track",
-    "versions": "version",
-    "predictions": "prediction_set",
-    "evaluations": "evaluation",
-}
-"""What a person is told of, by the name of its table."""
-_ACCESS = ("dataset_role", "access_token", "webhook")
-"""Who may, or hears, what in a dataset; nothing that was said of its groups."""
+    return session.rows(VersionName, select(*columns).where(or_(*fits)))
 
 
 def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
@@ -215,7 +243,7 @@ def count_contents(session: Session, dataset_id: int) -> dict[str, int]:
     return counts
 
 
-def solutions_of(session: Session, dataset_id: int) -> list[int]:
+def list_solution_ids(session: Session, dataset_id: int) -> list[int]:
     """Ids of the solutions of a dataset's groups."""
     mine = SolutionModel.group_id.in_(_group_ids_statement(dataset_id))
     return list(session.scalars(select(SolutionModel.id).where(mine)))
@@ -295,3 +323,76 @@ def _must_be_deleted_first(table: Table) -> bool:
         and key.ondelete is None
         for key in table.foreign_keys
     )
+
+
+def unused_calibrations(session: Session) -> list[str]:
+    """Keys of calibrations that no solution rests on; none while groups wait to be solved.
+
+    A solver may have read them already for the solution that it is about to save.
+    """
+    return [] if _has_unsolved(session) else list(session.scalars(_UNUSED))
+
+
+def delete_if_unused(session: Session, keys: Sequence[str]) -> int:
+    """Delete those of some calibrations that are spare still; returns how many.
+
+    Those that a version needs go on in it (a trigger sees to that).
+    """
+    if _has_unsolved(session):
+        return 0
+    named = _NAMED.where(_items.c.value.in_(texts_in(keys)))
+    unused = (_KEY.in_(texts_in(keys)), _KEY.not_in(named))
+    gone = delete(CalibrationModel).where(*unused).returning(_KEY)
+    return len(session.scalars(gone).all())
+
+
+def _has_unsolved(session: Session) -> bool:
+    """Whether a group of any dataset waits to be solved."""
+    waiting = select(QueueModel.group_id).where(QueueModel.solved.is_(False)).limit(1)
+    return session.scalar(waiting) is not None
+
+
+def unread_uploads(session: Session, settings: Settings) -> list[str]:
+    """Ids of uploads that are kept for their frames, though no view has its frame there and none is a
+    recording."""
+    folders = {folder for path in _paths_in_use(session) for folder in path.parents}
+    return [
+        upload.id
+        for upload in list_uploads(settings)
+        if upload.kept and settings.uploads.absolute() / upload.id not in folders
+    ]
+
+
+def unused_frames(session: Session, settings: Settings) -> list[str]:
+    """Folders and files of the home's recordings that no view and no recording uses."""
+    used = {path.parent.name for path in _paths_in_use(session)}
+    cameras = ShotCamerasModel
+    for column in (RecordingModel.sha256, cameras.digest, cameras.before):
+        used |= {sha256 for sha256 in session.scalars(select(column)) if sha256}
+    if not settings.recordings.is_dir():
+        return []
+    return sorted(
+        path.name
+        for path in settings.recordings.iterdir()
+        if path.name.partition(".")[0] not in {*used, ""}
+    )
+
+
+def _paths_in_use(session: Session) -> list[Path]:
+    """Where frames of views and recordings lie on this disk."""
+    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
+    found = [*session.scalars(statement), *session.scalars(select(RecordingModel.path))]
+    return [Path(path) for path in found if path and not is_address(path)]
+
+
+def expire_cache(settings: Settings) -> int:
+    """Delete derived files that were made longer ago than the settings allow; returns how many."""
+    oldest = time.time() - settings.cache_days * DAY
+    gone = 0
+    for folder, _, names in os.walk(settings.cache):
+        for path in (Path(folder, name) for name in names):
+            written = last_written(path)
+            if written is not None and written < oldest:
+                path.unlink(missing_ok=True)
+                gone += 1
+    return gone

@@ -2,33 +2,115 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from app.features.datasets import service as deletion
 from app.features.datasets import service as review
-from app.features.datasets.schemas import (
-    DatasetDeletion,
-    DatasetDocument,
-    DatasetList,
-    DeletedDocument,
-    SummaryDocument,
-)
-from app.features.datasets.service import DatasetContents, read_contents
+from app.features.datasets.service import Dataset, DatasetContents, read_contents
 from app.features.jobs.queries import Job
-from app.features.queue.service import summary
+from app.features.jobs.schemas import by_job, job_answer
+from app.features.policies.schemas import PolicyDocument
+from app.features.queue.service import summarize_groups
 from app.features.solve.jobs import request_solve
-from app.http.access import login_of
+from app.http.access import current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import Document, ListDocument, document, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
-from app.http.respond import document, responds
 from app.http.route import Route
 
 router = APIRouter(prefix="/datasets", tags=["datasets"], route_class=Route)
+
+
+class DatasetDocument(Document, shows=Dataset):
+    """A dataset, its progress and its policy."""
+
+    policy: PolicyDocument
+    created: datetime
+    hides_groups: bool = Field(
+        description=(
+            "Whether groups are hidden from the logged-in person until the batch that they "
+            "annotate independently is closed; counts leave them out."
+        )
+    )
+
+
+class DatasetList(ListDocument[DatasetDocument]):
+    """Every dataset, by name."""
+
+
+class Progress(Document):
+    """How many groups match, and how far they are."""
+
+    groups: int
+    solved: int
+    accepted: int
+    rejected: int
+    deferred: int
+    unreviewed: int
+    stale: int = Field(description="Changed after their verdict.")
+
+
+class Histogram(Document):
+    """Counts of one number over the groups that match.
+
+    A bin holds what is at least its left edge and below its right one; the first one also what
+    is smaller, the last one its right edge.
+    """
+
+    low: float = Field(
+        validation_alias=AliasPath("column", "edges", 0), description="Left end of the first bin."
+    )
+    high: float = Field(
+        validation_alias=AliasPath("column", "edges", -1), description="Right end of the last bin."
+    )
+    edges: list[float] = Field(
+        validation_alias=AliasPath("column", "edges"), description="One more than there are bins."
+    )
+    open_high: bool = Field(
+        validation_alias=AliasPath("column", "open_high"),
+        description="The last bin also holds what lies beyond.",
+    )
+    log: bool = Field(
+        validation_alias=AliasPath("column", "log"),
+        description="The bins are equally wide on a logarithmic scale, but the first: it holds 0 "
+        "and all that is smaller than the second edge.",
+    )
+    counts: list[int]
+    unknown: int = Field(description="Groups that have no such number.")
+
+
+class SummaryDocument(Document):
+    """Counts and histograms over the groups that a query matches."""
+
+    progress: Progress
+    histograms: dict[str, Histogram] = Field(
+        description="By column: jac, error_percent, sigma, parallax, size_ratio."
+    )
+
+
+class DatasetDeletion(BaseModel):
+    """The name of the dataset, once more: nobody deletes one by a slip."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"confirm": "demo"}]})
+
+    confirm: Annotated[str, Field(max_length=200)] = ""
+
+
+class DeletedDocument(BaseModel):
+    """What was deleted, or, with `dry_run`, what would be."""
+
+    dry_run: bool
+    id: int
+    name: str
+    counts: dict[str, int] = Field(
+        description="groups, views, verdicts, saved_views, versions, predictions, evaluations."
+    )
 
 
 @router.get("", operation_id="listDatasets", responses=responses())
@@ -36,7 +118,7 @@ router = APIRouter(prefix="/datasets", tags=["datasets"], route_class=Route)
 @paged()
 def list_datasets(request: Request, store: AppStore, visibility: Sees) -> DatasetList:
     """Every dataset that one sees, with its progress."""
-    login = login_of(request.scope)
+    login = current_login(request.scope)
     own = () if login is None else login.roles.single.keys()
     return DatasetList(items=review.list_datasets(store, visibility, own))
 
@@ -58,7 +140,7 @@ def get_dataset(dataset: DatasetPath, store: AppStore) -> review.Dataset:
 def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> SummaryDocument:
     """Progress and histograms over the groups that a query matches."""
     found = review.get_dataset_head(store, dataset)
-    counted = summary(store, found.id, query)
+    counted = summarize_groups(store, found.id, query)
     return SummaryDocument(progress=counted, histograms=counted.histograms)
 
 

@@ -14,23 +14,24 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets import queries as removal
-from app.features.datasets.orphan_queries import delete_if_unused, unused_calibrations
 from app.features.datasets.queries import (
     dataset_names,
     dataset_rows,
+    delete_if_unused,
     find_dataset,
     group_ids,
     has_match,
     insert_dataset_row,
-    policy_of,
+    policy_from_row,
+    unused_calibrations,
     update_policy,
 )
 from app.features.groups.codecs import policy_to_json
 from app.features.independent_annotations.queries import (
     CopiesOf,
-    copies_of,
     copy_dataset_ids,
     insert_copy_dataset,
+    list_copies,
 )
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility, is_blind
 from app.features.queue.queries import count_states
@@ -53,18 +54,18 @@ class MatchState(Protocol):
 State = TypeVar("State", bound=MatchState)
 
 
-def of_match(states: Iterable[State], match: str | None) -> list[State]:
+def filter_by_match(states: Iterable[State], match: str | None) -> list[State]:
     """What is known of one match, or of all where ``match`` is None."""
     return [state for state in states if match in (None, state.match)]
 
 
 def need_match(states: Iterable[State], match: str | None, dataset: str) -> list[State]:
-    """``of_match``.
+    """``filter_by_match``.
 
     Raises:
         NotFoundError: The dataset has no match of that name.
     """
-    chosen = of_match(states, match)
+    chosen = filter_by_match(states, match)
     if match is not None and not chosen:
         raise no_match(dataset, match)
     return chosen
@@ -231,7 +232,7 @@ def need_dataset(session: Session, dataset: str | int) -> int:
 def read_dataset_head(session: Session, dataset: str | int) -> DatasetHead:
     """A dataset within a session, uncounted; raises NotFoundError when there is none."""
     row = _require_dataset_row(session, dataset)
-    return DatasetHead(row.id, row.name, row.created, policy_of(row.policy))
+    return DatasetHead(row.id, row.name, row.created, policy_from_row(row.policy))
 
 
 def require_matches(
@@ -277,7 +278,7 @@ def _dataset_with_counts(row: Any, counts: Counter[str]) -> Dataset:
         id=row.id,
         name=row.name,
         created=row.created,
-        policy=policy_of(row.policy),
+        policy=policy_from_row(row.policy),
         groups=counts["groups"],
         solved=counts["solved"],
         accepted=counts["accepted"],
@@ -288,14 +289,14 @@ def _dataset_with_counts(row: Any, counts: Counter[str]) -> Dataset:
     )
 
 
-def licence_of(match: str) -> str:
+def find_licence(match: str) -> str:
     """The terms of the source that a match is from."""
     return LICENCES.get(_source_of_match(match), UNKNOWN_LICENCE)
 
 
 def licence_text(matches: Iterable[str]) -> str:
     """The terms of all sources, one after another."""
-    return " ".join(sorted({licence_of(match) for match in matches})) or UNKNOWN_LICENCE
+    return " ".join(sorted({find_licence(match) for match in matches})) or UNKNOWN_LICENCE
 
 
 def _source_of_match(match: str) -> str:
@@ -381,7 +382,7 @@ def delete_dataset(
         )
     identity = dataset_id(store, found.id)
     with store.read() as session:
-        copies = copies_of(session, identity)
+        copies = list_copies(session, identity)
     with without_response():
         for row in copies:
             delete_dataset(store, row.dataset_id, confirm=row.name, actor=actor)
@@ -408,7 +409,7 @@ def _read_contents_in(session: Session, identity: int) -> DatasetContents:
 def _delete_solutions(store: Store, identity: int) -> None:
     """Delete what was computed."""
     with store.read() as session:
-        solutions = removal.solutions_of(session, identity)
+        solutions = removal.list_solution_ids(session, identity)
     for start in range(0, len(solutions), CHUNK):
         with store.write() as session:
             removal.delete_solutions(session, solutions[start : start + CHUNK])

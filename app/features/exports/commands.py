@@ -256,7 +256,7 @@ def export(
             values = remote_files.export_values(client, sent_to, request, progress)
         print_export(values, json_)
         return
-    from app.features.exports.service import export as run_export
+    from app.features.exports.service import export_dataset as run_export
     from app.features.exports.service import require_possible
 
     with opened_store() as store, show_progress("Exporting") as progress:

@@ -16,16 +16,22 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
-from app.features.datasets.service import licence_of, read_dataset_head
-from app.features.exports.images import ExportImages, ReadPicture
-from app.features.exports.source import ExportSource, Item, LiveSource, VersionSource
+from app.features.datasets.service import find_licence, read_dataset_head
+from app.features.exports.source import (
+    ExportImages,
+    ExportSource,
+    Item,
+    LiveSource,
+    ReadPicture,
+    VersionSource,
+)
 from app.features.groups.view_queries import frame_files
 from app.features.imports.edits_export import FORMAT as CARRY
 from app.features.imports.edits_export import export_edits
 from app.features.imports.unassigned import unassigned_persons
 from app.features.tracks.export import TrackSource, frozen_records
 from app.features.tracks.service import track_source
-from app.features.versions.frozen_queries import json_of, read_frozen
+from app.features.versions.frozen_queries import read_frozen, read_json
 from app.features.versions.service import find_version
 from app.formats.export_formats import (
     CONTENT,
@@ -138,7 +144,7 @@ class _ExportOptions:
             raise InputError("a zip cannot hold links; export a folder or copy the images")
 
 
-def export(
+def export_dataset(
     store: Store,
     dataset: str | int,
     format: str,  # noqa: A002
@@ -400,7 +406,7 @@ def _frozen(
     """The tracks of a version by stretch, as they were frozen."""
     names = source.tracks or {}
     bodies = read_frozen(session, source.dataset_id, names.values())
-    return {key: json_of(bodies[name]) for key, name in names.items()}
+    return {key: read_json(bodies[name]) for key, name in names.items()}
 
 
 class _ExportRun:
@@ -479,7 +485,7 @@ class _ExportRun:
         for place, (found, facts) in enumerate(self._source.items(), 1):
             record = found.for_training() if chosen else found
             if record.group.views:
-                self._licences.add(licence_of(record.group.match))
+                self._licences.add(find_licence(record.group.match))
                 names = self._names.of(record.group, record.splits)
                 self._images.add(record.group, facts, record.splits, names)
                 self._note_verdict(record)

@@ -1,9 +1,10 @@
-"""Line files to camera files, without a database."""
+"""Line files to camera files, and the JaC of cameras on line files, without a database."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import asdict, dataclass, replace
 from itertools import chain
@@ -13,20 +14,25 @@ from typing import Any
 import numpy as np
 
 from app.durable import replace_file
-from app.errors import InputError
+from app.errors import DatasetFormatError, InputError
 from app.features.file_tools.matches import (
     MatchShare,
-    as_taken,
-    picture_for,
+    choose_picture,
+    match_shares,
+    points_as_taken,
     read_matches,
-    shares_of,
 )
 from app.finite import json_text
+from app.formats.cameras_reader import read_cameras
 from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.json_text import read_json
 from app.formats.report import Report
+from app.formats.safe_path import read_regular_file
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
+from app.geometry.camera import Camera
 from app.progress import ReportProgress
+from app.soccer.annotation import lines_without
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
@@ -37,7 +43,7 @@ from app.solving.calibrate import calibrate, lone_frame_of, with_lone_covariance
 from app.solving.calibration_findings import calibration_findings, lone_findings
 from app.solving.lone_frame import LoneFrame
 from app.solving.match_position import FramePlace, Places, place_of, share_position
-from app.solving.score import leave_one_out
+from app.solving.score import leave_one_out, score_frame, score_frames
 from app.solving.solve import warm_up
 
 CHUNK = 16
@@ -110,8 +116,8 @@ def calibrate_files(
     geometry: PictureGeometry | None = None
     picture_summary: dict[str, Any] | None = None
     if picture is not None or guess_picture:
-        geometry, picture_summary = picture_for(files, size, picture)
-        files = as_taken(files, geometry)
+        geometry, picture_summary = choose_picture(files, size, picture)
+        files = points_as_taken(files, geometry)
     named = None if matches is None else read_matches(matches)
     sharing = guess or named is not None
     policy = replace(CLICKED, goal=goal, check_labels=labels == "checked", lone_frames="any")
@@ -130,7 +136,7 @@ def calibrate_files(
     frames = gather([executor.submit(calibrate_chunk, it, size, policy, alone) for it in chunks], 0)
     groups = 0
     if sharing:
-        shares = shares_of(files, [frame.place for frame in frames], named)
+        shares = match_shares(files, [frame.place for frame in frames], named)
         groups = len({share.match for share in shares})
         jobs = []
         for start in range(0, len(files), CHUNK):
@@ -308,3 +314,93 @@ def _files_of_earlier_run(out: Path) -> set[str]:
 
 def _json_file_text(value: Any) -> str:
     return json_text(value, indent=1) + "\n"
+
+
+def score_files(
+    lines: Path,
+    cameras: Path,
+    *,
+    size: ImageSize,
+    without: Path | None = None,
+    progress: ReportProgress | None = None,
+) -> dict[str, Any]:
+    """Measure camera files against line files.
+
+    Args:
+        lines: Folder or zip of line files.
+        cameras: Folder or zip of ``camera_<stem>.json``.
+        size: Size of the annotated images where no folder of an export says it.
+        without: ``findings.json``; markings that it calls mislabelled are left out.
+        progress: Called with frames done.
+
+    Raises:
+        InputError: There is no line file, or no camera at all.
+    """
+    report, camera_report = Report(), Report()
+    found = _cameras_by_frame(read_cameras(cameras, camera_report))
+    if not found:
+        raise camera_report.refusal(f"{cameras} holds no camera files")
+    dropped = _wrong_labels(without) if without is not None else set()
+    pitch = Pitch()
+    scores = []
+    frames: set[str] = set()
+    for file in read_line_files(lines, size, report, by_folder=True):
+        kept = lines_without(
+            file.lines, {marking for stem, marking in dropped if stem == file.stem}
+        )
+        camera = found.get(file.stem)
+        frames.add(file.stem)
+        scores.append(None if camera is None else score_frame(camera, kept, pitch, file.size))
+        if progress is not None:
+            progress(len(scores))
+    if not scores:
+        raise report.refusal(f"{lines} holds no line files")
+    if all(score is None for score in scores):
+        frame, other = sorted(frames)[0], sorted(found)[0]
+        raise InputError(
+            f'no camera belongs to a line file: cameras are called "{other}", frames "{frame}"',
+            hint="A camera of the frame 00002 lies in camera_00002.json.",
+        )
+    # A line file that cannot be read is a frame without a camera.
+    scores.extend([None] * (report.read - len(scores)))
+    total = score_frames(scores)
+    return {
+        "frames": total.frames,
+        "calibrated": total.calibrated,
+        "completeness": total.completeness,
+        "jac_0.5": total.jac[0],
+        "jac_1": total.jac[1],
+        "jac_2": total.jac[2],
+        "share": total.share,
+        "fs5": total.challenge,
+        "error_median_px": total.error_median_px,
+        "error_p95_px": total.error_p95_px,
+        **_read_milliseconds(cameras),
+        "problems": [item.message for item in (*report.problems, *camera_report.problems)],
+    }
+
+
+def _cameras_by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
+    """Cameras by key, and by the bare name of the frame where only one has it."""
+    names = Counter(key.rsplit("/", 1)[-1] for key in cameras)
+    bare = {key.rsplit("/", 1)[-1]: camera for key, camera in cameras.items()}
+    return {**{name: bare[name] for name in bare if names[name] == 1}, **cameras}
+
+
+def _wrong_labels(findings: Path) -> set[tuple[str, str]]:
+    """Frame and marking of each finding ``wrong_label``."""
+    value = read_json(read_regular_file(findings), str(findings))
+    if not isinstance(value, list):
+        raise DatasetFormatError(str(findings), None, None, "is not a list of findings")
+    rows = [item for item in value if isinstance(item, dict) and item.get("kind") == "wrong_label"]
+    return {(str(item.get("frame")), str(item.get("marking"))) for item in rows}
+
+
+def _read_milliseconds(cameras: Path) -> dict[str, Any]:
+    """Milliseconds a frame from the ``calibrate.json`` beside the cameras, or null."""
+    beside = cameras / "calibrate.json"
+    value = read_json(beside.read_bytes(), str(beside)) if beside.is_file() else {}
+    times = {"ms_median": None, "ms_p95": None}
+    if isinstance(value, dict):
+        times |= {name: value.get(name) for name in times}
+    return {name: time if isinstance(time, int | float) else None for name, time in times.items()}

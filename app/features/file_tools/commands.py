@@ -148,7 +148,7 @@ def score(
     json_: Json = False,
 ) -> None:
     """Measure camera files against line files: JaC, completeness, errors."""
-    from app.features.file_tools.score import score_files
+    from app.features.file_tools.calibrate import score_files
 
     with show_progress("Scoring") as progress:
         result = score_files(lines, cameras, size=size, without=without, progress=progress)

@@ -1,7 +1,7 @@
-"""Matches of line files.
+"""Frames that share something: those of one match, its pitch and how its pictures were stretched, or of one tripod.
 
-They say which frames are of one match, its pitch, and how its pictures were stretched.
-"""
+Frames of one camera that stands still say together which pitch they show; the files of their cameras
+get covariances that know it."""
 
 from __future__ import annotations
 
@@ -11,20 +11,31 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.errors import DatasetFormatError, GeometryError
+from app.durable import replace_file
+from app.errors import DatasetFormatError, GeometryError, InputError
+from app.features.file_tools.track import pitch_row
+from app.formats.cameras_writer import camera_file_name, camera_file_text
 from app.formats.csv_text import read_rows
 from app.formats.file_tree import Limits
 from app.formats.json_text import read_json
 from app.formats.report import Report
-from app.formats.safe_path import read_regular_file
+from app.formats.safe_path import read_regular_file, resolve_inside
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
+from app.geometry.arrays import row_by_row
+from app.geometry.camera import Camera
+from app.paint.frame_pitch import share_tripod
+from app.paint.snap import SnappedCamera
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
-from app.soccer.policy import CLICKED
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.match_picture import PictureEstimate, PictureFrame, estimate_match_picture
 from app.solving.match_position import NO_PLACES, FramePlace, Places, guess_matches
 from app.solving.pitch_size import PitchFrame, estimate_pitch
+
+ONE = "one"
+"""Of ``--tripod``: all pictures are of one camera."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +64,7 @@ def read_matches(path: Path) -> dict[str, str]:
     return {row["frame"].strip(): row["match"].strip() for _, row in rows if "match" in row}
 
 
-def shares_of(
+def match_shares(
     files: Sequence[LineFile], places: Sequence[FramePlace | None], named: Mapping[str, str] | None
 ) -> list[MatchShare]:
     """What each frame gets from the others of its match.
@@ -123,7 +134,7 @@ def estimate_picture_of_files(source: Path, *, size: ImageSize) -> dict[str, Any
     return {**values, "problems": [problem.message for problem in report.problems]}
 
 
-def picture_for(
+def choose_picture(
     files: Sequence[LineFile], size: ImageSize, given: Path | None
 ) -> tuple[PictureGeometry | None, dict[str, Any]]:
     """The picture to calibrate line files with, and what ``calibrate.json`` says of it.
@@ -165,7 +176,7 @@ def read_picture(path: Path) -> PictureGeometry:
         raise DatasetFormatError(str(path), None, None, problem) from error
 
 
-def as_taken(files: Sequence[LineFile], picture: PictureGeometry | None) -> list[LineFile]:
+def points_as_taken(files: Sequence[LineFile], picture: PictureGeometry | None) -> list[LineFile]:
     """Line files with their points where the pictures as they were taken show them."""
     if picture is None:
         return list(files)
@@ -185,3 +196,80 @@ def _picture_values(found: PictureEstimate) -> dict[str, Any]:
         "frames": found.frames,
         "changed": found.proposal is not None,
     }
+
+
+@dataclass(frozen=True)
+class DrawnFrame:
+    """A camera on its paint, and its file.
+
+    Attributes:
+        frame: Name of the frame.
+        snapped: Pixels of the picture.
+        camera: As its file has it.
+        size: Of the picture, as the file has it.
+        pitch: On which it lies.
+    """
+
+    frame: str
+    snapped: SnappedCamera
+    camera: Camera
+    size: ImageSize
+    pitch: Pitch
+
+
+def share_tripods(
+    drawn: Sequence[DrawnFrame], tripod: str | None, rows: Sequence[dict[str, Any]], out: Path
+) -> None:
+    """Write cameras of frames of one tripod again, with what they know together.
+
+    Args:
+        drawn: All cameras that lie on paint.
+        tripod: ``one``, or a file that names the camera of each frame; None: nothing is known.
+        rows: Of all frames; those of a tripod get ``shown``, the pitch that they show.
+        out: Folder of the camera files.
+
+    Raises:
+        InputError: The file cannot be read, or names no frame, or ``out`` cannot be written.
+    """
+    if tripod is None:
+        return
+    by_camera: dict[str, list[DrawnFrame]] = {}
+    named = None if tripod == ONE else _named(Path(tripod), rows)
+    for each in drawn:
+        name = ONE if named is None else named.get(each.frame, "")
+        if name:
+            by_camera.setdefault(name, []).append(each)
+    by_frame = {row["frame"]: row for row in rows}
+    for frames in by_camera.values():
+        if len({each.pitch for each in frames}) > 1:
+            continue
+        shared = share_tripod(
+            [each.snapped for each in frames], frames[0].pitch, CalibrationPolicy()
+        )
+        if shared is None:
+            continue
+        shown, covariances = shared
+        for each, covariance in zip(frames, covariances, strict=True):
+            by_frame[each.frame]["shown"] = pitch_row(shown, on_shown=False)
+            text = camera_file_text(each.camera, row_by_row(covariance), each.size)
+            _write(resolve_inside(out, camera_file_name(each.frame)), text)
+
+
+def _named(file: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The camera of each frame, as ``calibrate --matches`` reads matches."""
+    if not file.is_file():
+        raise InputError(
+            f'"{file}" is not {ONE}, and there is no such file',
+            hint="Give a CSV file with the columns frame and match, or a JSON object of frame names and matches.",
+        )
+    named = read_matches(file)
+    if not any(row["frame"] in named for row in rows):
+        raise InputError(f"{file} names none of the {len(rows)} frames, such as {rows[0]['frame']}")
+    return named
+
+
+def _write(file: Path, text: str) -> None:
+    try:
+        replace_file(file, text.encode(), durable=False, private=False)
+    except OSError as error:
+        raise InputError(f"{file.parent} cannot be written ({error.strerror})") from error

@@ -6,16 +6,16 @@ from collections.abc import Collection, Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from sqlalchemy import Table, delete, insert, select
+from sqlalchemy import Double, ForeignKey, Index, Table, delete, insert, select
+from sqlalchemy.orm import Mapped, mapped_column
 
 from app.canonical import canonical
 from app.db.json_columns import as_written, parse
 from app.db.log import Entry, append
-from app.db.session import Session
+from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel
-from app.features.findings.tables import DismissalModel
 from app.features.groups.insert_queries import next_id
-from app.features.people.alias_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor
 from app.soccer.finding import (
     PICTURE_GEOMETRY,
     PITCH_SIZE,
@@ -30,9 +30,35 @@ SEEN = (PITCH_SIZE, PICTURE_GEOMETRY, TRACK_DISAGREES)
 """Kinds that stand beside what imports noticed and are in no log: computed, or seen of pictures."""
 Noticed = tuple[str | None, str]
 """Key of a view, or None where the whole group is meant; and the sentence."""
+DISMISSAL = "dismissal"
+"""Kind of the log's entries."""
 
 
-def findings_of(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
+class DismissalModel(Base):
+    """A finding of a group that somebody dismissed, or (``dismissed`` false) opened again.
+
+    ``kind``, ``view``, ``marking`` and ``suggested`` name the finding; ``number`` and ``sentence``
+    are what it said: where it says something else now, the dismissal no longer counts.
+    """
+
+    __tablename__ = "dismissal"
+    __table_args__ = (Index("dismissal_group", "group_id", "id"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    group_id: Mapped[int] = mapped_column(ForeignKey("groups.id"))
+    actor: Mapped[str]
+    at: Mapped[str]
+    kind: Mapped[str]
+    view: Mapped[str | None]
+    marking: Mapped[str | None]
+    suggested: Mapped[str | None]
+    number: Mapped[float | None] = mapped_column(Double)
+    sentence: Mapped[str]
+    dismissed: Mapped[bool]
+    note: Mapped[str | None]
+
+
+def findings_from_rows(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
     """What was noticed about a group as it is now.
 
     Args:
@@ -214,8 +240,6 @@ def replace_track_findings(
     return sorted({key[0] for key in present.keys() ^ wanted})
 
 
-DISMISSAL = "dismissal"
-"""Kind of the log's entries."""
 _TABLE = cast(Table, DismissalModel.__table__)
 SHOWN = (
     *(_TABLE.c[name] for name in ("marking", "suggested", "number", "at", "dismissed", "note")),

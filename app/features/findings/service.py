@@ -17,10 +17,10 @@ from app.features.queue.queries import (
     Condition,
     Listing,
     Order,
-    compares,
-    contains,
-    either,
-    lists,
+    any_of,
+    compare_condition,
+    contains_text,
+    has_list_item,
 )
 from app.features.queue.refresh_queries import read_import_findings, refresh_queue
 from app.features.solutions.queries import is_solved
@@ -79,7 +79,7 @@ def read_findings(
     ``dismissed`` names those that people have checked (True) or have not (False); None: all.
     """
     with store.read() as session:
-        where = [*_where(kind, dismissed), compares("number", ">", after)]
+        where = [*_where(kind, dismissed), compare_condition("number", ">", after)]
         ids = Listing(session, dataset_id, where).ids(Order("number"), limit)
         states = read_states(session, ids)
     return [_group_findings(state, kind, dismissed) for state in states]
@@ -97,8 +97,8 @@ def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
 def _where(kind: str | None, dismissed: bool | None) -> list[Condition]:
     """What holds of groups with findings that can be read: those of an earlier solver cannot."""
     columns = {None: ("findings", "dismissed"), False: ("findings",), True: ("dismissed",)}
-    has = either(
-        contains(column, ",") if kind is None else lists(column, kind)
+    has = any_of(
+        contains_text(column, ",") if kind is None else has_list_item(column, kind)
         for column in columns[dismissed]
     )
     return [has, is_solved()]

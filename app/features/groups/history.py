@@ -1,22 +1,25 @@
-"""Past: a group's entries in the log, with those of its static cameras, and what each has changed."""
+"""History of a group: its entries in the log with what each changed, and undo and redo of the last edit."""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Unpack
 
 from app.db.log import LogEntry as LogEntry
 from app.db.log import group_entries, station_entries
 from app.db.session import Session
 from app.db.store import Store
-from app.errors import NotFoundError
+from app.errors import ConflictError, NotFoundError
+from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
-from app.features.groups.state import need_group
+from app.features.groups.state import GroupState, Record, need_group
 from app.features.groups.state_snapshot import StateSnapshot, StationRecord
-from app.features.people.alias_queries import shown_entries
-from app.features.people.visibility_queries import reads_blind
+from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
+from app.features.groups.undo_stacks import undo_entry_body
+from app.features.people.visibility_queries import reads_blind, shown_entries
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 
@@ -54,7 +57,7 @@ class EntryChanges:
     first: bool
 
 
-def history(store: Store, group_id: int) -> list[LogEntry]:
+def read_history(store: Store, group_id: int) -> list[LogEntry]:
     """Everything that was said about a group and changed of its static cameras, oldest first.
 
     Whoever annotates blind is told the places of entries in it instead of their ids.
@@ -138,3 +141,27 @@ def _changes_between(
     )
     pitch = None if before is None else before.pitch
     return EntryChanges(entry, changed, pitch, after.pitch, before is None)
+
+
+def undo(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
+    """Take the last edit of a group back, whoever made it; raises ConflictError without one."""
+    return submit_change(store, lambda _session: group_id, _plan_step("undo"), **how)
+
+
+def redo(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
+    """Do again what undo took back last; raises ConflictError without such an edit."""
+    return submit_change(store, lambda _session: group_id, _plan_step("redo"), **how)
+
+
+def _plan_step(kind: str) -> Plan:
+    def plan(session: Session, record: Record, _actor: str) -> GroupChange:
+        body = undo_entry_body(session, record.stacks, kind, "in this group")
+        try:
+            group = edit_from_json(body["edit"]).apply(record.stored.group)
+        except NotFoundError as error:
+            raise ConflictError(
+                f"this can no longer be undone or redone: {error.message}"
+            ) from error
+        return GroupChange(kind, body, group)
+
+    return plan

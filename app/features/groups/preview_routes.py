@@ -1,30 +1,144 @@
-"""Previews of edits: solved for the person who drags, never stored."""
+"""Processes that solve previews and large edits, where these keep nobody else waiting.
+
+A preview is solved for the person who drags, and never stored. An edit or preview of hundreds of points
+takes as long as dozens of others, and one interpreter computes one thing at a time: a server of a team
+has a process for them, which gives way to the server where both want a processor (decision 0062).
+"""
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import CancelledError
 from functools import partial
+from typing import Annotated, TypeVar
 
 from fastapi import Request
+from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from starlette.concurrency import run_in_threadpool
 
 from app.config import Settings
 from app.db.store import Store
 from app.errors import InputError, OverloadedError
 from app.features.groups.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
-from app.features.groups.history_schemas import PreviewDocument, PreviewRequest, ViewPreview
-from app.features.groups.large_edit_routes import LargeGroupSolver
-from app.features.groups.schemas import points_by_marking
+from app.features.groups.schemas import BallEdit, LineEdits, PictureEdit, points_by_marking
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, preview
 from app.features.groups.view_paint import PaintFollower, WithoutPictures
+from app.http.documents import Document
 from app.http.request_limits import PREVIEWS, is_large
 from app.log import log_to_stderr
 from app.soccer.group import Group
+from app.soccer.policy import Policy
+from app.soccer.solution import Calibration
 from app.solving.solve import solve, warm_up
 from app.worker_pool import ReadyWorker, least_busy
 from app.worker_process import WorkerEnded, WorkerLimits
+
+Solved = TypeVar("Solved")
+
+LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=120.0)
+"""For one preview or large edit; the first one of a process may have to wait for kernels to be compiled."""
+NICENESS = 5
+"""Of the process of large edits."""
+
+
+_stores: dict[str, Store] = {}
+"""In the process of previews: the database, once it was opened."""
+
+
+class ViewPreview(BaseModel):
+    """Changes to one view; what is absent stays as it is."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    lines: LineEdits = Field(default_factory=dict)
+    ball: BallEdit | None = Field(
+        default=None, description="null: the view has no ball; absent: the ball stays as it is."
+    )
+    included: StrictBool | None = None
+    picture: PictureEdit | None = Field(
+        default=None,
+        description="null: as the camera took it; absent: unchanged.",
+    )
+
+
+class PreviewRequest(BaseModel):
+    """Changes by the key of the view."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [{"views": {"7_1.png": {"ball": {"box": [801.5, 322.0, 14.0, 14.5]}}}}]
+        },
+    )
+
+    views: Annotated[dict[str, ViewPreview], Field(max_length=64)]
+
+
+class PreviewDocument(Document):
+    """The solution as it would be."""
+
+    solution: SolutionDocument
+
+
+class LargeGroupSolver:
+    """Has large groups solved.
+
+    Args:
+        settings: Whether there is a process for them.
+    """
+
+    def __init__(self, settings: Settings):
+        apart = settings.solves_apart
+        self.workers = (
+            [ReadyWorker("large", LIMITS, _large_edit_error, prepare_solver_process)]
+            if apart
+            else []
+        )
+
+    def solve(
+        self,
+        work: Callable[[Group, Policy, Mapping[str, Calibration]], Solved],
+        group: Group,
+        policy: Policy,
+        known: Mapping[str, Calibration],
+    ) -> Solved:
+        """What a function of a module that solves a group makes of it; waits for the process.
+
+        Raises:
+            OverloadedError: The process ended.
+        """
+        worker = least_busy(self.workers)
+        if worker is None:
+            return work(group, policy, known)
+        task = worker.submit(work, group, policy, known)
+        try:
+            found: Solved = task.future.result()
+        except CancelledError as error:
+            raise OverloadedError(
+                "the server is shutting down",
+                hint="Nothing was saved. Try it again in a moment.",
+            ) from error
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        for worker in self.workers:
+            worker.close()
+
+
+def prepare_solver_process() -> None:
+    """In the process: give way to others, and load the solver's kernels."""
+    os.nice(NICENESS)
+    warm_up()
+    gc.collect()
+    gc.freeze()
+
+
+def _large_edit_error(error: WorkerEnded) -> OverloadedError:
+    return OverloadedError(f"solving this {error}", hint="Nothing was saved. Try it again.")
 
 
 def preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
@@ -56,13 +170,6 @@ def _view_edits(key: str, change: ViewPreview) -> list[Edit]:
     if "picture" in change.model_fields_set:
         edits.append(SetPicture(key, None if change.picture is None else change.picture.picture()))
     return edits
-
-
-LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=120.0)
-"""For one preview; the first one of a process may have to wait for kernels to be compiled."""
-
-_stores: dict[str, Store] = {}
-"""In the process of previews: the database, once it was opened."""
 
 
 class PreviewSolver:

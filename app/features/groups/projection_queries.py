@@ -17,8 +17,7 @@ from app.features.datasets.tables import (
     UnassignedFrameModel,
     ViewModel,
 )
-from app.features.findings.queries import SEEN
-from app.features.findings.tables import DismissalModel
+from app.features.findings.queries import SEEN, DismissalModel
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.view_queries import StoredStation, stored_station
 from app.features.queue.tables import QueueModel

@@ -6,7 +6,7 @@ from collections import namedtuple
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import BindParameter, bindparam, null, or_, select
 from sqlalchemy.sql import FromClause
@@ -15,7 +15,7 @@ from app.db.dialects.statements import insert
 from app.db.json_columns import as_written, parse, unpack
 from app.db.session import Session
 from app.errors import NotFoundError
-from app.features.datasets.queries import policy_of
+from app.features.datasets.queries import policy_from_row
 from app.features.datasets.tables import (
     DatasetModel,
     GroupModel,
@@ -25,9 +25,9 @@ from app.features.datasets.tables import (
 )
 from app.features.groups import codecs
 from app.features.groups.view_queries import StoredStation, stored_station
-from app.features.match_estimates.queries import Factors, factors_of
+from app.features.match_estimates.queries import Factors, factors_from_text
 from app.features.paint.queries import paint_digests, read_readings
-from app.features.people.visibility_queries import seen_in
+from app.features.people.visibility_queries import visible_groups_condition
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading
@@ -154,24 +154,30 @@ def group_of_view(session: Session, view_id: int) -> int:
     return int(found)
 
 
+class ViewName(NamedTuple):
+    """A view with its key and that of its group."""
+
+    id: int
+    key: str
+    group_id: int
+    group_key: str
+
+
 def find_views(
     session: Session, dataset_id: int, ids: Collection[int], groups: Collection[str]
-) -> Sequence[Any]:
+) -> Sequence[ViewName]:
     """Views of a dataset by their ids, and those of groups by the groups' keys.
 
     Views of groups that are hidden from whoever asks are left out.
-
-    Returns:
-        Rows of ``id``, ``key``, ``group_id`` and ``group_key``.
     """
     view, group = ViewModel, GroupModel
     statement = (
         select(view.id, view.key, view.group_id, group.key.label("group_key"))
         .join(group, group.id == view.group_id)
         .where(group.dataset_id == dataset_id, or_(view.id.in_(ids), group.key.in_(groups)))
-        .where(*seen_in(dataset_id, group.id))
+        .where(*visible_groups_condition(dataset_id, group.id))
     )
-    return session.execute(statement).all()
+    return session.rows(ViewName, statement)
 
 
 def _stored_group(
@@ -194,8 +200,8 @@ def _stored_group(
         id=head.id,
         dataset_id=head.dataset_id,
         dataset=head.dataset,
-        policy=policy_of(head.policy),
-        factors=factors_of(head.factors),
+        policy=policy_from_row(head.policy),
+        factors=factors_from_text(head.factors),
         number=head.number,
         revision=head.revision,
         changed=head.changed,

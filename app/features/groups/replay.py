@@ -40,7 +40,7 @@ from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 
 
-def replay(session: Session) -> StateSnapshot:
+def replay_log(session: Session) -> StateSnapshot:
     """The state snapshot that follows from the log, whose chain is verified first.
 
     Raises:
@@ -64,14 +64,14 @@ def apply_entry(snapshot: StateSnapshot, entry: LogEntry, number: int = 0) -> No
         _STEPS[entry.kind](snapshot, entry)
 
 
-def rebuild(store: Store) -> int:
+def rebuild_tables(store: Store) -> int:
     """Write groups, views, stations and what belongs to them anew from the log.
 
     Datasets, verdicts, dismissals, solutions and the log itself stay, and so do predictions and proposals as
     far as their views do. Returns the number of groups.
     """
     with store.write() as session:
-        snapshot = replay(session)
+        snapshot = replay_log(session)
         replace_all_rows(session, **_rows_by_table(snapshot))
         refresh_queue(session, list(snapshot.groups))
     return len(snapshot.groups)

@@ -1,13 +1,13 @@
-"""Revisions of groups, and which groups have changed since some row of the log or the solutions."""
+"""Revisions of groups, the values that name their state, and which groups have changed since."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
-from sqlalchemy import bindparam, delete, func, select, update
+from sqlalchemy import bindparam, delete, func, literal, select, update
 
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session
@@ -19,6 +19,7 @@ from app.features.datasets.tables import (
     StationModel,
     ViewModel,
 )
+from app.features.findings.queries import DismissalModel
 from app.features.groups import codecs
 from app.features.groups.digest import inputs_hash, station_digest, view_digest
 from app.features.groups.insert_queries import (
@@ -32,10 +33,56 @@ from app.features.groups.insert_queries import (
 from app.features.groups.queries import StoredGroup, positions_from_text
 from app.features.groups.view_queries import save_station
 from app.features.paint.queries import paint_digests
-from app.features.solutions.queries import is_current
-from app.features.solutions.tables import SolutionModel
+from app.features.solutions.queries import SolutionModel, is_current
+from app.features.verdicts.tables import VerdictModel
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
+
+_GROUP, _DATASET, _VERDICT = GroupModel.__table__, DatasetModel.__table__, VerdictModel.__table__
+_DISMISSAL = DismissalModel.__table__
+_LAST = (
+    select(func.coalesce(func.max(_VERDICT.c.id), 0))
+    .where(_VERDICT.c.group_id == _GROUP.c.id)
+    .correlate(_GROUP)
+    .scalar_subquery()
+    .label("last")
+)
+_DISMISSED = (
+    select(func.coalesce(func.max(_DISMISSAL.c.id), 0))
+    .where(_DISMISSAL.c.group_id == _GROUP.c.id)
+    .correlate(_GROUP)
+    .scalar_subquery()
+    .label("last_dismissal")
+)
+_STATIONS = (
+    select(func.coalesce(func.sum(StationModel.revision), 0))
+    .join_from(ViewModel, StationModel, StationModel.id == ViewModel.station_id)
+    .where(ViewModel.group_id == _GROUP.c.id)
+    .correlate(_GROUP)
+    .scalar_subquery()
+    .label("station_revisions")
+)
+_HEAD = (
+    select(_GROUP.c.inputs_hash, _GROUP.c.revision, _DATASET.c.policy_hash, _LAST, _DISMISSED)
+    .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
+    .where(_GROUP.c.id == bindparam("group"))
+)
+_HEADS = (
+    select(
+        _GROUP.c.id,
+        _GROUP.c.inputs_hash,
+        _GROUP.c.revision,
+        _DATASET.c.policy,
+        _DATASET.c.policy_hash,
+        SolutionModel.__table__.c.summary,
+        _LAST,
+        _DISMISSED,
+        _STATIONS,
+    )
+    .join_from(_GROUP, _DATASET, _DATASET.c.id == _GROUP.c.dataset_id)
+    .outerjoin(SolutionModel.__table__, is_current())
+    .where(_GROUP.c.id.in_(bindparam("ids", expanding=True)))
+)
 
 
 def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
@@ -248,12 +295,24 @@ def changed_group_ids(session: Session, dataset_id: int, after: int) -> list[int
     return list(session.scalars(statement))
 
 
-def changed_groups(session: Session, dataset_id: int, after: int, limit: int) -> Sequence[Any]:
-    """Groups of a dataset that have changed after a change, in the order of their last ones.
+class SolvedGroupRow(NamedTuple):
+    """A group with the solution that fits it as it is, and its last change; 0 where that is not asked for."""
 
-    Returns:
-        Rows as of ``groups_after``, with ``change_id``.
-    """
+    group_id: int
+    number: int
+    inputs_hash: str
+    solution_id: int | None
+    split: str
+    match: str
+    pitch_length: float
+    pitch_width: float
+    change_id: int
+
+
+def changed_groups(
+    session: Session, dataset_id: int, after: int, limit: int
+) -> Sequence[SolvedGroupRow]:
+    """Groups of a dataset that have changed after a change, in the order of their last ones."""
     statement = (
         _changed_groups_statement()
         .add_columns(GroupChangeModel.id.label("change_id"))
@@ -262,19 +321,17 @@ def changed_groups(session: Session, dataset_id: int, after: int, limit: int) ->
         .order_by(GroupChangeModel.id)
         .limit(limit)
     )
-    return session.execute(statement).all()
+    return session.rows(SolvedGroupRow, statement)
 
 
-def groups_after(session: Session, dataset_id: int, after: int, limit: int) -> Sequence[Any]:
-    """Groups of a dataset in order, from the one after a number on.
-
-    Returns:
-        Rows (group_id, number, inputs_hash, solution_id or None, split, match, pitch_length,
-        pitch_width); the solution is the one that fits the group as it is.
-    """
+def groups_after(
+    session: Session, dataset_id: int, after: int, limit: int
+) -> Sequence[SolvedGroupRow]:
+    """Groups of a dataset in order, from the one after a number on."""
     mine = (GroupModel.dataset_id == dataset_id, GroupModel.number > after)
-    statement = _changed_groups_statement().where(*mine).order_by(GroupModel.number).limit(limit)
-    return session.execute(statement).all()
+    statement = _changed_groups_statement().add_columns(literal(0).label("change_id"))
+    statement = statement.where(*mine).order_by(GroupModel.number).limit(limit)
+    return session.rows(SolvedGroupRow, statement)
 
 
 def _changed_groups_statement() -> Any:
@@ -335,3 +392,42 @@ def groups_solved_after(session: Session, after: int) -> list[tuple[int, int]]:
         .order_by(GroupModel.dataset_id, GroupModel.id)
     )
     return [(row.dataset_id, row.id) for row in session.execute(statement)]
+
+
+class EtagRow(NamedTuple):
+    """What names the state of a group: ``last`` is its newest verdict."""
+
+    inputs_hash: str
+    revision: int
+    policy_hash: str
+    last: int
+    last_dismissal: int
+
+
+class SolvedEtagRow(NamedTuple):
+    """What names the state of a group, its policy and solution.
+
+    Attributes:
+        summary: Of the solution; None: there is none.
+        station_revisions: Sum of the revisions of its views' stations.
+    """
+
+    id: int
+    inputs_hash: str
+    revision: int
+    policy: str
+    policy_hash: str
+    summary: str | None
+    last: int
+    last_dismissal: int
+    station_revisions: int
+
+
+def find_etag_row(session: Session, group_id: int) -> EtagRow | None:
+    """What names the state of a group; None where there is no such group."""
+    return session.row(EtagRow, _HEAD, {"group": group_id})
+
+
+def read_etag_rows(session: Session, group_ids: Sequence[int]) -> Sequence[SolvedEtagRow]:
+    """What names the states of groups, with their policies and solutions."""
+    return session.rows(SolvedEtagRow, _HEADS, {"ids": list(group_ids)})

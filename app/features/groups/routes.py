@@ -1,28 +1,34 @@
-"""Groups: lists, the whole document, what-if, undo and history."""
+"""Groups: lists, the whole document, previews, undo and history."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
 
 from fastapi import APIRouter, Query, Request, Response
+from pydantic import Field
 
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.service import dataset_id
-from app.features.groups import submit
-from app.features.groups import undo as undoing
-from app.features.groups.history import history, read_entry_changes
-from app.features.groups.history_schemas import PreviewDocument, PreviewRequest, StepDocument
-from app.features.groups.schemas import GroupDocument
+from app.features.groups import history, submit
+from app.features.groups.history import ChangedView, EntryChanges, read_entry_changes
+from app.features.groups.preview_routes import PreviewDocument, PreviewRequest
+from app.features.groups.schemas import (
+    Ball,
+    GroupDocument,
+    LineDocuments,
+    PitchSize,
+    image_address,
+    lines_document,
+)
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
-from app.features.people.roles import lets
+from app.features.people.roles import role_allows
 from app.features.queue import service as queue
 from app.features.queue.schemas import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
 from app.features.queue.service import Ids
 from app.finite import MAX_ID
-from app.http.access import login_of
-from app.http.conflicts import current_state
+from app.http.access import current_login
 from app.http.cursor import foreign_cursor, paged
 from app.http.deps import (
     Actor,
@@ -34,11 +40,13 @@ from app.http.deps import (
     QueryText,
     etag_matches,
 )
+from app.http.documents import Document, document, responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import EDITS, LOOKS, PREVIEWS, limit
-from app.http.respond import document, responds
 from app.http.route import Route
+from app.soccer.group import View, view_letter
 
 router = APIRouter(prefix="/groups", tags=["groups"], route_class=Route)
 
@@ -46,6 +54,73 @@ MAX_LIMIT = 500
 ETAG = {"ETag": {"description": "The group's state.", "schema": {"type": "string"}}}
 CHANGED: Responses = {200: {"headers": ETAG, "description": "The whole group as it is now."}}
 CONFLICTS = (404, 409, 412, 413, 415, 428)
+
+
+class ViewThen(Document):
+    """A view as it was said to be at a time."""
+
+    included: bool
+    calibration: str = Field(description="Which calibration counts when both exist.")
+    lines: LineDocuments
+    balls: list[Ball]
+
+    @classmethod
+    def of(cls, view: View) -> Self:
+        """The document of a view."""
+        return cls(
+            included=view.included,
+            calibration=view.station.calibration,
+            lines=lines_document(view.station.lines),
+            balls=[Ball.of(ball) for ball in view.balls],
+        )
+
+
+class ChangedViewDocument(Document):
+    """A view that an entry has changed; `before` and `after` are null where it was not there."""
+
+    key: str
+    letter: str
+    width: int
+    height: int
+    image: str | None = Field(description="Address of the frame, where there is one now.")
+    before: ViewThen | None
+    after: ViewThen | None
+
+    @classmethod
+    def of(cls, changed: ChangedView) -> Self:
+        """The document of a changed view."""
+        there = changed.after or changed.before
+        assert there is not None
+        shown = changed.id is not None and there.media is not None
+        return cls(
+            key=changed.key,
+            letter=view_letter(changed.index),
+            width=there.size.width,
+            height=there.size.height,
+            image=image_address(changed.id) if shown and changed.id is not None else None,
+            before=None if changed.before is None else ViewThen.of(changed.before),
+            after=None if changed.after is None else ViewThen.of(changed.after),
+        )
+
+
+class StepDocument(Document):
+    """What an entry has changed: the views that differ, and the pitch."""
+
+    entry: LogEntryDocument
+    views: list[ChangedViewDocument]
+    pitch_before: PitchSize | None = Field(description="null: there was nothing before it.")
+    pitch_after: PitchSize
+
+    @classmethod
+    def of(cls, step: EntryChanges) -> Self:
+        """The document of a step."""
+        old = step.pitch_before
+        return cls(
+            entry=LogEntryDocument.of(step.entry),
+            views=[ChangedViewDocument.of(view) for view in step.views],
+            pitch_before=None if old is None else PitchSize.model_validate(old),
+            pitch_after=PitchSize.model_validate(step.pitch_after),
+        )
 
 
 def group_answer(state: GroupState) -> Response:
@@ -98,8 +173,8 @@ def list_groups(
     except (OverflowError, UnicodeEncodeError) as error:
         # A forged cursor can hold what the database cannot.
         raise foreign_cursor() from error
-    login = login_of(request.scope)
-    judges = login is None or lets(login.roles.role_in(found), Action.REVIEW)
+    login = current_login(request.scope)
+    judges = login is None or role_allows(login.roles.role_in(found), Action.REVIEW)
     items = [GroupRow.of(row, judges) for row in page.items]
     return GroupPage(items=items, next=page.next, total=page.total)
 
@@ -160,7 +235,7 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
 @limit(LOOKS)
 def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""
-    return queue.neighbours(store, group, query)
+    return queue.find_neighbours(store, group, query)
 
 
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
@@ -169,7 +244,9 @@ def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.N
 @paged()
 def get_history(group: Id, store: AppStore) -> History:
     """Everything that was said about the group and changed of its static cameras, oldest first."""
-    return History(items=[LogEntryDocument.of(entry) for entry in history(store, group)])
+    return History(
+        items=[LogEntryDocument.of(entry) for entry in history.read_history(store, group)]
+    )
 
 
 @router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
@@ -209,7 +286,7 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     """Take the last edit back; 409 when there is none."""
     store = services.store
     with current_state(lambda: load_document(store, group)):
-        return undoing.undo(store, group, if_match=if_match, actor=actor, paint=services.paint)
+        return history.undo(store, group, if_match=if_match, actor=actor, paint=services.paint)
 
 
 @router.post(
@@ -225,4 +302,4 @@ def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     """Do again what was undone last; 409 when there is nothing."""
     store = services.store
     with current_state(lambda: load_document(store, group)):
-        return undoing.redo(store, group, if_match=if_match, actor=actor, paint=services.paint)
+        return history.redo(store, group, if_match=if_match, actor=actor, paint=services.paint)

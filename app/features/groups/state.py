@@ -9,11 +9,11 @@ from typing import Any
 
 from app.db.session import Session
 from app.errors import NotFoundError, StaleRevisionError
-from app.features.datasets.queries import policy_of
-from app.features.findings.queries import NOTHING_DISMISSED, GroupDismissals, findings_of
+from app.features.datasets.queries import policy_from_row
+from app.features.findings.queries import NOTHING_DISMISSED, GroupDismissals, findings_from_rows
 from app.features.groups.digest import digest
-from app.features.groups.etag_queries import find_etag_row, read_etag_rows
 from app.features.groups.queries import StoredGroup, read_groups
+from app.features.groups.revision_queries import find_etag_row, read_etag_rows
 from app.features.groups.undo_stacks import UndoStacks, read_stacks
 from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
@@ -84,7 +84,7 @@ def read_group_head(session: Session, group_id: int) -> GroupHead | None:
     return GroupHead(content, row.policy_hash)
 
 
-def content_tag_of(etag: str) -> str:
+def content_tag_from_etag(etag: str) -> str:
     """The first part of an ETag, quoted or not."""
     return etag.strip().strip('"').partition("-")[0]
 
@@ -113,7 +113,7 @@ def require_content(
     session: Session, group_id: int, content: str, if_match: str, what: str
 ) -> None:
     """``require_unchanged`` where what was said about the group is known."""
-    if content != content_tag_of(if_match):
+    if content != content_tag_from_etag(if_match):
         require_etag(read_etags(session, [group_id])[group_id], if_match, what)
 
 
@@ -123,7 +123,7 @@ def require_etag(current: str, if_match: str, what: str) -> None:
     Raises:
         StaleRevisionError: With both ETags.
     """
-    if content_tag_of(current) != content_tag_of(if_match):
+    if content_tag_from_etag(current) != content_tag_from_etag(if_match):
         raise StaleRevisionError(
             f"{what} was changed meanwhile", base_etag=if_match, current_etag=current
         )
@@ -137,9 +137,9 @@ def read_etags(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
         content = content_tag(row.inputs_hash, row.revision, row.last, row.last_dismissal)
         findings = None
         if row.summary is not None:
-            kinds = [item.kind for item in findings_of(noticed[row.id], row.inputs_hash)]
+            kinds = [item.kind for item in findings_from_rows(noticed[row.id], row.inputs_hash)]
             findings = [*json.loads(row.summary)["findings"], *kinds]
-        name = policy_of(row.policy).name
+        name = policy_from_row(row.policy).name
         revisions = int(row.station_revisions)
         etags[row.id] = group_etag(content, row.policy_hash, name, findings, revisions)
     return etags
@@ -233,7 +233,7 @@ class Record:
     @property
     def noticed(self) -> tuple[Finding, ...]:
         """What was noticed about the group as it is."""
-        return tuple(findings_of(self.said, self.stored.inputs_hash))
+        return tuple(findings_from_rows(self.said, self.stored.inputs_hash))
 
     @property
     def content(self) -> str:

@@ -1,6 +1,6 @@
 """Ledger: everything that was said, as values, whether it comes from the log or the tables.
 
-``replay.replay`` makes one from the log, ``read_state_snapshot`` one from the tables; they are equal.
+``replay.replay_log`` makes one from the log, ``read_state_snapshot`` one from the tables; they are equal.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 from app.db.json_columns import unpack
 from app.db.session import Session
-from app.features.datasets.queries import dataset_rows, policy_of
+from app.features.datasets.queries import dataset_rows, policy_from_row
 from app.features.groups.codecs import extras_from_json, paint_to_json
 from app.features.groups.digest import group_inputs_hash
 from app.features.groups.projection_queries import (
@@ -110,7 +110,7 @@ def read_state_snapshot(session: Session) -> StateSnapshot:
     """The state snapshot as the tables have it."""
     snapshot = StateSnapshot()
     for row in dataset_rows(session):
-        snapshot.datasets[row.id] = (row.name, policy_of(row.policy))
+        snapshot.datasets[row.id] = (row.name, policy_from_row(row.policy))
     for station in all_stations(session):
         snapshot.stations[station.id] = StationRecord(
             station.dataset_id, station.station, station.revision, station.source_digest

@@ -12,7 +12,6 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import NotFoundError, SharedStationError
 from app.features.groups import view_queries as views
-from app.features.groups.ball_noise import add_noise_of_actor, keep_view_noise
 from app.features.groups.edit import (
     STATION_EDITS,
     CompositeEdit,
@@ -22,6 +21,7 @@ from app.features.groups.edit import (
     need_view,
 )
 from app.features.groups.edit_codec import edit_and_inverse_to_json, require_point_limits_of_edits
+from app.features.groups.group_edits import add_noise_of_actor, keep_view_noise
 from app.features.groups.queries import StoredGroup, group_of_view
 from app.features.groups.revision_queries import next_revision, save_revision
 from app.features.groups.state import (

@@ -33,13 +33,13 @@ from app.features.groups.state import GroupState
 from app.features.groups.submit import FoundView, find_view, submit_view
 from app.features.groups.view_paint import NO_FRAME_HINT
 from app.features.solutions.service import Solve, solve_encoded
-from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, Id, IfMatch, etag_matches
+from app.http.documents import responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import EDITS, IMAGES, is_large, limit
-from app.http.respond import responds
 from app.http.route import Route
 from app.http.services import Services
 from app.media.frames import Frames, SentPicture

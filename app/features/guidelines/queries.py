@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
 from sqlalchemy import func, select
 
@@ -19,10 +19,18 @@ GUIDELINE = "guideline"
 """Kind of the log's entries about them; each has the digest of a text."""
 
 
-def all_guidelines(session: Session) -> Sequence[Any]:
-    """``dataset_id``, ``number`` and ``text`` of every version of every dataset."""
+class GuidelineText(NamedTuple):
+    """One version of a dataset's guidelines."""
+
+    dataset_id: int
+    number: int
+    text: str
+
+
+def all_guidelines(session: Session) -> Sequence[GuidelineText]:
+    """Every version of the guidelines of every dataset."""
     model = GuidelineModel
-    return session.execute(select(model.dataset_id, model.number, model.text)).all()
+    return session.rows(GuidelineText, select(model.dataset_id, model.number, model.text))
 
 
 def guidelines_dataset(session: Session, dataset_id: int) -> int:
@@ -31,13 +39,21 @@ def guidelines_dataset(session: Session, dataset_id: int) -> int:
     return session.scalar(statement) or dataset_id
 
 
-def guideline_heads(session: Session, dataset_id: int) -> Sequence[Any]:
-    """``number``, ``written`` and ``written_by`` of every version, the newest first."""
+class GuidelineHead(NamedTuple):
+    """When and by whom a version of guidelines was written."""
+
+    number: int
+    written: str
+    written_by: str
+
+
+def guideline_heads(session: Session, dataset_id: int) -> Sequence[GuidelineHead]:
+    """Every version of a dataset's guidelines without its text, the newest first."""
     model = GuidelineModel
     statement = select(model.number, model.written, model.written_by).where(
         model.dataset_id == dataset_id
     )
-    return session.execute(statement.order_by(model.number.desc())).all()
+    return session.rows(GuidelineHead, statement.order_by(model.number.desc()))
 
 
 def guideline_text(session: Session, dataset_id: int, number: int) -> str | None:
@@ -59,11 +75,18 @@ def insert_picture(session: Session, dataset_id: int, digest: str, kind: str, bo
     session.execute(insert(GuidelinePictureModel).values(**values).on_conflict_do_nothing())
 
 
-def find_picture(session: Session, dataset_id: int, digest: str) -> Any | None:
-    """``type`` and ``body`` of a picture."""
+class StoredPicture(NamedTuple):
+    """A picture of guidelines: its media type and its bytes."""
+
+    type: str
+    body: bytes
+
+
+def find_picture(session: Session, dataset_id: int, digest: str) -> StoredPicture | None:
+    """A picture by its digest."""
     model = GuidelinePictureModel
     mine = (model.dataset_id == dataset_id) & (model.digest == digest)
-    return session.execute(select(model.type, model.body).where(mine)).one_or_none()
+    return session.row(StoredPicture, select(model.type, model.body).where(mine))
 
 
 def count_pictures(session: Session, dataset_id: int) -> int:

@@ -14,9 +14,9 @@ from app.features.independent_annotations.schemas import (
     NewGuidelinePicture,
 )
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, etag_matches
+from app.http.documents import as_document, document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import as_document, document, responds
 from app.http.route import Route
 
 router = APIRouter(

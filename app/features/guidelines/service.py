@@ -165,9 +165,7 @@ def read_picture(store: Store, dataset: str | int, digest: str) -> GuidelinePict
 
 def _read_version(session: Session, dataset_id: int, number: int | None = None) -> Guidelines:
     """A version of the guidelines of the dataset whose they are; None: the newest."""
-    versions = tuple(
-        GuidelineVersion(**row._mapping) for row in guideline_heads(session, dataset_id)
-    )
+    versions = tuple(GuidelineVersion(*row) for row in guideline_heads(session, dataset_id))
     if number is None:
         number = versions[0].number if versions else 0
     text = "" if number == 0 else guideline_text(session, dataset_id, number)

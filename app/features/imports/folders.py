@@ -25,7 +25,6 @@ from app.features.imports.upload_queries import (
     require_size,
     require_unused_by_datasets,
 )
-from app.features.imports.upload_quota import quota_of as quota_of
 from app.features.imports.upload_quota import used_bytes as used_bytes
 from app.features.people.visibility_queries import Visibility
 from app.formats.file_tree import Root

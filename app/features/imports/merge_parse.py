@@ -15,7 +15,7 @@ from app.features.groups.undo_stacks import group_of_log_entry, pitch_size
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, count_points
 from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
 from app.features.imports.queries import VERDICT
-from app.features.policies.text import CUSTOM, policy_values, policy_with
+from app.features.policies.service import CUSTOM, policy_values, policy_with
 from app.features.verdicts.service import STATES
 from app.finite import json_text
 from app.formats.file_tree import BROKEN, FileTree

@@ -28,16 +28,16 @@ from app.features.imports.folders import (
 from app.features.imports.jobs import request_import
 from app.features.imports.schemas import FolderDocument, ImportBody, UploadDocument, UploadList
 from app.features.imports.upload_queries import Upload, UploadWriter
-from app.features.imports.upload_quota import quota_of, used_bytes
+from app.features.imports.upload_quota import person_quota, used_bytes
 from app.features.jobs.queries import Job
+from app.features.jobs.schemas import by_job, job_answer
 from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, DryRun, Sees
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import UPLOADS, limit
-from app.http.respond import no_content, responds
 from app.http.route import Route
 from app.http.services import Services
 
@@ -300,7 +300,7 @@ def get_uploads(services: AppServices, visibility: Sees, actor: Actor) -> Upload
         max_bytes=settings.max_upload_bytes,
         days=settings.upload_days,
         used_bytes=used_bytes(settings, actor),
-        quota_bytes=quota_of(settings),
+        quota_bytes=person_quota(settings),
     )
 
 

@@ -421,7 +421,7 @@ def _open_static_folder(source: Source, report: Report, limits: Limits) -> Issia
 
 def _report_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
-    from app.features.solutions.service import contradicted_cameras, sentence_of
+    from app.features.solutions.service import contradicted_cameras, contradiction_sentence
 
     stations = {station.key: number for number, station in folder.stations.items()}
     off = contradicted_cameras(((one, Pitch()) for one in folder.stations.values()), PAPER)
@@ -436,7 +436,7 @@ def _report_contradicted(folder: IssiaFolder, dataset: str, source: Source, repo
     )
     shown = len(set[int]().union(*showing))
     where = f"{shown:,} of {len(groups):,} groups show {'it' if len(off) == 1 else 'one of them'}, and it fails there at the gate jac"
-    report.remark(sentence_of(off, where, f"`{command}`"))
+    report.remark(contradiction_sentence(off, where, f"`{command}`"))
 
 
 def _read_unassigned(folder: IssiaFolder) -> Iterator[UnassignedFrame]:

@@ -33,7 +33,7 @@ from app.features.imports.upload_queries import (
     safe_name,
     write_record,
 )
-from app.features.imports.upload_quota import quota_of, require_quota, used_bytes
+from app.features.imports.upload_quota import person_quota, require_quota, used_bytes
 
 Guess = Callable[[Path], str | None]
 
@@ -64,7 +64,7 @@ def begin_upload_in_parts(
     with lock_upload_records(settings):
         upload = read_upload(folder)
         begun = Upload(folder.name, name, 0, now(), by=(by,), size=size)
-        if upload is None and (quota := quota_of(settings)) is not None:
+        if upload is None and (quota := person_quota(settings)) is not None:
             require_quota(settings, size, quota, used_bytes(settings, by, but=folder))
         with _storage_errors(upload or begun):
             if upload is None or upload.bytes < size:

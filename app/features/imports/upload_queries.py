@@ -27,7 +27,7 @@ from app.db.locks import require_lock
 from app.db.session import now
 from app.durable import replace_file, sync
 from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
-from app.features.imports.upload_quota import quota_of, require_quota, used_bytes
+from app.features.imports.upload_quota import person_quota, require_quota, used_bytes
 from app.finite import json_text
 
 _ID = re.compile(r"[0-9a-f]{32}")
@@ -304,7 +304,7 @@ class UploadWriter:
         self._settings, self._name, self._by = settings, safe_name(name), by
         self._folder = settings.uploads / f"{uuid.uuid4().hex}{PART}"
         self._digest = UploadDigest(self._name)
-        self._quota = quota_of(settings) if by else None
+        self._quota = person_quota(settings) if by else None
         self._reserved = 0
         self.bytes = 0
         if self._quota is None:

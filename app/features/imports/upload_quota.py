@@ -18,7 +18,7 @@ IDLE_SECONDS = 600.0
 """A half-sent upload in which nothing was written for so long has lost its sender."""
 
 
-def quota_of(settings: Settings) -> int | None:
+def person_quota(settings: Settings) -> int | None:
     """How many bytes one person may have; None: nobody counts, as on a server without accounts."""
     return settings.upload_quota_bytes or None if settings.team else None
 

@@ -1,4 +1,4 @@
-"""Adopting: a person's own annotation becomes that of the original, as their edit and verdict."""
+"""What becomes of a submitted annotation: it is adopted for its group, or returned to its person."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import ConflictError
+from app.errors import ConflictError, InputError
 from app.features.groups.edit import (
     CompositeEdit,
     Edit,
@@ -32,10 +32,18 @@ from app.features.independent_annotations.copying import rename_views_as_origina
 from app.features.independent_annotations.queries import (
     GOLD,
     IndependentAnnotation,
+    annotation_of_copy,
     update_annotation,
 )
-from app.features.independent_annotations.service import get_annotation, read_annotation
-from app.features.independent_annotations.submission_queries import KIND
+from app.features.independent_annotations.service import (
+    DisclosedAnnotation,
+    disclose_in_session,
+    get_annotation,
+    read_annotation,
+)
+from app.features.independent_annotations.submission_queries import KIND, RETURNED, return_copy
+from app.features.notifications.queries import NotificationKind
+from app.features.notifications.service import notify
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.verdicts.queries import (
     StoredVerdict,
@@ -43,7 +51,12 @@ from app.features.verdicts.queries import (
     next_verdict_id,
     read_last_verdicts,
 )
+from app.features.webhooks.queries import HANDED_BACK, announce, time_suffix
+from app.soccer.actors import person_of
 from app.soccer.group import Group, Station
+
+MAX_REASON = 500
+"""Letters of the sentence that says why."""
 
 
 def adopt_annotation(
@@ -79,7 +92,7 @@ def adopt_annotation(
     def settle(session: Session) -> None:
         _require_ready(read_annotation(session, annotation_id))
         _adopt_stations(session, original, copy, annotation.person)
-        give_verdict_of(session, annotation, actor=annotation.person)
+        copy_verdict_to_original(session, annotation, actor=annotation.person)
         at = now()
         update_annotation(session, annotation_id, settled=at)
         body = {"take": annotation_id, "person": annotation.person, "did": "adopted"}
@@ -188,7 +201,7 @@ def _adopt_stations(
             refresh_queue(session, groups)
 
 
-def give_verdict_of(
+def copy_verdict_to_original(
     session: Session, annotation: IndependentAnnotation, *, actor: str, note: str | None = None
 ) -> StoredVerdict | None:
     """Give the original the verdict of an independent annotation's copy, where there is one.
@@ -220,3 +233,94 @@ def give_verdict_of(
     )
     insert_verdicts(session, after.dataset_id, [verdict], actor=actor, at=verdict.at)
     return verdict
+
+
+def return_annotation(
+    store: Store, annotation_id: int, reason: str = "", *, actor: str
+) -> DisclosedAnnotation:
+    """Let the person of an annotation that was submitted go on with it, and tell them why.
+
+    A comparison of it that waits for a decision waits no longer: it is made anew once it is handed
+    in again.
+
+    Raises:
+        NotFoundError: There is no such annotation.
+        ConflictError: It is not submitted, or it was decided about.
+        InputError: There is no sentence, or it is too long.
+    """
+    checked = checked_reason(reason)
+    if not checked:
+        raise InputError(
+            "a reason is required to return an annotation",
+            hint="Say in a sentence what its annotator should change.",
+            pointer="/reason",
+        )
+    with store.write() as session:
+        annotation = read_annotation(session, annotation_id)
+        return_copy(session, annotation)
+        copy = annotation.copy_id
+        log_return(
+            session, KIND, copy, annotation.person, checked, actor=actor, batch=annotation.batch_id
+        )
+        back = disclose_in_session(session, read_annotation(session, annotation_id))
+        session.respond(back)
+        return back
+
+
+def log_return(
+    session: Session,
+    kind: str,
+    group_id: int,
+    person: str,
+    reason: str,
+    *,
+    actor: str,
+    batch: int | None,
+) -> None:
+    """Write into the log that a group was returned to somebody, and tell them.
+
+    The entry names the group: its history says so, and a page that has it open hears of it.
+
+    Args:
+        session: The write session in which it happens.
+        kind: Of the entry.
+        group_id: What they worked on; for an annotation of their own, its copy.
+        person: Whom it goes back to.
+        reason: Why; may be empty.
+        actor: Who returns it.
+        batch: Of which batch it is; None: of none.
+    """
+    group = need_group(session, group_id)
+    body: dict[str, str | int] = {"did": RETURNED, "person": person, "reason": reason}
+    if batch is not None:
+        body["batch"] = batch
+    at = now()
+    append(session, [Entry(kind, actor, at, body, group.dataset_id, group_id)])
+    _announce_return(session, group, person, actor=actor, at=at, batch=batch)
+    why = f": {reason}" if reason else ""
+    walk = "" if batch is None else f"?q=batch%3A{batch}"
+    notify(
+        session, person, NotificationKind.RETURNED, f"{person_of(actor)} returned {group.group.label or group.group.key} to you{why}",
+        actor=actor, address=f"/review/{group_id}{walk}", dataset_id=group.dataset_id, group_id=group_id,
+    )  # fmt: skip
+
+
+def _announce_return(
+    session: Session, group: StoredGroup, person: str, *, actor: str, at: str, batch: int | None
+) -> None:
+    """Tell webhooks of the dataset, for a copy of the one that it is of."""
+    row = annotation_of_copy(session, group.id)
+    where, details = group.dataset_id, {"group": group.id, "person": person}
+    if row is not None:
+        where = need_group(session, row.group_id).dataset_id
+        details = {"group": row.group_id, "person": person, "copy": group.id}
+    event = f"group{group.id}_handed_back{time_suffix(at)}"
+    announce(session, where, HANDED_BACK, event, actor=actor, at=at, batch_id=batch, also=details)
+
+
+def checked_reason(reason: str) -> str:
+    """The sentence without blanks around it; raises InputError where it is too long."""
+    text = " ".join(reason.split())
+    if len(text) > MAX_REASON:
+        raise InputError(f"the reason has at most {MAX_REASON} letters", pointer="/reason")
+    return text

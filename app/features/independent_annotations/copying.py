@@ -9,7 +9,7 @@ from itertools import count
 
 from app.db.log import LogEntry, group_entries
 from app.db.session import Session
-from app.features.datasets.queries import find_dataset, policy_of
+from app.features.datasets.queries import find_dataset, policy_from_row
 from app.features.datasets.service import insert_dataset, save_policy
 from app.features.groups.codecs import view_from_json
 from app.features.groups.digest import source_hash
@@ -19,8 +19,13 @@ from app.features.groups.queries import StoredGroup
 from app.features.groups.reimport import SharedStations
 from app.features.imports.ingest import Origin, insert_new_groups
 from app.features.imports.queries import newest_imports, shared_stations
-from app.features.independent_annotations.gold_queries import BARE, IMPORTED, gold_start
-from app.features.independent_annotations.queries import CopiesOf, find_copies
+from app.features.independent_annotations.queries import (
+    BARE,
+    IMPORTED,
+    CopiesOf,
+    find_copies,
+    gold_start,
+)
 from app.features.paint.queries import PAINT, insert_readings, read_readings
 from app.soccer.group import Group, Station, View
 
@@ -66,7 +71,7 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     return copy_id
 
 
-def gold_start_of(session: Session, stored: StoredGroup) -> Group:
+def gold_group_start(session: Session, stored: StoredGroup) -> Group:
     """A gold group as its own start says, before it is stripped as all copies of the batch are."""
     if gold_start(session, stored.id) == IMPORTED:
         return _group_as_imported(session, stored)
@@ -86,7 +91,7 @@ def without_extras(group: Group, start: str) -> Group:
     return replace(group, paint={} if bare else group.paint)
 
 
-def start_of(session: Session, stored: StoredGroup, since: str) -> Group:
+def group_before_edits(session: Session, stored: StoredGroup, since: str) -> Group:
     """A group without its edits from a time on, back to the import before, the last one first."""
     group = stored.group
     for entry in reversed(group_entries(session, stored.id, verdicts=False)):
@@ -180,7 +185,7 @@ def _dataset_of_copies(session: Session, order: CopyRequest) -> int:
         name = _free_name(session, f"{stored.dataset[:_NAME]} {copies.batch_id} {order.person}")
         return insert_dataset(session, name, stored.policy, order.person, copies)
     held = find_dataset(session, int(row.dataset_id))
-    if held is not None and policy_of(held.policy) != stored.policy:
+    if held is not None and policy_from_row(held.policy) != stored.policy:
         save_policy(session, int(row.dataset_id), stored.policy, order.person)
     return int(row.dataset_id)
 

@@ -25,22 +25,20 @@ from app.features.independent_annotations.errors import (
     distance_from_truth,
     world_error,
 )
-from app.features.independent_annotations.gold_queries import (
+from app.features.independent_annotations.queries import (
+    GOLD,
     STARTS,
+    IndependentAnnotation,
     gold_head,
     gold_heads,
     gold_truth,
+    is_copy,
     mark_gold,
+    read_annotations,
     start_gold,
     unmark_gold,
 )
-from app.features.independent_annotations.queries import (
-    GOLD,
-    IndependentAnnotation,
-    annotations_in,
-    is_copy,
-)
-from app.features.independent_annotations.submission_queries import submissions_of
+from app.features.independent_annotations.submission_queries import list_submissions
 from app.features.solutions.service import known_calibrations
 from app.finite import Moment
 from app.formats.camera_json import camera_from_json
@@ -142,7 +140,7 @@ class GoldReport:
     people: tuple[PersonResults, ...]
 
 
-def mark(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
+def mark_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
     """Say that what a group holds now is true; annotators begin with what ``start`` leaves of it.
 
     Raises:
@@ -190,7 +188,7 @@ def start_with(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
     return changed
 
 
-def unmark(store: Store, group_id: int, *, actor: str) -> GoldGroup:
+def unmark_group(store: Store, group_id: int, *, actor: str) -> GoldGroup:
     """Let a gold group be an ordinary one again; what was measured by it is no longer shown.
 
     Raises:
@@ -218,9 +216,9 @@ def read_report(store: Store, dataset: str | int) -> GoldReport:
             row.group_id: _gold_with_truth(session, row) for row in gold_heads(session, dataset_id)
         }
         annotations = [
-            one for one in annotations_in(session, dataset_id, kind=GOLD) if one.group_id in known
+            one for one in read_annotations(session, dataset_id, kind=GOLD) if one.group_id in known
         ]
-        submitted = submissions_of(session, [annotation.copy_id for annotation in annotations])
+        submitted = list_submissions(session, [annotation.copy_id for annotation in annotations])
         for annotation in annotations:
             made = submitted.get(annotation.copy_id, [])
             if annotation.submitted is None and not made:

@@ -17,25 +17,26 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
-from app.features.agreement.queries import AGREED, DECIDED, states_of
+from app.features.agreement.queries import AGREED, DECIDED, read_group_states
 from app.features.datasets.service import dataset_id
 from app.features.groups.codecs import group_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.submit import solve_and_keep
 from app.features.independent_annotations.gold import KIND, TruthSource, check_start
-from app.features.independent_annotations.gold_queries import fresh_gold, mark_gold
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
     IndependentAnnotation,
     annotations_of_batch,
+    fresh_gold,
     is_copy,
+    mark_gold,
 )
-from app.features.independent_annotations.service import begin
+from app.features.independent_annotations.service import begin_in_session
 from app.features.queue.queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
 from app.features.versions.queries import BATCH, read_rows
-from app.features.versions.service import Version, find_version, thaw
+from app.features.versions.service import Version, find_version, read_frozen_groups
 from app.formats.camera_json import camera_to_json
 from app.sample.scene import TRUTH, SceneTruth, read_truth
 from app.soccer.actors import person_of
@@ -187,13 +188,13 @@ def _truths_of_version(
     """Truths of groups that a version holds, and upon which people agreed or somebody decided."""
     ids: dict[str, int] = {}
     for start in range(0, len(group_ids), BATCH):
-        states = states_of(session, group_ids[start : start + BATCH])
+        states = read_group_states(session, group_ids[start : start + BATCH])
         settled = [group for group, state in states.items() if state in (AGREED, DECIDED)]
         ids |= {one.group.key: group for group, one in read_groups(session, settled).items()}
     for row in read_rows(session, version.id, members=True):
         if row.key not in ids or row.ball is None:
             continue
-        (frozen,) = thaw(session, version, [row])
+        (frozen,) = read_frozen_groups(session, version, [row])
         verdict = (row.verdict or {}).get("state", "unreviewed")
         values = {"group": group_to_json(frozen.group), "verdict": verdict, "ball": [*row.ball]}
         yield ids[row.key], {**values, "source": str(TruthSource.VERSION)}
@@ -283,7 +284,7 @@ def _next_annotation(
     if not choice:
         return None
     group_id = chance.choice(choice)
-    return begin(
+    return begin_in_session(
         session,
         group_id,
         person=person,

@@ -1,20 +1,27 @@
-"""Independent annotations: which copy is whose annotation of which group, and how far it is."""
+"""Independent annotations and gold groups in the database."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, get_args
 
-from sqlalchemy import Select, bindparam, exists, func, insert, or_, select, update
+from sqlalchemy import Select, bindparam, delete, exists, func, insert, or_, select, update
 from sqlalchemy.orm import aliased
 
+from app.db.dialects.statements import insert as insert_or_update
+from app.db.json_columns import Json, pack, unpack
 from app.db.session import Session, now
 from app.features.batches.tables import BatchGroupModel
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.groups.insert_queries import next_id
-from app.features.independent_annotations.tables import CopyDatasetModel, IndependentAnnotationModel
+from app.features.independent_annotations.tables import (
+    CopyDatasetModel,
+    GoldModel,
+    IndependentAnnotationModel,
+)
 from app.features.queue.tables import QueueModel
+from app.soccer.choices import GoldStart
 
 GOLD = "gold"
 INDEPENDENT = "independent"
@@ -27,6 +34,24 @@ _READY = (
     IndependentAnnotationModel.submitted.is_not(None),
 )
 _OF_COPY = _ANNOTATIONS.where(IndependentAnnotationModel.copy_id == bindparam("copy"))
+
+
+_COPIES = select(*CopyDatasetModel.__table__.columns, DatasetModel.name).join(
+    DatasetModel, DatasetModel.id == CopyDatasetModel.dataset_id
+)
+IMPORTED = "imported"
+WITHOUT_BALLS = "without_balls"
+BARE = "bare"
+STARTS: tuple[str, ...] = get_args(GoldStart)
+_HEADS = select(
+    GoldModel.group_id,
+    GoldModel.dataset_id,
+    GoldModel.start,
+    GoldModel.marked,
+    GoldModel.marked_by,
+    GroupModel.key,
+    GroupModel.label,
+).join(GroupModel, GroupModel.id == GoldModel.group_id)
 
 
 @dataclass(frozen=True)
@@ -200,7 +225,7 @@ def open_annotations(session: Session, batch_ids: Collection[int], person: str) 
     return session.execute(statement.order_by(IndependentAnnotationModel.id)).all()
 
 
-def annotations_in(
+def read_annotations(
     session: Session, dataset_id: int, person: str | None = None, kind: str | None = None
 ) -> list[IndependentAnnotation]:
     """The independent annotations of a dataset, of one person or one kind where these are named, oldest first."""
@@ -217,9 +242,27 @@ def annotations_in(
     )
 
 
-def names_of_copies(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
-    """``id``, ``key``, ``label``, ``of_id`` and ``same`` (whether it has the original's key) of copies, and
-    ``number``, ``of_key`` and ``of_label`` of the original."""
+class CopyName(NamedTuple):
+    """Names of a copy and of the group that it is a copy of.
+
+    Attributes:
+        of_id: Dataset of the original.
+        same: Whether the copy has the key of the original.
+        of_key, of_label, number: Of the original.
+    """
+
+    id: int
+    key: str
+    label: str
+    of_id: int
+    same: bool
+    of_key: str
+    of_label: str
+    number: int
+
+
+def names_of_copies(session: Session, copy_ids: Sequence[int]) -> Sequence[CopyName]:
+    """Names of copies and of their originals."""
     original = aliased(GroupModel)
     statement = (
         select(
@@ -237,7 +280,7 @@ def names_of_copies(session: Session, copy_ids: Sequence[int]) -> Sequence[Any]:
         .join(original, original.id == IndependentAnnotationModel.group_id)
         .join(QueueModel, QueueModel.group_id == original.id)
     )
-    return session.execute(statement.where(GroupModel.id.in_(copy_ids))).all()
+    return session.rows(CopyName, statement.where(GroupModel.id.in_(copy_ids)))
 
 
 def count_annotations(session: Session, batch_id: int | None, person: str) -> int:
@@ -257,11 +300,6 @@ def update_annotation(session: Session, annotation_id: int, **values: str | None
     )
 
 
-_COPIES = select(*CopyDatasetModel.__table__.columns, DatasetModel.name).join(
-    DatasetModel, DatasetModel.id == CopyDatasetModel.dataset_id
-)
-
-
 @dataclass(frozen=True)
 class CopiesOf:
     """Of what a dataset holds copies: of the groups of ``of_id``, by a person, in a batch (0: none)."""
@@ -276,7 +314,7 @@ def insert_copy_dataset(session: Session, dataset_id: int, copies: CopiesOf) -> 
     session.execute(insert(CopyDatasetModel), [{"dataset_id": dataset_id, **vars(copies)}])
 
 
-def copies_of(session: Session, dataset_id: int) -> Sequence[Any]:
+def list_copies(session: Session, dataset_id: int) -> Sequence[Any]:
     """``dataset_id``, ``of_id``, ``batch_id``, ``person`` and ``name`` of a dataset's copies."""
     return session.execute(_COPIES.where(CopyDatasetModel.of_id == dataset_id)).all()
 
@@ -297,3 +335,65 @@ def is_copy(session: Session, dataset_id: int) -> bool:
     """Whether a dataset holds somebody's copies."""
     mine = CopyDatasetModel.dataset_id == dataset_id
     return session.scalar(select(CopyDatasetModel.dataset_id).where(mine)) is not None
+
+
+def mark_gold(
+    session: Session, group_id: int, dataset_id: int, start: str, truth: Json, by: str
+) -> None:
+    """Keep what is true of a group, in the place of what was kept before."""
+    values = {"dataset_id": dataset_id, "start": start, "truth": pack(truth)}
+    values |= {"marked": now(), "marked_by": by}
+    statement = insert_or_update(GoldModel).values(group_id=group_id, **values)
+    session.execute(statement.on_conflict_do_update(index_elements=["group_id"], set_=values))
+
+
+def start_gold(session: Session, group_id: int, start: str) -> None:
+    """Let annotators of a gold group begin with something else; what is true of it stays."""
+    of = GoldModel.group_id == group_id
+    session.execute(update(GoldModel).where(of).values(start=start))
+
+
+def unmark_gold(session: Session, group_id: int) -> None:
+    """A gold group is an ordinary one again."""
+    session.execute(delete(GoldModel).where(GoldModel.group_id == group_id))
+
+
+def gold_start(session: Session, group_id: int) -> str:
+    """What annotators of a gold group begin with."""
+    statement = select(GoldModel.start).where(GoldModel.group_id == group_id)
+    return session.scalar(statement) or IMPORTED
+
+
+def common_start(session: Session, dataset_id: int) -> str | None:
+    """What everybody begins with in batches that mix the gold groups of a dataset in: that which
+    leaves least of those that its gold groups have; None where there is not a gold group."""
+    mine = GoldModel.dataset_id == dataset_id
+    found = session.scalars(select(GoldModel.start).where(mine).distinct())
+    return max(found, key=(IMPORTED, WITHOUT_BALLS, BARE).index, default=None)
+
+
+def gold_heads(session: Session, dataset_id: int) -> Sequence[Any]:
+    """The gold groups of a dataset without what is true of them, by id of the group."""
+    statement = _HEADS.where(GoldModel.dataset_id == dataset_id).order_by(GoldModel.group_id)
+    return session.execute(statement).all()
+
+
+def gold_head(session: Session, group_id: int) -> Any | None:
+    """A gold group without what is true of it; None: it is none."""
+    return session.execute(_HEADS.where(GoldModel.group_id == group_id)).one_or_none()
+
+
+def gold_truth(session: Session, group_id: int) -> Json | None:
+    """What is true of a gold group."""
+    packed = session.scalar(select(GoldModel.truth).where(GoldModel.group_id == group_id))
+    return None if packed is None else unpack(packed)
+
+
+def fresh_gold(session: Session, dataset_id: int, person: str) -> list[int]:
+    """Ids of the gold groups of a dataset of which a person has had no copy yet."""
+    had = select(IndependentAnnotationModel.group_id).where(
+        IndependentAnnotationModel.person == person
+    )
+    mine = GoldModel.dataset_id == dataset_id
+    statement = select(GoldModel.group_id).where(mine, GoldModel.group_id.not_in(had))
+    return list(session.scalars(statement.order_by(GoldModel.group_id)))

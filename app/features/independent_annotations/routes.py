@@ -10,13 +10,13 @@ from app.features.groups.routes import ETAG, group_answer
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.independent_annotations import gold, service
+from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.gold import GoldGroup
 from app.features.independent_annotations.known_truth import (
     GoldChoice,
     GoldChoiceResult,
     mark_known,
 )
-from app.features.independent_annotations.return_work import return_annotation
 from app.features.independent_annotations.schemas import (
     GoldChoiceDocument,
     GoldEdit,
@@ -25,14 +25,14 @@ from app.features.independent_annotations.schemas import (
     ReturnReason,
 )
 from app.features.independent_annotations.service import DisclosedAnnotation
-from app.features.people.roles import lets
-from app.http.access import login_of
+from app.features.people.roles import role_allows
+from app.http.access import current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
+from app.http.documents import document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import LOOKS, limit
-from app.http.respond import document, responds
 from app.http.route import Route
 
 annotations_router = APIRouter(tags=["independent annotations"], route_class=Route)
@@ -49,11 +49,13 @@ def list_independent_annotations(
     dataset: DatasetPath, store: AppStore, request: Request, actor: Actor
 ) -> IndependentAnnotationList:
     """Own annotations of a dataset's groups: for a lead everybody's, else those of whoever asks."""
-    login = login_of(request.scope)
+    login = current_login(request.scope)
     found = service.list_annotations(
         store,
         dataset,
-        lambda dataset_id: login is None or lets(login.roles.role_in(dataset_id), Action.LEAD),
+        lambda dataset_id: (
+            login is None or role_allows(login.roles.role_in(dataset_id), Action.LEAD)
+        ),
         person=actor,
     )
     return IndependentAnnotationList(items=found)
@@ -87,7 +89,7 @@ def begin(group: Id, store: AppStore, actor: Actor) -> service.DisclosedAnnotati
 @limit(LOOKS)
 def get_independent_annotation(group: Id, store: AppStore) -> service.DisclosedAnnotation:
     """Whose own annotation a group is; 404 for an ordinary group."""
-    return service.shown(store, service.get_annotation_of_copy(store, group))
+    return service.disclose_annotation(store, service.get_annotation_of_copy(store, group))
 
 
 @annotations_router.post(
@@ -186,7 +188,7 @@ def choose(
 @responds(document)
 def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Say that what a group holds now, with its verdict, is true."""
-    return gold.mark(store, group, edit.start, actor=actor)
+    return gold.mark_group(store, group, edit.start, actor=actor)
 
 
 @gold_router.patch(
@@ -212,4 +214,4 @@ def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.Gol
 @responds(document)
 def unmark(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let a gold group be an ordinary one again; what people made of it is no longer shown."""
-    return gold.unmark(store, group, actor=actor)
+    return gold.unmark_group(store, group, actor=actor)

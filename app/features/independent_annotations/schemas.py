@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.guidelines.service import MAX_LETTERS
+from app.features.independent_annotations.adopt import MAX_REASON
 from app.features.independent_annotations.errors import DistanceFromTruth
 from app.features.independent_annotations.gold import (
     GoldGroup,
@@ -16,7 +17,6 @@ from app.features.independent_annotations.gold import (
     PersonResults,
 )
 from app.features.independent_annotations.known_truth import MOST
-from app.features.independent_annotations.return_work import MAX_REASON
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.finite import MAX_ID

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from app.db.log import read_entries_of
 from app.db.session import Session, now
@@ -17,22 +16,23 @@ from app.features.groups.submit import solve_and_keep
 from app.features.independent_annotations.copying import (
     CopyRequest,
     copy_group,
-    gold_start_of,
-    start_of,
+    gold_group_start,
+    group_before_edits,
     without_extras,
 )
-from app.features.independent_annotations.gold_queries import common_start
 from app.features.independent_annotations.queries import (
     GOLD,
     INDEPENDENT,
+    CopyName,
     IndependentAnnotation,
     annotation_of_copy,
-    annotations_in,
     annotations_of_group,
+    common_start,
     count_annotations,
     find_annotation,
     insert_annotation,
     names_of_copies,
+    read_annotations,
 )
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
@@ -124,14 +124,14 @@ def begin_annotation(store: Store, group_id: int, *, person: str) -> DisclosedAn
         ConflictError: It is a copy itself.
     """
     with store.write() as session:
-        annotation = begin(session, group_id, person=person_of(person))
-        begun = show(session, annotation)
+        annotation = begin_in_session(session, group_id, person=person_of(person))
+        begun = disclose_in_session(session, annotation)
         session.respond(begun)
     solve_and_keep(store, annotation.copy_id)
     return begun
 
 
-def begin(
+def begin_in_session(
     session: Session,
     group_id: int,
     *,
@@ -168,9 +168,9 @@ def begin(
     ready = [one.copy_id for one in others if one.submitted is not None]
     start = stored.group
     if kind == GOLD:
-        start = gold_start_of(session, stored)
+        start = gold_group_start(session, stored)
     elif (blind or nameless) and since is not None:
-        start = start_of(session, stored, since)
+        start = group_before_edits(session, stored, since)
     elif not blind and ready:
         start = need_group(session, ready[-1]).group
     common = common_start(session, stored.dataset_id) if nameless else None
@@ -201,7 +201,7 @@ def submit_annotation(store: Store, annotation_id: int, *, actor: str) -> Disclo
     with store.write() as session:
         annotation = read_annotation(session, annotation_id)
         submit_copy(session, annotation, actor=actor, at=now())
-        handed = show(session, read_annotation(session, annotation_id))
+        handed = disclose_in_session(session, read_annotation(session, annotation_id))
         session.respond(handed)
         return handed
 
@@ -251,18 +251,18 @@ def list_annotations(
     with store.read() as session:
         dataset_id = need_dataset(session, dataset)
         whose = None if sees_all(dataset_id) else person_of(person)
-        found = annotations_in(session, dataset_id, whose)
+        found = read_annotations(session, dataset_id, whose)
         return _disclosed_annotations(session, found)
 
 
-def shown(store: Store, annotation: IndependentAnnotation) -> DisclosedAnnotation:
+def disclose_annotation(store: Store, annotation: IndependentAnnotation) -> DisclosedAnnotation:
     """An independent annotation as it is shown."""
     with store.read() as session:
-        return show(session, annotation)
+        return disclose_in_session(session, annotation)
 
 
-def show(session: Session, annotation: IndependentAnnotation) -> DisclosedAnnotation:
-    """``shown`` within a session."""
+def disclose_in_session(session: Session, annotation: IndependentAnnotation) -> DisclosedAnnotation:
+    """``disclose_annotation`` within a session."""
     return _disclosed_annotations(session, [annotation])[0]
 
 
@@ -305,7 +305,7 @@ def _disclosed_annotations(
     ]
 
 
-def _title_of_copy(head: Any, disclosed: bool) -> str:
+def _title_of_copy(head: CopyName, disclosed: bool) -> str:
     return str((head.of_label or head.of_key) if disclosed else (head.label or head.key))
 
 

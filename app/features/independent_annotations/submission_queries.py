@@ -116,7 +116,7 @@ def return_copy(session: Session, annotation: IndependentAnnotation) -> None:
     forget_open(session, annotation.group_id, annotation.batch_id or 0)
 
 
-def submissions_of(
+def list_submissions(
     session: Session, copy_ids: Sequence[int]
 ) -> Mapping[int, list[Mapping[str, Any]]]:
     """The bodies of the entries about submissions of copies, the first one first.

@@ -25,7 +25,7 @@ def doctor(
 ) -> None:
     """Look whether home and database are whole: what the log tells of, and what was computed; 1 if not."""
     from app.db.locks import server_lock
-    from app.features.groups.replay import rebuild as rebuild_tables
+    from app.features.groups.replay import rebuild_tables
     from app.features.integrity.home import examine_everything
 
     settings = read_settings()
@@ -105,7 +105,7 @@ def transfer(
     address with a password stands in a file, or the password in ~/.pgpass.
     """
     from app.features.integrity.transfer import settings_of_both_databases
-    from app.features.integrity.transfer import transfer as run_transfer
+    from app.features.integrity.transfer import transfer_database as run_transfer
 
     settings = read_settings()
     printed: set[str] = set()

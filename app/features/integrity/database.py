@@ -14,11 +14,11 @@ from app.features.datasets.service import list_datasets
 from app.features.groups.codecs import paint_to_json
 from app.features.groups.digest import group_inputs_hash, station_digest, view_digest
 from app.features.groups.projection_queries import all_groups, all_stations
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import StateSnapshot, read_state_snapshot
 from app.features.guidelines.queries import GUIDELINE, all_guidelines
 from app.features.integrity.records import DELETED, examine_computed, examine_people
-from app.features.integrity.transfer import find_null_characters, named
+from app.features.integrity.transfer import find_null_characters, list_null_characters
 from app.features.queue.refresh_queries import differing_rows
 from app.features.solutions.service import stale_groups
 
@@ -70,7 +70,7 @@ KEPT = {
 """Parts that it leaves as they are."""
 
 
-def examine(store: Store) -> list[Check]:
+def examine_database(store: Store) -> list[Check]:
     """Look at the file, the log's hash chain, the tables and everything that was computed.
 
     Nothing is changed. The tables are compared with what follows from the log alone, unless the
@@ -81,7 +81,7 @@ def examine(store: Store) -> list[Check]:
         checks = [_check_file(session, restore)]
         entries = newest_entry(session)
         try:
-            logged = replay(session)
+            logged = replay_log(session)
         except StorageError as error:
             checks.append(Check("log", False, error.message, error.hint or restore))
         else:
@@ -111,7 +111,9 @@ def _check_texts(session: Session) -> Check:
     found = find_null_characters(session)
     if not found:
         return Check("texts", True, "SQLite and PostgreSQL can keep each")
-    sentence = f"{len(found):,} with U+0000, which PostgreSQL cannot keep: {named(found)}"
+    sentence = (
+        f"{len(found):,} with U+0000, which PostgreSQL cannot keep: {list_null_characters(found)}"
+    )
     return Check("texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there.")
 
 

@@ -21,9 +21,9 @@ from app.db.recovery.anchor import read_anchor
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError, StorageError
-from app.features.comments.check import examine_threads
-from app.features.datasets.orphan_queries import unread_uploads, unused_calibrations, unused_frames
-from app.features.integrity.database import examine
+from app.features.comments.service import examine_threads
+from app.features.datasets.queries import unread_uploads, unused_calibrations, unused_frames
+from app.features.integrity.database import examine_database
 from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import linked_admins, read_rules
 from app.features.versions.check import examine_versions
@@ -275,7 +275,7 @@ def examine_everything(settings: Settings) -> list[Check]:
     checks = [*examine_home(settings), examine_yields(settings)]
     try:
         with closing(Store.open(settings)) as store:
-            checks += [*examine_surroundings(store), *examine(store)]
+            checks += [*examine_surroundings(store), *examine_database(store)]
             return [*checks, examine_threads(store), *examine_versions(store)]
     except StorageError as error:
         return [*checks, Check("database", False, error.message, error.hint)]

@@ -11,22 +11,22 @@ from app.db.check import Check, compare_with_log, compared
 from app.db.log import LogEntry, entries_of_kinds
 from app.db.session import Session
 from app.errors import StorageError
-from app.features.datasets.queries import policy_of
+from app.features.datasets.queries import policy_from_row
 from app.features.groups.codecs import paint_to_json
 from app.features.groups.digest import group_inputs_hash
 from app.features.groups.queries import read_groups
-from app.features.people.alias_queries import given_aliases
 from app.features.people.queries import all_dataset_roles, all_people
 from app.features.people.roles import PERSON
+from app.features.people.visibility_queries import given_aliases
+from app.features.solutions.codec import SolutionSummary, summarize
 from app.features.solutions.queries import read_summary
 from app.features.solutions.stored_queries import (
-    calibrations_of,
+    calibration_keys,
     damaged_calibrations,
     damaged_readings,
     decode_row,
     solution_batches,
 )
-from app.features.solutions.summary import SolutionSummary, summarize
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
@@ -210,7 +210,7 @@ def _differing_solutions(session: Session, rows: Sequence[Any], damaged: Set[str
     groups = _groups_with_sound_rows(session, [row.group_id for row in rows if row.current])
     for row in rows:
         try:
-            known = damaged.isdisjoint(calibrations_of(row))
+            known = damaged.isdisjoint(calibration_keys(row))
             is_whole = not known or _is_as_written(session, row, groups)
         except StorageError:
             is_whole = False
@@ -241,7 +241,7 @@ def _is_as_written(session: Session, row: Any, groups: Mapping[int, Group]) -> b
     if not row.current or row.group_id not in groups:
         return True
     group = groups[row.group_id]
-    is_theirs = _fits_group(group, solution, policy_of(row.policy))
+    is_theirs = _fits_group(group, solution, policy_from_row(row.policy))
     return is_theirs and _are_equal_values(summary, summarize(group, solution))
 
 

@@ -146,7 +146,7 @@ def without_null_characters(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def named(found: Sequence[NullCharacter], most: int = 5) -> str:
+def list_null_characters(found: Sequence[NullCharacter], most: int = 5) -> str:
     """Rows and columns as a sentence lists them."""
     return ", ".join(map(str, found[:most])) + (" and others" if len(found) > most else "")
 
@@ -173,7 +173,7 @@ class Transferred:
     versions: dict[str, str]
 
 
-def transfer(
+def transfer_database(
     source: Settings,
     target: Settings,
     tell: Callable[[str, int], None] = lambda *_: None,
@@ -220,7 +220,7 @@ def transfer(
 def _null_character_error(found: Sequence[NullCharacter]) -> InputError:
     count = plural(len(found), "text holds", "texts hold")
     return InputError(
-        f"{count} U+0000, which no database takes any more: {named(found)}",
+        f"{count} U+0000, which no database takes any more: {list_null_characters(found)}",
         hint="Run touchline transfer with --replace-null: it writes U+FFFD in its place.",
     )
 

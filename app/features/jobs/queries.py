@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from sqlalchemy import case, delete, func, insert, select, update
+from sqlalchemy import Index, case, delete, false, func, insert, select, update
+from sqlalchemy.orm import Mapped, mapped_column
 
 from app.canonical import canonical
 from app.db.dialects.statements import member
 from app.db.json_columns import Json, parse
-from app.db.session import Session, now, text_of
+from app.db.session import Base, Session, now, text_of
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
-from app.features.jobs.tables import JobModel
-from app.features.people.alias_queries import columns_shown
-from app.features.people.visibility_queries import EVERYTHING, Visibility
+from app.features.people.visibility_queries import EVERYTHING, Visibility, columns_shown
 from app.finite import finite
 from app.soccer.choices import JobState
 
@@ -30,6 +29,36 @@ EXPORT = "export"
 """The kind of job whose row is the only way to its file."""
 OPEN = (WAITING, RUNNING)
 """States that are not the last one of a job."""
+
+
+class JobModel(Base):
+    """A piece of background work and how far it is.
+
+    ``tries`` counts the times that it was begun and neither ended nor was stopped in good order.
+    ``ending``: somebody wants the running one to end. ``request`` (JSON) is what it was asked for, enough to start it again where its kind can be;
+    ``result`` and ``problem`` (JSON) are what came of it. A dataset may be gone before its jobs.
+    """
+
+    __tablename__ = "job"
+    __table_args__ = (Index("job_dataset", "dataset_id", "id"), Index("job_kind", "kind", "id"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str]
+    title: Mapped[str]
+    dataset_id: Mapped[int | None]
+    state: Mapped[str]
+    done: Mapped[int]
+    total: Mapped[int | None]
+    sentence: Mapped[str]
+    request: Mapped[str | None]
+    result: Mapped[str | None]
+    problem: Mapped[str | None]
+    created: Mapped[str]
+    started: Mapped[str | None]
+    ended: Mapped[str | None]
+    actor: Mapped[str]
+    tries: Mapped[int] = mapped_column(server_default="0")
+    ending: Mapped[bool] = mapped_column(server_default=false())
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import JobDocument, JobKind, JobPage
 from app.http.cursor import parse_cursor
 from app.http.deps import Actor, AppServices, Id, SeesWhole
+from app.http.documents import as_document, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
-from app.http.respond import as_document, responds
 from app.http.route import Route
 from app.soccer.choices import JobState
 

@@ -1,13 +1,16 @@
-"""Jobs: work that outlasts a request."""
+"""Documents of jobs, and the response of routes that start one."""
 
 from __future__ import annotations
 
 from datetime import datetime
 from typing import Any, Literal
 
+from fastapi import Response
 from pydantic import Field
 
-from app.http.documents import Document, ListDocument
+from app.features.jobs.queries import Job
+from app.http.documents import Document, ListDocument, document
+from app.http.problem import Responses, responses
 from app.soccer.choices import JobState
 
 JobKind = Literal[
@@ -31,6 +34,14 @@ JobKind = Literal[
     "track",
     "link",
 ]
+
+
+ACCEPTED: Responses = {
+    202: {
+        "description": "The job that does it.",
+        "headers": {"Location": {"description": "Of the job.", "schema": {"type": "string"}}},
+    }
+}
 
 
 class JobProblem(Document):
@@ -62,3 +73,23 @@ class JobDocument(Document):
 
 class JobPage(ListDocument[JobDocument]):
     """Jobs, the newest first; ``next`` is the cursor of the next page."""
+
+
+def job_address(job: Job) -> dict[str, str]:
+    """The header that says where a job is looked at."""
+    return {"Location": f"/api/v1/jobs/{job.id}"}
+
+
+def job_answer(job: Job) -> Response:
+    """The answer of a job that was started."""
+    return document(JobDocument.model_validate(job), 202, job_address(job))
+
+
+def by_job(*statuses: int) -> dict[str, Any]:
+    """What a route says of itself that answers 202 with a job.
+
+    Args:
+        statuses: Of its refusals.
+    """
+    answers = {**responses(*statuses), **ACCEPTED}
+    return {"status_code": 202, "response_model": JobDocument, "responses": answers}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
-from app.features.maintenance.schemas import Health, NewBanner, Readiness
-from app.features.maintenance.service import Banner, clear_banner, set_banner
+from app.features.maintenance.service import LONGEST, Banner, clear_banner, set_banner
 from app.features.queue.changes import read_position
 from app.http.deps import Actor, AppStore
 from app.http.metrics import SharedNumbers
@@ -17,6 +19,43 @@ from app.http.request_limits import limit
 from app.http.route import Route
 
 maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"], route_class=Route)
+health_router = APIRouter(tags=["health"], route_class=Route)
+
+
+class NewBanner(BaseModel):
+    """A notice, and when it is shown."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"text": "Upgrade at 18:00, ten minutes.", "until": "2099-11-28T18:10:00Z"}
+            ]
+        },
+    )
+
+    text: Annotated[str, Field(min_length=1, max_length=LONGEST)] = Field(
+        description="One line, shown on every page, also before people log in."
+    )
+    starts: AwareDatetime | None = Field(
+        default=None, description="When it begins to be shown; null: at once."
+    )
+    until: AwareDatetime | None = Field(
+        default=None, description="When it is no longer shown; null: when it is deleted."
+    )
+
+
+class Health(BaseModel):
+    """The process answers."""
+
+    status: Literal["ok"]
+    version: str
+
+
+class Readiness(BaseModel):
+    """The database answers."""
+
+    status: Literal["ready"]
 
 
 @maintenance_router.put("", operation_id="setMaintenance", responses=responses(413, 415))
@@ -42,9 +81,6 @@ def delete_maintenance(store: AppStore, actor: Actor) -> Response:
     if not clear_banner(store, actor=actor):
         raise NotFoundError("there is no notice of maintenance")
     return Response(status_code=204)
-
-
-health_router = APIRouter(tags=["health"], route_class=Route)
 
 
 @health_router.get("/healthz", operation_id="getHealth", responses=responses())

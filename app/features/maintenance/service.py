@@ -6,13 +6,14 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from urllib.parse import urlsplit
 
-from app.config import Settings, is_local
+from app.config import Settings
 from app.db.session import now, text_of
 from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.audit_events import add_audit_event
 from app.features.maintenance.queries import find_banner, put_banner
 from app.finite import Moment
+from app.hosts import is_local
 
 LONGEST = 300
 """Characters of a notice."""
@@ -80,7 +81,7 @@ def clear_banner(store: Store, *, actor: str) -> bool:
         return True
 
 
-def exposure_of(settings: Settings) -> str | None:
+def exposure_warning(settings: Settings) -> str | None:
     """What makes it unsafe to serve with some settings, as a sentence; None: nothing."""
     secure = (settings.url or "").startswith("https://")
     if not is_local(settings.host) and not settings.team:

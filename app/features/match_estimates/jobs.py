@@ -33,9 +33,9 @@ from app.features.match_estimates.positions import (
     take_back_positions,
 )
 from app.features.match_estimates.rig import (
-    accept,
+    accept_rig,
     proposal_values,
-    propose,
+    propose_adjustment,
     require_adjustable,
     take_back,
 )
@@ -245,12 +245,12 @@ POSITIONS = MatchJob(
 
 
 def _adjust_rig(call: MatchCall, progress: JobProgress) -> Json:
-    """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept`` takes it (none:
+    """The proposal and what of it was saved; ``what`` is asked for as ``rig.accept_rig`` takes it (none:
     nothing), with the ``inputs`` of the proposal that a person saw: no other one is saved."""
     what, inputs = call.job.request["what"], call.job.request["inputs"]
     progress(0, None, "Adjusting cameras to lines and balls.")
     with call.jobs.pool() as executor:
-        proposed = propose(call.store, call.dataset_id, executor=executor)
+        proposed = propose_adjustment(call.store, call.dataset_id, executor=executor)
     progress.check()
     if what is not None:
         if inputs != proposed.inputs:
@@ -258,7 +258,7 @@ def _adjust_rig(call: MatchCall, progress: JobProgress) -> Json:
                 "balls, lines or cameras have changed since that proposal",
                 hint="Look at a new one, and accept that.",
             )
-        accept(call.store, proposed, what, actor=call.job.actor)
+        accept_rig(call.store, proposed, what, actor=call.job.actor)
         call.solve()
     return {**proposal_values(proposed), "accepted": what}
 

@@ -42,12 +42,12 @@ Factors = tuple[Factor, ...]
 
 def read_factors(session: Session, dataset_id: int) -> Factors:
     """The factors that are accepted for a dataset; none where all balls are alike."""
-    return factors_of(
+    return factors_from_text(
         session.scalar(select(DatasetModel.noise).where(DatasetModel.id == dataset_id))
     )
 
 
-def factors_of(text: str | None) -> Factors:
+def factors_from_text(text: str | None) -> Factors:
     """The factors that a dataset's row holds."""
     if text is None:
         return ()
@@ -67,7 +67,7 @@ def factors_to_json(factors: Factors) -> Json:
     return [list(item) for item in factors]
 
 
-def factor_of(factors: Sequence[Factor], camera: str | None, person: str | None) -> float:
+def noise_factor(factors: Sequence[Factor], camera: str | None, person: str | None) -> float:
     """How noisy a ball is beside the dataset's; a camera or person that is not named is any other."""
     known = {(item.camera, item.person): item.ratio for item in factors}
     cameras, people = {item.camera for item in factors}, {item.person for item in factors}

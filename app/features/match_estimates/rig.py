@@ -54,7 +54,7 @@ class ProposedRig:
     inputs: str
 
 
-def propose(
+def propose_adjustment(
     store: Store,
     dataset: str | int,
     lines: Path | None = None,
@@ -147,12 +147,12 @@ def require_adjustable(
     return found
 
 
-def accept(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> None:
+def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) -> None:
     """Save a proposal as an edit of each of its cameras, all at once.
 
     Args:
         store: The database.
-        proposed: What ``propose`` said.
+        proposed: What ``propose_adjustment`` said.
         what: ``CAMERAS`` for the adjusted cameras with their covariance; ``SIGMA`` to keep the
             cameras in use and save how far they may be off, so that no ball moves and its
             uncertainty becomes right.

@@ -2,39 +2,163 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from app.db.session import Session
+from app.features.groups.schemas import PictureEdit
 from app.features.jobs.queries import Job
+from app.features.jobs.schemas import by_job, job_answer
 from app.features.match_estimates.jobs import PICTURES, POSITIONS, RIG, take_rig_back
 from app.features.match_estimates.pictures import change_pictures, read_pictures
-from app.features.match_estimates.positions import get_positions
-from app.features.match_estimates.schemas import (
-    MatchPictureChange,
-    MatchPicturesDocument,
-    MatchRequest,
-    NoiseDocument,
-    RigRequest,
-    RigTakenBack,
-    SharedPositionsDocument,
-)
+from app.features.match_estimates.positions import PositionState, get_positions
+from app.features.match_estimates.queries import MatchPictures
 from app.features.policies import noise as noises
+from app.features.policies.noise import Advice
 from app.features.policies.service import read_policy
 from app.features.solve.jobs import change_and_solve
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import Document, ListDocument, document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import QUESTIONS, limit
-from app.http.respond import document, responds
 from app.http.route import Route
+from app.solving.ball_noise import Sigma
+from app.solving.line_noise import LineEstimate
 
 positions_router = APIRouter(
     prefix="/datasets/{dataset}/positions", tags=["datasets"], route_class=Route
 )
+rig_router = APIRouter(tags=["stations"], route_class=Route)
+noise_router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"], route_class=Route)
+pictures_router = APIRouter(
+    prefix="/datasets/{dataset}/pictures", tags=["datasets"], route_class=Route
+)
+
+
+class MatchPicturesDocument(ListDocument[MatchPictures]):
+    """The pictures of a dataset's matches, by name of the match."""
+
+
+class MatchRequest(BaseModel):
+    """Which matches a job is to look at."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
+
+    match: str | None = Field(
+        default=None, min_length=1, max_length=1000, description="This match alone; null: all."
+    )
+
+
+class MatchPictureChange(BaseModel):
+    """Say what was done to the pictures of a match's main camera."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"match": "a/b/c", "picture": None}]}
+    )
+
+    match: str = Field(min_length=1, max_length=1000)
+    picture: PictureEdit | None = Field(description="As proposed; null: as they were taken.")
+
+
+class SharedPositionsDocument(ListDocument[PositionState]):
+    """The shared positions of a dataset's matches, by name of the match."""
+
+    used: bool = Field(description="Whether the policy uses them: `calibration.share_position`.")
+
+
+class RigRequest(BaseModel):
+    """Adjust the static cameras of a dataset; without `accept` that is a proposal."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
+
+    accept: Literal["cameras", "sigma"] | None = Field(
+        default=None,
+        description="Save the adjusted cameras, or only how far the cameras in use may be off.",
+    )
+    inputs: Annotated[str, Field(pattern="^[0-9a-f]{32}$")] | None = Field(
+        default=None,
+        description="`inputs` of the proposal that was looked at: another one is not saved. "
+        "`accept` needs it.",
+    )
+
+    @model_validator(mode="after")
+    def _seen(self) -> RigRequest:
+        if self.accept is not None and self.inputs is None:
+            raise ValueError("to accept a proposal, give the inputs of the one that was looked at")
+        return self
+
+
+class RigTakenBack(BaseModel):
+    """An accepted rig that was undone."""
+
+    taken_back: int = Field(description="How many cameras are what they were.")
+
+
+class BallNoiseDocument(Document):
+    """Noise of annotated balls; null where no groups say anything."""
+
+    click: Sigma | None = Field(description="Of a coordinate of a ball's centre.")
+    share: float | None = Field(description="What the ball's diameter adds, as a share of it.")
+    given: Sigma | None = Field(description="What a given camera of unknown exactness adds.")
+
+
+class SourceNoiseDocument(Document):
+    """Noise of the balls of a static camera or of a person, drawn towards the dataset's."""
+
+    source: str = Field(description="Key of the station, or name of the person.")
+    sigma_px: float = Field(description="Of a coordinate of a ball, pixels at 1920 x 1080.")
+    low: float = Field(description="End of the 95 % interval.")
+    high: float
+    ratio: float = Field(description="Of that to the dataset's.")
+    numbers: float = Field(description="Independent numbers that speak of it alone.")
+    differs: bool = Field(description="The interval leaves out the dataset's sigma.")
+
+
+class AdviceDocument(Document, shows=Advice):
+    """A threshold of the policy and what the dataset says of it."""
+
+    present: float | None = Field(description="Null: the policy leaves it to each image.")
+    agrees: bool = Field(description="The interval holds the present value.")
+
+
+class FactorDocument(Document):
+    """How noisy balls of a camera that a person places are beside the dataset's."""
+
+    camera: str | None = Field(description="Key of a static camera; null: any other.")
+    person: str | None = Field(description="Who places the ball; null: anybody else.")
+    ratio: float = Field(description="Of both sigmas; one where they may be alike.")
+
+
+class NoiseDocument(Document):
+    """Estimates, and the thresholds that would make the policy agree."""
+
+    groups: int = Field(description="Groups that were looked at.")
+    solved: int = Field(description="Groups with a solution.")
+    ball: BallNoiseDocument
+    stations: list[SourceNoiseDocument] = Field(
+        description="Static cameras of which enough is seen, the noisiest first."
+    )
+    people: list[SourceNoiseDocument] = Field(
+        description="The same for the people who placed the balls last."
+    )
+    factors: list[FactorDocument] = Field(
+        description="Of cameras and people together; empty where all may be like the dataset."
+    )
+    used: list[FactorDocument] = Field(description="Those that sigma uses now.")
+    is_new: bool = Field(description="`factors` say something else than `used`.")
+    line_estimate: LineEstimate | None = Field(description="Null where no lines make a camera.")
+    follows: bool = Field(
+        description="The policy uses the estimates: each solve of the dataset sets them."
+    )
+    advice: list[AdviceDocument]
+    values: dict[str, float] = Field(
+        description="To be sent to the policy; empty where it agrees already."
+    )
+    notices: list[str] = Field(description="What a person should know.")
 
 
 @positions_router.get("", operation_id="listPositions", responses=responses(404))
@@ -76,9 +200,6 @@ def take_back_positions(
     return POSITIONS.take_back(services.jobs, services.store, dataset, match, actor=actor)
 
 
-rig_router = APIRouter(tags=["stations"], route_class=Route)
-
-
 @rig_router.post("/datasets/{dataset}/rig", operation_id="adjustRig", **by_job(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @responds(job_answer)
@@ -110,9 +231,6 @@ def _taken_back(count: int) -> Response:
 def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
     return take_rig_back(services.jobs, services.store, dataset, actor=actor)
-
-
-noise_router = APIRouter(prefix="/datasets/{dataset}/noise", tags=["policies"], route_class=Route)
 
 
 @noise_router.get(
@@ -161,11 +279,6 @@ def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -
         noises.take_noise_back(session, dataset, actor=actor)
 
     return change_and_solve(services.jobs, services.store, dataset, change, actor=actor)
-
-
-pictures_router = APIRouter(
-    prefix="/datasets/{dataset}/pictures", tags=["datasets"], route_class=Route
-)
 
 
 @pictures_router.get("", operation_id="listMatchPictures", responses=responses(404))

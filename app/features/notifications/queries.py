@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, delete, func, insert, literal, select, update
 
 from app.db.session import Session
-from app.features.comments.tables import NotificationModel
+from app.features.comments.queries import NotificationModel
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.visibility_queries import Visibility, seen_anywhere

@@ -5,21 +5,41 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.features.notifications import service as bell
-from app.features.notifications.schemas import NotificationsDocument, SeenNotifications
+from app.features.notifications.queries import Notification
 from app.features.notifications.service import NotificationState
 from app.features.people.session_routes import Me
+from app.finite import MAX_ID
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
+from app.http.documents import ListDocument, as_document, responds
 from app.http.permissions import Action, may
 from app.http.problem import responses
 from app.http.request_limits import LOOKS, limit
-from app.http.respond import as_document, responds
 from app.http.route import Route
 from app.http.team import AppTeam
 
 router = APIRouter(prefix="/notifications", tags=["comments"], route_class=Route)
+
+
+class NotificationsDocument(ListDocument[Notification]):
+    """What somebody was told in the last 90 days, of what they see now, the newest first."""
+
+    unread: int = Field(description="How much of all of it they have not seen yet.")
+
+
+class SeenNotifications(BaseModel):
+    """What somebody has seen."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"ids": [12, 15]}, {"ids": None}]}
+    )
+
+    ids: list[Annotated[int, Field(ge=1, le=MAX_ID)]] | None = Field(
+        default=None, max_length=200, description="null: everything."
+    )
 
 
 @router.get("", operation_id="getNotifications", responses=responses(401, 409))

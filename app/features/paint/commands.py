@@ -61,7 +61,7 @@ def paint(
     Pictures that were read for the lines that they have now are left alone. The policy must say
     calibration.source paint, as touchline does; `touchline solve` computes what follows.
     """
-    from app.features.datasets.service import of_match
+    from app.features.datasets.service import filter_by_match
     from app.features.paint.service import get_paint, read_paint, take_back_paint
 
     if show and undo:
@@ -82,7 +82,7 @@ def paint(
                     workers=workers,
                     progress=progress,
                 )
-    print_sentences(of_match(found.items, match), json_)
+    print_sentences(filter_by_match(found.items, match), json_)
 
 
 @commands.command()
@@ -237,7 +237,7 @@ def _propose_for_files(
     tripod: str | None,
     json_: bool,
 ) -> None:
-    from app.features.file_tools.propose import counts_of, propose_files
+    from app.features.file_tools.propose import count_proposals, propose_files
 
     wanted = None if size == "native" else parse_size(size)
     with show_progress("Proposing") as progress:
@@ -250,7 +250,7 @@ def _propose_for_files(
     for row in rows:
         if row["reason"]:
             say(f"{row['frame']}: {row['outcome']}; {row['reason']}")
-    print_values(counts_of(rows), False)
+    print_values(count_proposals(rows), False)
 
 
 @commands.command()

@@ -19,10 +19,9 @@ from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.groups.codecs import lines_from_json, lines_to_json
-from app.features.paint.tables import ProposalModel
+from app.features.paint.queries import ProposalModel
 from app.features.queue.tables import QueueModel
-from app.features.solutions.queries import is_current, undetermined
-from app.features.solutions.tables import SolutionModel
+from app.features.solutions.queries import SolutionModel, is_current, list_undetermined_calibrations
 from app.soccer.annotation import Lines
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 
@@ -147,7 +146,7 @@ def lost_views(
     if matches is not None:
         statement = statement.where(GroupModel.match.in_(matches))
     rows = session.execute(statement).all()
-    left_open = undetermined(session, {row.calibration for row in rows})
+    left_open = list_undetermined_calibrations(session, {row.calibration for row in rows})
     return set({row.station_id: row.id for row in rows if row.calibration in left_open}.values())
 
 

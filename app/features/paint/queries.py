@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast
 
-from sqlalchemy import BindParameter, Table, bindparam, func, select, true
+from sqlalchemy import BindParameter, ForeignKey, Index, Table, bindparam, func, select, text, true
+from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.statements import any_of, insert, values_of
 from app.db.json_columns import as_written, inflate, parse
 from app.db.log import LogEntry, LogModel, read_entries
-from app.db.session import Session
+from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, PaintEvidenceModel, StationModel, ViewModel
 from app.soccer.paint_evidence import PaintReading, reading_from_text
 
@@ -30,6 +31,34 @@ _READINGS = (
 )
 _WITHOUT_PICTURE = func.count(StationModel.id).filter(ViewModel.media_path.is_(None))
 _BATCH = 500
+
+
+class ProposalModel(Base):
+    """What was proposed for one view when its picture was looked at last; ``lines`` are JSON.
+
+    ``frame`` is the digest of the picture's bytes (empty: there were none), ``sought_with`` that
+    of all else that was known, ``version`` that of what read the picture. ``beside`` is the digest
+    of the station whose lines determined no camera then (empty: it had none); it is open beside those.
+    """
+
+    __tablename__ = "proposal"
+    __table_args__ = (Index("proposal_outcome", "outcome"),)
+
+    view_id: Mapped[int] = mapped_column(
+        ForeignKey("view.id", ondelete="CASCADE"), primary_key=True
+    )
+    outcome: Mapped[str]
+    sentence: Mapped[str]
+    supported: Mapped[float | None]
+    explained: Mapped[float | None]
+    points: Mapped[int]
+    error_px: Mapped[float | None]
+    runner_up: Mapped[float | None]
+    lines: Mapped[str]
+    frame: Mapped[str]
+    sought_with: Mapped[str]
+    version: Mapped[str]
+    beside: Mapped[str] = mapped_column(server_default=text("''"))
 
 
 def insert_readings(session: Session, dataset_id: int, readings: Iterable[PaintReading]) -> None:
@@ -60,12 +89,12 @@ def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintRe
     for start in range(0, len(wanted), _BATCH):
         some = wanted[start : start + _BATCH]
         for row in session.execute(_READINGS, {"digests": some}):
-            found[row.digest] = reading_of(row.digest, row.body)
+            found[row.digest] = reading_from_row(row.digest, row.body)
     return found
 
 
 @lru_cache(maxsize=64)
-def reading_of(digest: str, body: bytes) -> PaintReading:
+def reading_from_row(digest: str, body: bytes) -> PaintReading:
     with as_written():
         reading = reading_from_text(inflate(body).decode())
         if reading.digest != digest:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from anyio import to_thread
 from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.groups.schemas import points_by_marking
+from app.features.groups.schemas import LineDocuments, LineEdits, lines_document, points_by_marking
 from app.features.groups.view_paint import (
     ViewPaintRequest,
     make_paint_request,
@@ -17,34 +18,166 @@ from app.features.groups.view_paint import (
 )
 from app.features.groups.view_routes import CLIENT_GONE, with_view_in_error
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import JobDocument
-from app.features.match_estimates.schemas import MatchRequest
+from app.features.jobs.schemas import ACCEPTED, JobDocument, by_job, job_answer
+from app.features.match_estimates.routes import MatchRequest
 from app.features.paint.jobs import PAINT, PROPOSALS, stop_and_forget
+from app.features.paint.proposal_queries import MatchProposals, Proposal
 from app.features.paint.proposals import get_group_proposals, get_proposals
-from app.features.paint.schemas import (
-    DatasetPaintDocument,
-    DatasetProposalsDocument,
-    DatasetProposalsRequest,
-    ForgottenProposalsDocument,
-    GroupProposal,
-    GroupProposals,
-    PaintDocument,
-    PaintRequest,
-    ProposalDocument,
-    ProposalPlanDocument,
-)
-from app.features.paint.service import get_paint
+from app.features.paint.service import PaintState, get_paint
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
-from app.http.job_responses import ACCEPTED, by_job, job_answer
+from app.http.documents import Document, ListDocument, document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import IMAGES, LOOKS, limit
-from app.http.respond import document, responds
 from app.http.route import Route
+from app.paint.view_paint import ViewPaint
+from app.paint.view_proposal import ViewProposal
+from app.soccer.choices import ProposalOutcome
 from app.worker_pool import PoolTask
 
+Spot = Annotated[list[float], Field(min_length=2, max_length=2)]
+"""x and y."""
+Place = Annotated[list[float], Field(min_length=3, max_length=3)]
+"""x, y and the standard deviation across the marking."""
+DIGITS = 3
+"""Of a pixel: what lies below is far less than any sigma."""
 paint_router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"], route_class=Route)
+view_paint_router = APIRouter(prefix="/views", tags=["views"], route_class=Route)
+REFUSALS = (404, 409, 413, 415, 503)
+proposals_router = APIRouter(tags=["datasets"], route_class=Route)
+
+
+class DatasetPaintDocument(ListDocument[PaintState]):
+    """What was read of the paint in a dataset's pictures, by name of the match."""
+
+    used: bool = Field(description="Whether the policy uses it: `calibration.source`.")
+
+
+class PaintRequest(BaseModel):
+    """Lines that are not saved yet; without any those count that are."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {},
+                {"lines": {"Middle line": [{"x": 640.5, "y": 120.0}, {"x": 655.0, "y": 700.0}]}},
+            ]
+        },
+    )
+
+    lines: LineEdits = Field(default_factory=dict)
+
+
+class PaintDocument(Document):
+    """What the frame of a view shows of the painted lines, pixels of the annotated size."""
+
+    outcome: Literal["snapped", "kept", "nothing"] = Field(
+        description="`snapped`: the paint places the camera; `kept`: it does not, `reason` says "
+        "why; `nothing`: nothing could be read."
+    )
+    reason: Literal["no_paint", "paint_disagrees"] | None
+    sentence: str = Field(description="The reason for people; empty where it is snapped.")
+    points: dict[str, list[Place]] = Field(
+        description="By marking, in their order along it: x, y and the standard deviation across."
+    )
+    line_like: list[Spot] = Field(
+        description="Places of everything in the frame that looks like painted lines."
+    )
+    supported: float | None = Field(description="Share of the visible markings that has paint.")
+    explained: float | None = Field(description="Share of line-like paint that has a marking.")
+    error_px: float | None = Field(description="Median distance of the paint to its marking.")
+    moved_px: float | None = Field(
+        description="How far the markings moved onto the paint, or would have, in the median."
+    )
+
+    @classmethod
+    def of(cls, found: ViewPaint) -> PaintDocument:
+        """The document of what was read."""
+        points = {
+            name: [[round(value, DIGITS) for value in place] for place in places]
+            for name, places in found.evidence.points.items()
+        }
+        line_like = [[round(x, 1), round(y, 1)] for x, y in found.line_like]
+        own = {**vars(found), "points": points, "line_like": line_like}
+        del own["evidence"]
+        return cls.model_validate(own)
+
+
+class ProposalDocument(Document):
+    """Lines for a view without a camera, as its frame shows them; a prediction until saved."""
+
+    outcome: ProposalOutcome
+    sentence: str = Field(
+        description="Why no lines are proposed, or which drawn lines contradict the proposal; else empty."
+    )
+    lines: LineDocuments = Field(
+        description="Points on the paint, pixels of the annotated size; none unless proposed, and "
+        "none of markings that are drawn."
+    )
+    supported: float | None = Field(description="Share of the visible markings that has paint.")
+    explained: float | None = Field(description="Share of line-like paint that has a marking.")
+    runner_up: float | None = Field(
+        description="How much less the next best camera agrees; null where there is no other."
+    )
+    error_px: float | None = Field(description="Median distance of the paint to its marking.")
+    points: int = Field(description="How many places of paint the best camera lies on.")
+
+    @classmethod
+    def of(cls, found: ViewProposal) -> ProposalDocument:
+        """The document of a proposal."""
+        return cls.model_validate({**vars(found), "lines": lines_document(found.lines)})
+
+
+class DatasetProposalsDocument(ListDocument[MatchProposals]):
+    """What was proposed for the views of a dataset, by name of the match."""
+
+
+class DatasetProposalsRequest(MatchRequest):
+    """Look for cameras to propose."""
+
+    dry_run: StrictBool = Field(default=False, description="Count, and look at nothing.")
+
+
+class ProposalPlanDocument(Document):
+    """What a search would do."""
+
+    views: int = Field(description="Views whose pictures would be compared or looked at.")
+    looked: int = Field(
+        description="How many were looked at before: most of them are only compared."
+    )
+
+
+class ForgottenProposalsDocument(Document):
+    """What was taken back."""
+
+    forgotten: int = Field(description="How many proposals there were; accepted lines stay.")
+
+
+class GroupProposal(ProposalDocument):
+    """What was proposed for one view: a prediction until its lines are saved."""
+
+    view: int
+    key: str
+    open: bool = Field(
+        description="Whether the view still has no given camera, and no lines or those beside "
+        "which this was proposed because they determined no camera."
+    )
+    frame: str = Field(description="Digest of the picture's bytes; empty where there were none.")
+    version: str = Field(description="Of what read the picture.")
+
+    @classmethod
+    def of_view(cls, key: str, is_open: bool, found: Proposal) -> GroupProposal:
+        """The document of what was proposed for a view."""
+        shown = cls.model_fields.keys() - {"view", "key", "open"}
+        values: dict[str, Any] = {name: getattr(found, name) for name in shown}
+        values |= {"view": found.view_id, "key": key, "open": is_open}
+        return cls.model_construct(**{**values, "lines": lines_document(found.lines)})
+
+
+class GroupProposals(ListDocument[GroupProposal]):
+    """What was proposed for the views of a group, in their order."""
 
 
 @paint_router.get("", operation_id="listDatasetPaint", responses=responses(404))
@@ -79,11 +212,6 @@ def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -
     that waits or runs is cancelled, and is the one that is taken back, as far as it came.
     """
     return PAINT.take_back(services.jobs, services.store, dataset, actor=actor)
-
-
-view_paint_router = APIRouter(prefix="/views", tags=["views"], route_class=Route)
-
-REFUSALS = (404, 409, 413, 415, 503)
 
 
 @view_paint_router.post(
@@ -136,9 +264,6 @@ async def _wait_for_result(
     """What was found, or None where nobody waits for it any more."""
     with with_view_in_error(question.view.key):
         return await ask().result_unless_client_gone(request.is_disconnected)
-
-
-proposals_router = APIRouter(tags=["datasets"], route_class=Route)
 
 
 @proposals_router.get(

@@ -29,8 +29,8 @@ from app.features.people.login_queries import (
     touch_access_token,
 )
 from app.features.people.logins import LEADING, Login, TokenUse, roles_with
-from app.features.people.queries import person_by_id, rights_in
-from app.features.people.roles import Role, Scope, note
+from app.features.people.queries import person_by_id, rights_from_row
+from app.features.people.roles import Role, Scope, log_account_event
 
 PREFIX = "tl_"
 SHOWN, SECRET, CHECK = 8, 40, 6
@@ -168,7 +168,7 @@ class AccessTokens:
             row = find_access_token(session, token_hash(text), text_of(self._clock()), LEADING)
         if row is None:
             raise NotLoggedInError(INVALID, hint=ANOTHER)
-        roles = roles_with(Role(row.role), rights_in(row))
+        roles = roles_with(Role(row.role), rights_from_row(row))
         if row.dataset_id is not None:
             roles = roles.only(row.dataset_id)
         seen = datetime.fromisoformat(row.used or row.created)
@@ -254,4 +254,4 @@ def _log_token_event(
 ) -> None:
     changed = {name: values[name] for name in ("scopes", "expires", "dataset_id") if name in values}
     token = {"token": values["name"], "token_id": values["id"]}
-    note(session, actor, person.name, did, person.role, **token, **changed)
+    log_account_event(session, actor, person.name, did, person.role, **token, **changed)

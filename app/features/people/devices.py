@@ -232,7 +232,7 @@ CODE_BYTES = 10
 
 def use_code(session: Session, store: Store, person_id: int, code: str, at: datetime) -> bool:
     """Whether a code is right at a time, of an authenticator or a recovery code; it is then used."""
-    text = plain(code)
+    text = normalize_code(code)
     if len(text) == DIGITS:
         return use_totp(session, store, person_id, text, at)
     return use_recovery_code(session, person_id, token_hash(text))
@@ -243,8 +243,8 @@ def use_totp(session: Session, store: Store, person_id: int, code: str, at: date
     found = find_second_factor(session, person_id)
     if found is None:
         return False
-    totp, step = totp_of(store, person_id, found.salt), int(at.timestamp()) // SECONDS
-    given = plain(code).encode("utf-8", "replace")
+    totp, step = make_totp(store, person_id, found.salt), int(at.timestamp()) // SECONDS
+    given = normalize_code(code).encode("utf-8", "replace")
     right = [
         near
         for near in range(step - SKEW, step + SKEW + 1)
@@ -253,7 +253,7 @@ def use_totp(session: Session, store: Store, person_id: int, code: str, at: date
     return bool(right) and use_step(session, person_id, right[0])
 
 
-def totp_of(store: Store, person_id: int, salt: str) -> pyotp.TOTP:
+def make_totp(store: Store, person_id: int, salt: str) -> pyotp.TOTP:
     """The secret of a person, of what the database and of what the home alone knows."""
     text = f"{person_id} {salt}".encode()
     digest = hmac.new(
@@ -268,6 +268,6 @@ def new_code() -> str:
     return "-".join(text[at : at + 4] for at in range(0, len(text), 4))
 
 
-def plain(code: str) -> str:
+def normalize_code(code: str) -> str:
     """A code as it is compared: people copy it with spaces, and in capitals."""
     return code.strip().lower().replace("-", "").replace(" ", "")

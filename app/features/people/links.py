@@ -17,7 +17,7 @@ from pwdlib.hashers.argon2 import Argon2Hasher
 from app.db.session import Session, now, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
-from app.features.people.login_queries import delete_logins, identity_of
+from app.features.people.login_queries import delete_logins, find_person_identity
 from app.features.people.queries import (
     count_people_who_can_log_in,
     find_link,
@@ -28,7 +28,7 @@ from app.features.people.queries import (
     person_by_name,
     update_person,
 )
-from app.features.people.roles import Role, checked_name, note
+from app.features.people.roles import Role, checked_name, log_account_event
 
 BYTES = 32
 
@@ -188,14 +188,14 @@ def use_link(store: Store, token: str, password: str, name: str | None = None) -
     # Some tenths of a second: not while the database waits.
     hashed = hash_password(password, chosen)
     with store.write() as session:
-        person_id = take(session, token, chosen, password=hashed)
+        person_id = consume_link(session, token, chosen, password=hashed)
         person = person_by_id(session, person_id)
         assert person is not None
-        note(session, person.name, person.name, "password", person.role)
+        log_account_event(session, person.name, person.name, "password", person.role)
         return str(person.name)
 
 
-def take(session: Session, token: str, name: str | None, *, password: str | None) -> int:
+def consume_link(session: Session, token: str, name: str | None, *, password: str | None) -> int:
     """Whose a link is, which is then no longer valid; their sessions end, and they have that password.
 
     Raises:
@@ -230,11 +230,11 @@ def _find_holder(session: Session, token: str) -> tuple[int | None, LinkHolder]:
 
 def has_joined(session: Session, person: Any) -> bool:
     """Whether somebody has a way in: a password, or an account at the provider of single sign-on."""
-    return person.password is not None or identity_of(session, person.id) is not None
+    return person.password is not None or find_person_identity(session, person.id) is not None
 
 
 def _insert_first_admin(session: Session, name: str) -> int:
     if person_by_name(session, name) is not None:
         raise ConflictError(f"there is a {name} already", hint="Choose another name.")
-    note(session, name, name, "first admin", Role.ADMIN)
+    log_account_event(session, name, name, "first admin", Role.ADMIN)
     return insert_person(session, name, Role.ADMIN, by=name)

@@ -10,7 +10,7 @@ from sqlalchemy import Select, bindparam, delete, func, insert, select, update
 
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel
-from app.features.people.queries import MUST_ENROL, with_rights
+from app.features.people.queries import MUST_ENROL, select_with_rights
 from app.features.people.tables import (
     AccessTokenModel,
     IdentityModel,
@@ -41,7 +41,7 @@ def insert_login(session: Session, values: dict[str, Any]) -> None:
 def find_login(
     session: Session, token_hash: str, *, at: str, idle_since: str, leading: Collection[str]
 ) -> Any | None:
-    """The session under a hash with its person, their rights (``rights_in``) and whether they
+    """The session under a hash with its person, their rights (``rights_from_row``) and whether they
     ``must_enrol``, unless it has ended or the person is disabled.
 
     Args:
@@ -58,7 +58,7 @@ def find_login(
 @cache
 def _login_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
     """Made once: it takes longer to put together than to answer."""
-    return with_rights(_FOUND, leading).where(
+    return select_with_rights(_FOUND, leading).where(
         LoginModel.token_hash == bindparam("token_hash"),
         LoginModel.expires > bindparam("at"),
         LoginModel.seen > bindparam("idle_since"),
@@ -66,7 +66,7 @@ def _login_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
     )
 
 
-def logins_of(
+def list_sessions(
     session: Session, person_id: int, *, at: str, idle_since: str
 ) -> Sequence[LoginModel]:
     """The sessions of a person that have not ended, the one that was used last first."""
@@ -120,7 +120,7 @@ def find_passkey(session: Session, credential: str) -> PasskeyModel | None:
     return session.row(PasskeyModel, _ALL.where(PasskeyModel.credential == credential))
 
 
-def passkeys_of(session: Session, person_id: int) -> Sequence[PasskeyModel]:
+def list_passkeys(session: Session, person_id: int) -> Sequence[PasskeyModel]:
     """The passkeys of a person, the oldest first."""
     mine = _ALL.where(PasskeyModel.person_id == person_id)
     return session.rows(PasskeyModel, mine.order_by(PasskeyModel.id))
@@ -155,7 +155,7 @@ def find_identity(session: Session, issuer: str, subject: str) -> IdentityModel 
     return session.row(IdentityModel, _ALL_IDENTITIES.where(*same))
 
 
-def identity_of(session: Session, person_id: int) -> IdentityModel | None:
+def find_person_identity(session: Session, person_id: int) -> IdentityModel | None:
     """The account of a person."""
     return session.row(IdentityModel, _ALL_IDENTITIES.where(IdentityModel.person_id == person_id))
 
@@ -213,7 +213,7 @@ def insert_access_token(session: Session, values: dict[str, Any]) -> int:
 def find_access_token(
     session: Session, token_hash: str, at: str, leading: Collection[str]
 ) -> Any | None:
-    """The token under a hash with its person and their rights (``rights_in``), unless it has expired
+    """The token under a hash with its person and their rights (``rights_from_row``), unless it has expired
     or the person is disabled; ``leading`` are the roles that lead a dataset."""
     given = {"token_hash": token_hash, "at": at}
     return session.execute(_access_token_statement(tuple(leading)), given).one_or_none()
@@ -221,7 +221,7 @@ def find_access_token(
 
 @cache
 def _access_token_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]]:
-    return with_rights(_ALL_TOKENS, leading).where(
+    return select_with_rights(_ALL_TOKENS, leading).where(
         AccessTokenModel.token_hash == bindparam("token_hash"),
         AccessTokenModel.expires > bindparam("at"),
         PersonModel.disabled.is_(False),

@@ -29,7 +29,7 @@ from app.features.people.schemas import (
     TeamSettings,
 )
 from app.features.people.second_factor import Enrolment, FactorState
-from app.features.people.session_routes import Me, session_of
+from app.features.people.session_routes import Me, session_document
 from app.http.cursor import paged
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, OwnedKind, may, open_to_all
@@ -108,7 +108,7 @@ def remove_passkey(
 def begin_login(request: Request, response: Response, team: AppTeam) -> RequestOptions:
     """What a browser needs to log in with a passkey; it is for this browser, which gets a cookie."""
     team.require_passwords()
-    team.tries.count_challenge(team.address(request))
+    team.attempts.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
     options = team.passkeys.ask(asker, team.site(request))
     response.set_cookie(**team.asker_values(asker))
@@ -141,7 +141,7 @@ def log_in(
         log.warning("a login with a passkey was refused", address=address)
         raise
     response.set_cookie(**team.cookie_values(token))
-    return session_of(team.logins.find(token), store)
+    return session_document(team.logins.find(token), store)
 
 
 second_factors_router = APIRouter(tags=["sessions"], route_class=SecretRoute)
@@ -176,7 +176,7 @@ def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me:
 @may(Action.ACCOUNT, to_enrol=True)
 def confirm(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     """Ask for a code from now on; every other session ends. The recovery codes are shown this once."""
-    team.tries.count_code(me.name)
+    team.attempts.count_code(me.name)
     return RecoveryCodes(codes=team.factors.confirm(me, body.code))
 
 

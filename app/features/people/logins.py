@@ -18,24 +18,31 @@ from app.features.people.login_queries import (
     delete_logins,
     find_login,
     insert_login,
-    logins_of,
+    list_sessions,
     touch_login,
 )
 from app.features.people.queries import (
     Rights,
+    find_rights,
     forget_links,
     has_second_factor,
     person_by_id,
     person_by_name,
-    rights_in,
-    rights_of,
+    rights_from_row,
     update_person,
 )
-from app.features.people.roles import Action, DatasetRoles, Role, Scope, lets, note
+from app.features.people.roles import (
+    Action,
+    DatasetRoles,
+    Role,
+    Scope,
+    log_account_event,
+    role_allows,
+)
 from app.features.people.visibility_queries import RestrictedReader, Visibility
 from app.soccer.actors import with_token
 
-LEADING = tuple(role for role in Role if lets(role, Action.LEAD))
+LEADING = tuple(role for role in Role if role_allows(role, Action.LEAD))
 """Roles that lead a dataset."""
 IDLE = timedelta(hours=12)
 """A session that nobody has used for so long has ended."""
@@ -121,7 +128,9 @@ class Login:
         if self.roles.is_admin:
             return None
         return RestrictedReader(
-            self.name, self.roles.blind, lambda one: lets(self.roles.role_in(one), Action.REVIEW)
+            self.name,
+            self.roles.blind,
+            lambda one: role_allows(self.roles.role_in(one), Action.REVIEW),
         )
 
 
@@ -251,11 +260,15 @@ class Logins:
                 )
             ):
                 delete_login(session, old.id, old.person_id)
-            for unassigned in logins_of(session, person_id, **self._expiry_limits(at))[MOST - 1 :]:
+            for unassigned in list_sessions(session, person_id, **self._expiry_limits(at))[
+                MOST - 1 :
+            ]:
                 delete_login(session, unassigned.id, person_id)
             insert_login(session, values)
             details = {"address": address[:60], "way": way.value}
-            note(session, person.name, person.name, "logged in", person.role, **details)
+            log_account_event(
+                session, person.name, person.name, "logged in", person.role, **details
+            )
         return token
 
     def find(self, token: str, *, at_once: bool = False) -> Login | None:
@@ -269,7 +282,7 @@ class Logins:
             row = find_login(session, token_hash(token), leading=LEADING, **alive)
         if row is None or self._only not in (None, row.way):
             return None
-        roles = roles_with(Role(row.role), rights_in(row))
+        roles = roles_with(Role(row.role), rights_from_row(row))
         seen, created = datetime.fromisoformat(row.seen), datetime.fromisoformat(row.created)
         enrol = row.must_enrol and not row.vouched
         way = LoginMethod(row.way)
@@ -289,7 +302,7 @@ class Logins:
     def sessions(self, login: Login) -> list[OpenSession]:
         """Every session of a person, the one that was used last first."""
         with self._store.read() as session:
-            rows = logins_of(session, login.person_id, **self._expiry_limits(self._clock()))
+            rows = list_sessions(session, login.person_id, **self._expiry_limits(self._clock()))
         return [
             OpenSession(row.id, row.browser, row.address, row.created, row.seen, row.expires)
             for row in rows
@@ -305,13 +318,13 @@ class Logins:
             if not delete_login(session, session_id, login.person_id):
                 raise NotFoundError(f"you have no session {session_id}")
             did = "logged out" if session_id == login.id else "session ended"
-            note(session, login.actor, login.name, did, login.role)
+            log_account_event(session, login.actor, login.name, did, login.role)
 
     def end_others(self, login: Login) -> None:
         """End every session of a person but the one that asks."""
         with self._store.write() as session:
             delete_logins(session, login.person_id, but=login.id)
-            note(session, login.actor, login.name, "other sessions ended", login.role)
+            log_account_event(session, login.actor, login.name, "other sessions ended", login.role)
 
     def change_password(self, login: Login, old: str, new: str) -> str:
         """Give oneself another password; every session ends, and a new one begins.
@@ -328,14 +341,14 @@ class Logins:
             raise InputError("this is not your present password", pointer="/old")
         hashed = hash_password(new, login.name, pointer="/new")
         with self._store.write() as session:
-            found = logins_of(session, login.person_id, **self._expiry_limits(self._clock()))
+            found = list_sessions(session, login.person_id, **self._expiry_limits(self._clock()))
             mine = next((row for row in found if row.id == login.id), None)
             if mine is None:
                 raise NotLoggedInError("your session has ended")
             update_person(session, login.person_id, password=hashed)
             delete_logins(session, login.person_id)
             forget_links(session, login.person_id)
-            note(session, login.name, login.name, "password", login.role)
+            log_account_event(session, login.name, login.name, "password", login.role)
         way, vouched = LoginMethod(mine.way), mine.vouched
         return self.begin(
             login.person_id, hashed, mine.browser, mine.address, None, way=way, vouched=vouched
@@ -349,7 +362,7 @@ def read_roles(session: Session, person_id: int, everywhere: Role) -> DatasetRol
     """The rights of a person, who is that everywhere."""
     if everywhere is Role.ADMIN:
         return DatasetRoles(everywhere)
-    return roles_with(everywhere, rights_of(session, person_id, LEADING))
+    return roles_with(everywhere, find_rights(session, person_id, LEADING))
 
 
 def roles_with(everywhere: Role, rights: Rights) -> DatasetRoles:
@@ -374,7 +387,7 @@ def _blind_batches_by_dataset(roles: DatasetRoles, rights: Rights) -> dict[int, 
     found: dict[int, frozenset[int]] = {}
     for batch, dataset, waits in rights.blind:
         role = roles.role_in(dataset)
-        if lets(role, Action.LEAD) or (lets(role, Action.REVIEW) and not waits):
+        if role_allows(role, Action.LEAD) or (role_allows(role, Action.REVIEW) and not waits):
             continue
         found[dataset] = found.get(dataset, frozenset()) | {batch}
     return found

@@ -9,12 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError
-from app.features.datasets.queries import dataset_of, find_dataset, owner_of_job, versions_like
+from app.features.datasets.queries import (
+    find_dataset,
+    owner_of_job,
+    owning_dataset_id,
+    versions_like,
+)
 from app.features.imports.upload_queries import get_upload
 from app.features.people.roles import DatasetRoles, Role
 from app.features.people.visibility_queries import RestrictedReader, Visibility, is_hidden_group
@@ -126,7 +131,7 @@ def find_ownership(store: Store, named: Named, visibility: Visibility) -> Owners
             return find(session, named.by, visibility)
         if not isinstance(named.by, int):
             return None
-        dataset = dataset_of(session, named.kind.value, named.by)
+        dataset = owning_dataset_id(session, named.kind.value, named.by)
     return None if dataset is None else Ownership(dataset)
 
 
@@ -156,7 +161,19 @@ def _ownership_of_version(
     return Ownership(seen[0].dataset_id) if seen and len(seen) == len(every) else None
 
 
-def find_versions(rows: Sequence[Any], text: str) -> list[Any]:
+class _NamedVersion(Protocol):
+    @property
+    def id(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def hash(self) -> str: ...
+
+
+V = TypeVar("V", bound=_NamedVersion)
+
+
+def find_versions(rows: Sequence[V], text: str) -> list[V]:
     """The versions that a text names: by id, else by name, else by the first digits of the hash."""
     fitting = [row for row in rows if text == str(row.id)]
     fitting = fitting or [row for row in rows if text == row.name]

@@ -36,12 +36,12 @@ from app.features.people.login_queries import (
     delete_passkey,
     find_passkey,
     insert_passkey,
-    passkeys_of,
+    list_passkeys,
     use_passkey,
 )
 from app.features.people.logins import Login, LoginMethod, Logins
 from app.features.people.queries import count_recovery_codes, person_by_id, put_recovery_codes
-from app.features.people.roles import note
+from app.features.people.roles import log_account_event
 from app.features.people.second_factor import (
     ISSUER,
     code_hashes,
@@ -111,7 +111,7 @@ class Passkeys:
     def of(self, person_id: int) -> list[Passkey]:
         """The passkeys of a person, the oldest first."""
         with self._store.read() as session:
-            rows = passkeys_of(session, person_id)
+            rows = list_passkeys(session, person_id)
         return [Passkey(row.id, row.name, row.created, row.used) for row in rows]
 
     def begin(self, login: Login, password: str | None, site: PasskeySite) -> dict[str, Any]:
@@ -123,7 +123,7 @@ class Passkeys:
         """
         require_password(self._store, login, password, self._clock())
         with self._store.read() as session:
-            rows = passkeys_of(session, login.person_id)
+            rows = list_passkeys(session, login.person_id)
         _require_few_passkeys(rows)
         options = generate_registration_options(
             rp_id=site.name,
@@ -165,7 +165,7 @@ class Passkeys:
             "created": at,
         }
         with self._store.write() as session:
-            rows = passkeys_of(session, login.person_id)
+            rows = list_passkeys(session, login.person_id)
             _require_few_passkeys(rows)
             if name in {row.name for row in rows}:
                 raise ConflictError(f"you have a passkey {name} already", hint="Name it otherwise.")
@@ -176,7 +176,7 @@ class Passkeys:
             if codes:
                 put_recovery_codes(session, login.person_id, code_hashes(codes))
             delete_logins(session, login.person_id, but=login.id)
-            note(session, login.name, login.name, "passkey", login.role, passkey=name)
+            log_account_event(session, login.name, login.name, "passkey", login.role, passkey=name)
         return Passkey(number, name, at, None), codes
 
     def remove(self, login: Login, passkey_id: int, password: str | None) -> None:
@@ -193,7 +193,9 @@ class Passkeys:
             if name is None:
                 raise NotFoundError(f"you have no passkey {passkey_id}")
             end_factor(session, login)
-            note(session, login.name, login.name, "no passkey", login.role, passkey=name)
+            log_account_event(
+                session, login.name, login.name, "no passkey", login.role, passkey=name
+            )
 
     def ask(self, asker: str, site: PasskeySite) -> dict[str, Any]:
         """What a browser needs to log in with a passkey (PublicKeyCredentialRequestOptionsJSON).

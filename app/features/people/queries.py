@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import (
     ColumnElement,
@@ -149,7 +149,7 @@ class Rights:
     blind: tuple[tuple[int, int, bool], ...] = ()
 
 
-def with_rights(
+def select_with_rights(
     statement: Select[*tuple[Any, ...]], leading: Collection[str]
 ) -> Select[*tuple[Any, ...]]:
     """A statement about people whose rows tell their rights, too.
@@ -165,17 +165,19 @@ def with_rights(
     )
 
 
-def rights_in(row: Any) -> Rights:
+def rights_from_row(row: Any) -> Rights:
     """The rights that a row of such a statement tells."""
     blind = ((batch, dataset, bool(waits)) for batch, dataset, waits in json.loads(row.blind))
     return Rights(dict(json.loads(row.single)), dict(json.loads(row.copies)), tuple(blind))
 
 
-def rights_of(session: Session, person_id: int, leading: Collection[str]) -> Rights:
+def find_rights(session: Session, person_id: int, leading: Collection[str]) -> Rights:
     """The rights of one person; none where there is nobody of that id."""
-    statement = with_rights(select(PersonModel.id).where(PersonModel.id == person_id), leading)
+    statement = select_with_rights(
+        select(PersonModel.id).where(PersonModel.id == person_id), leading
+    )
     row = session.execute(statement).one_or_none()
-    return Rights({}, {}) if row is None else rights_in(row)
+    return Rights({}, {}) if row is None else rights_from_row(row)
 
 
 def _roles_column() -> ColumnElement[Any]:
@@ -241,8 +243,17 @@ def _scalar_subquery(statement: Select[Any]) -> ColumnElement[Any]:
     return statement.correlate(PersonModel).scalar_subquery()
 
 
-def all_dataset_roles(session: Session) -> Sequence[Any]:
-    """``person_id``, ``dataset_id``, ``dataset`` (its name) and ``role`` of everybody, by name."""
+class DatasetRoleRow(NamedTuple):
+    """A role of a person in one dataset, ``dataset`` by name."""
+
+    person_id: int
+    dataset_id: int
+    dataset: str
+    role: str
+
+
+def all_dataset_roles(session: Session) -> Sequence[DatasetRoleRow]:
+    """The roles that people have in single datasets, by name of the dataset."""
     statement = (
         select(
             DatasetRoleModel.person_id,
@@ -253,12 +264,22 @@ def all_dataset_roles(session: Session) -> Sequence[Any]:
         .join(DatasetModel, DatasetModel.id == DatasetRoleModel.dataset_id)
         .order_by(DatasetModel.name)
     )
-    return session.execute(statement).all()
+    return session.rows(DatasetRoleRow, statement)
 
 
-def members(session: Session, dataset_id: int, person_id: int | None = None) -> Sequence[Any]:
-    """``id``, ``name``, ``everywhere``, ``role`` (here, or None) of one person, or of all who are
-    not disabled."""
+class MemberRow(NamedTuple):
+    """A person with the role that they have ``everywhere``, and in one dataset."""
+
+    id: int
+    name: str
+    everywhere: str
+    role: str | None
+
+
+def read_members(
+    session: Session, dataset_id: int, person_id: int | None = None
+) -> Sequence[MemberRow]:
+    """One person, or all who are not disabled, with their roles in a dataset."""
     one = PersonModel.disabled.is_(False) if person_id is None else PersonModel.id == person_id
     here = (DatasetRoleModel.person_id == PersonModel.id) & (
         DatasetRoleModel.dataset_id == dataset_id
@@ -274,7 +295,7 @@ def members(session: Session, dataset_id: int, person_id: int | None = None) -> 
         .where(one)
         .order_by(PersonModel.name)
     )
-    return session.execute(statement).all()
+    return session.rows(MemberRow, statement)
 
 
 def set_dataset_role(

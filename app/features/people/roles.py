@@ -90,14 +90,14 @@ LEAST: Mapping[Action, Role] = {
 """The first role that may."""
 
 
-def lets(role: Role, action: Action) -> bool:
+def role_allows(role: Role, action: Action) -> bool:
     """Whether a role lets somebody do that."""
     return _RANKS.index(role) >= _RANKS.index(LEAST[action])
 
 
-def require(role: Role, action: Action, where: str = "") -> None:
+def require_permission(role: Role, action: Action, where: str = "") -> None:
     """Raise ForbiddenError unless a role lets somebody do that; ``where`` it counts, in words."""
-    if not lets(role, action):
+    if not role_allows(role, action):
         raise ForbiddenError(
             f"this action needs the role {LEAST[action]}{where}; yours is {role}",
             hint="An admin of this server can change your role, a lead that in their dataset.",
@@ -165,8 +165,10 @@ class DatasetRoles:
         """The datasets of which they are a lead, and nothing that is of none."""
         if self.is_admin:
             return EVERYTHING
-        all_but = lets(self.everywhere, Action.LEAD)
-        named = {key for key, role in self.single.items() if lets(role, Action.LEAD) != all_but}
+        all_but = role_allows(self.everywhere, Action.LEAD)
+        named = {
+            key for key, role in self.single.items() if role_allows(role, Action.LEAD) != all_but
+        }
         return Visibility(all_but, frozenset(named), "")
 
     def visibility(self, name: str) -> Visibility:
@@ -222,7 +224,7 @@ def require_no_token(actor: str) -> None:
         )
 
 
-def note(
+def log_account_event(
     session: Session, actor: str, name: str, did: str, role: str, **more: str | int | None
 ) -> None:
     """Write what became of an account into the log."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 
 from app.db.store import Store
-from app.features.audit.audit_events import adopt, adopted_by
-from app.features.people import members
+from app.features.audit.audit_events import assign_local_work, find_owner_of_local_work
 from app.features.people import service as people
 from app.features.people.invitations import (
     Invitation,
@@ -61,7 +60,9 @@ def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
 
 def _list_users(store: Store, team: Team) -> UserList:
     by_mail = team.mail is not None and team.url is not None
-    return UserList(items=people.list_people(store), adopted_by=adopted_by(store), mail=by_mail)
+    return UserList(
+        items=people.list_people(store), adopted_by=find_owner_of_local_work(store), mail=by_mail
+    )
 
 
 @users_router.post(
@@ -174,7 +175,7 @@ def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
 
     The log is not changed: its entries keep their name, and this becomes an entry of its own.
     """
-    adopt(store, user, actor=me.actor)
+    assign_local_work(store, user, actor=me.actor)
     return _list_users(store, team)
 
 
@@ -209,7 +210,7 @@ members_router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"],
 @paged()
 def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> MemberList:
     """Everybody who can log in, and what they are in the dataset."""
-    return MemberList(items=members.list_members(store, dataset))
+    return MemberList(items=people.list_members(store, dataset))
 
 
 @members_router.put(
@@ -221,9 +222,9 @@ def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def set_role(
     dataset: DatasetPath, user: Id, change: MemberEdit, store: AppStore, _team: AppTeam, me: Me
-) -> members.Member:
+) -> people.Member:
     """Give somebody a role in this dataset alone, up to lead; null takes it back.
 
     Nobody changes their own rights, and nobody those of an admin.
     """
-    return members.give_role(store, dataset, user, change.role, actor=me.actor)
+    return people.give_role(store, dataset, user, change.role, actor=me.actor)

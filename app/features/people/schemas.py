@@ -11,9 +11,8 @@ from pydantic.config import JsonDict
 from app.features.maintenance.service import Banner
 from app.features.people.invitations import MOST, Invitation
 from app.features.people.logins import LoginMethod
-from app.features.people.members import SingleRole
 from app.features.people.roles import Action, Role
-from app.features.people.service import Person
+from app.features.people.service import Person, SingleRole
 from app.http.documents import Document, ListDocument
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]

@@ -15,7 +15,7 @@ import segno
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
-from app.features.people.devices import new_code, plain, totp_of, use_totp
+from app.features.people.devices import make_totp, new_code, normalize_code, use_totp
 from app.features.people.links import is_password, token_hash
 from app.features.people.login_queries import delete_logins, delete_passkeys
 from app.features.people.logins import Login, LoginMethod
@@ -31,7 +31,7 @@ from app.features.people.queries import (
     put_second_factor,
     set_required,
 )
-from app.features.people.roles import note, require_no_token
+from app.features.people.roles import log_account_event, require_no_token
 
 ISSUER = "Touchline"
 CODES = 10
@@ -109,7 +109,7 @@ class SecondFactors:
                     "you have an authenticator already", hint="Remove it first, then add a new one."
                 )
             put_second_factor(session, login.person_id, salt, now())
-        totp = totp_of(self._store, login.person_id, salt)
+        totp = make_totp(self._store, login.person_id, salt)
         uri = totp.provisioning_uri(name=login.name, issuer_name=ISSUER)
         return Enrolment(totp.secret, uri, segno.make(uri, error="m").png_data_uri(scale=5))
 
@@ -136,7 +136,7 @@ class SecondFactors:
                 )
             confirm_second_factor(session, login.person_id, code_hashes(codes))
             delete_logins(session, login.person_id, but=login.id)
-            note(session, login.name, login.name, "second factor", login.role)
+            log_account_event(session, login.name, login.name, "second factor", login.role)
         return codes
 
     def remove(self, login: Login, password: str | None) -> None:
@@ -150,7 +150,7 @@ class SecondFactors:
         with self._store.write() as session:
             if delete_second_factor(session, login.person_id):
                 end_factor(session, login)
-                note(session, login.name, login.name, "no second factor", login.role)
+                log_account_event(session, login.name, login.name, "no second factor", login.role)
 
     def clear(self, person_id: int, *, actor: str) -> None:
         """Forget the authenticator, passkeys and recovery codes of somebody who has lost them.
@@ -171,7 +171,7 @@ class SecondFactors:
             had = delete_second_factor(session, person_id)
             if delete_passkeys(session, person_id) or had:
                 delete_recovery_codes(session, person_id)
-                note(session, actor, person.name, "no second factor", person.role)
+                log_account_event(session, actor, person.name, "no second factor", person.role)
 
     def required(self) -> bool:
         """Whether everybody needs one."""
@@ -189,7 +189,7 @@ class SecondFactors:
             if is_required(session) != on:
                 set_required(session, on)
                 word = "required" if on else "not required"
-                note(session, actor, "everybody", f"second factor {word}", "")
+                log_account_event(session, actor, "everybody", f"second factor {word}", "")
 
 
 def new_codes() -> list[str]:
@@ -199,7 +199,7 @@ def new_codes() -> list[str]:
 
 def code_hashes(codes: list[str]) -> list[str]:
     """What is kept of recovery codes."""
-    return [token_hash(plain(one)) for one in codes]
+    return [token_hash(normalize_code(one)) for one in codes]
 
 
 def end_factor(session: Session, login: Login) -> None:

@@ -1,4 +1,4 @@
-"""People: who has an account here, invited by an admin, never deleted, at most disabled."""
+"""People: accounts, made by invitation and at most disabled, and roles in single datasets."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Any
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
+from app.features.datasets.queries import dataset_names, find_dataset
+from app.features.independent_annotations.queries import copy_dataset_ids
 from app.features.people.links import Link, insert_new
 from app.features.people.login_queries import (
     count_access_tokens,
@@ -17,8 +19,9 @@ from app.features.people.login_queries import (
     delete_logins,
     people_with_identity,
 )
-from app.features.people.members import SingleRole, single_roles
+from app.features.people.logins import read_roles
 from app.features.people.queries import (
+    all_dataset_roles,
     all_people,
     count_people,
     count_people_who_can_log_in,
@@ -28,9 +31,18 @@ from app.features.people.queries import (
     people_with_second_factor,
     person_by_id,
     person_by_name,
+    read_members,
+    set_dataset_role,
     update_person,
 )
-from app.features.people.roles import Role, checked_name, note, require_no_token
+from app.features.people.roles import (
+    DatasetRoles,
+    Role,
+    checked_name,
+    log_account_event,
+    require_no_token,
+)
+from app.features.people.visibility_queries import COPIES
 from app.finite import Moment
 from app.soccer.actors import person_of
 
@@ -128,7 +140,7 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
 def insert_invited(session: Session, name: str, role: Role, *, actor: str) -> tuple[int, Link]:
     """Make the account of a checked name that nobody has, in the caller's transaction; id and link."""
     person = insert_person(session, name, role, by=actor)
-    note(session, actor, name, "invited", role)
+    log_account_event(session, actor, name, "invited", role)
     return person, insert_new(session, person, by=actor, at=datetime.now(UTC))
 
 
@@ -152,7 +164,7 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
             )
         if person.disabled:
             raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")
-        note(session, actor, person.name, "link", person.role)
+        log_account_event(session, actor, person.name, "link", person.role)
         link = insert_new(session, person_id, by=actor, at=datetime.now(UTC))
         return _read_person(session, person_id), link
 
@@ -189,9 +201,9 @@ def change_person(
                 f"{person.name} is the last admin who can log in", hint="Make another one first."
             )
         if wanted is not person.role:
-            note(session, actor, person.name, "role", wanted)
+            log_account_event(session, actor, person.name, "role", wanted)
         if off is not person.disabled:
-            note(session, actor, person.name, "disabled" if off else "enabled", wanted)
+            log_account_event(session, actor, person.name, "disabled" if off else "enabled", wanted)
         update_person(session, person_id, role=wanted, disabled=off)
         if off:
             delete_logins(session, person_id)
@@ -244,3 +256,126 @@ def _person_from_row(
         tokens.get(row.id, 0),
         ways.get(row.id),
     )
+
+
+@dataclass(frozen=True)
+class Member:
+    """Somebody and a dataset.
+
+    Attributes:
+        id: Of the person.
+        everywhere: What they are in every dataset in which they are nothing else.
+        single: What they are in this one; None: what they are everywhere.
+    """
+
+    id: int
+    name: str
+    everywhere: Role
+    single: Role | None
+
+    @property
+    def role(self) -> Role:
+        """What they are here."""
+        if self.everywhere is Role.ADMIN or self.single is None:
+            return self.everywhere
+        return self.single
+
+
+@dataclass(frozen=True)
+class SingleRole:
+    """What a person is in one dataset.
+
+    Attributes:
+        id: Of the dataset.
+        dataset: Its name.
+    """
+
+    id: int
+    dataset: str
+    role: Role
+
+
+def list_members(store: Store, dataset: str | int) -> list[Member]:
+    """Everybody who is not disabled, and what they are in a dataset.
+
+    Raises:
+        NotFoundError: There is no such dataset.
+    """
+    with store.read() as session:
+        return _read_members(session, _require_dataset(session, dataset))
+
+
+def single_roles(session: Session) -> dict[int, list[SingleRole]]:
+    """The roles in single datasets of everybody, by the id of the person; none of their practice."""
+    found: dict[int, list[SingleRole]] = {}
+    for row in all_dataset_roles(session):
+        if row.dataset_id > COPIES:
+            continue
+        one = SingleRole(row.dataset_id, row.dataset, Role(row.role))
+        found.setdefault(row.person_id, []).append(one)
+    return found
+
+
+def read_single_roles(store: Store, roles: DatasetRoles) -> list[SingleRole]:
+    """The roles of one person in the single datasets that they see, by name of the dataset."""
+    if not roles.single:
+        return []
+    with store.read() as session:
+        names, copies = dataset_names(session), copy_dataset_ids(session)
+    seen = {
+        key: role
+        for key, role in roles.single.items()
+        if role is not Role.NONE and key not in copies
+    }
+    found = [SingleRole(key, names[key], role) for key, role in seen.items() if key in names]
+    return sorted(found, key=lambda one: one.dataset)
+
+
+def give_role(
+    store: Store, dataset: str | int, person_id: int, role: Role | None, *, actor: str
+) -> Member:
+    """Give somebody a role in one dataset; None: what they are everywhere counts there again.
+
+    Raises:
+        NotFoundError: There is no such dataset, or nobody of that id.
+        ForbiddenError: It is oneself.
+        InputError: The role is of the whole server.
+        ConflictError: They are an admin, who may do everything in every dataset.
+    """
+    if role is Role.ADMIN:
+        raise InputError(
+            "the role admin applies to the whole server, not to a dataset", pointer="/role"
+        )
+    with store.write() as session:
+        dataset_id = _require_dataset(session, dataset)
+        person = person_by_id(session, person_id)
+        if person is None:
+            raise NotFoundError.person(person_id)
+        if person.name == person_of(actor):
+            raise ForbiddenError(
+                "you cannot change your own role", hint="An admin, or another lead, can."
+            )
+        if person.role == Role.ADMIN:
+            raise ConflictError(f"{person.name} is an admin and may do everything in every dataset")
+        before = read_roles(session, person_id, Role(person.role)).single.get(dataset_id)
+        if before is not role:
+            set_dataset_role(session, person_id, dataset_id, role, by=actor)
+            did = "role taken" if role is None else "role in dataset"
+            log_account_event(
+                session, actor, person.name, did, role or person.role, dataset_id=dataset_id
+            )
+        return next(one for one in _read_members(session, dataset_id, person_id))
+
+
+def _require_dataset(session: Session, dataset: str | int) -> int:
+    row = find_dataset(session, dataset)
+    if row is None:
+        raise NotFoundError.dataset(dataset)
+    return int(row.id)
+
+
+def _read_members(session: Session, dataset_id: int, person_id: int | None = None) -> list[Member]:
+    return [
+        Member(row.id, row.name, Role(row.everywhere), None if row.role is None else Role(row.role))
+        for row in read_members(session, dataset_id, person_id)
+    ]

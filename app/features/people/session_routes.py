@@ -13,8 +13,7 @@ from app.features.maintenance.service import read_banner
 from app.features.people import links
 from app.features.people.links import LinkHolder
 from app.features.people.logins import Login
-from app.features.people.members import read_single_roles
-from app.features.people.roles import SCOPES, Role, lets
+from app.features.people.roles import SCOPES, Role, role_allows
 from app.features.people.schemas import (
     LinkToken,
     LinkUse,
@@ -25,10 +24,11 @@ from app.features.people.schemas import (
     PasswordEdit,
     SessionDocument,
 )
-from app.http.access import login_of
+from app.features.people.service import read_single_roles
+from app.http.access import current_login
 from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, Id
-from app.http.headers import bearer_of
+from app.http.headers import bearer_token
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
 from app.http.request_limits import LOGINS, LOOKS, limit
@@ -46,7 +46,7 @@ async def get_login(request: Request) -> Login:
     Raises:
         NotLoggedInError: Nobody is.
     """
-    login = login_of(request.scope)
+    login = current_login(request.scope)
     if login is None:
         raise NotLoggedInError("you are not logged in", hint="Log in first.")
     return login
@@ -55,10 +55,10 @@ async def get_login(request: Request) -> Login:
 Me = Annotated[Login, Depends(get_login)]
 
 
-ALLOWS = {role: [action for action in Action if lets(role, action)] for role in Role}
+ALLOWS = {role: [action for action in Action if role_allows(role, action)] for role in Role}
 
 
-def session_of(login: Login | None, store: Store) -> SessionDocument:
+def session_document(login: Login | None, store: Store) -> SessionDocument:
     """What a server of a team says of who asks."""
     if login is None:
         return SessionDocument(team=True, name=None, role=None, may=[])
@@ -95,9 +95,9 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
             may=every,
             allows=ALLOWS,
         )
-    bearer = bearer_of(request.scope)
+    bearer = bearer_token(request.scope)
     login = team.login(request) if bearer is None else team.login_with(bearer, request)
-    found = session_of(login, services.store)
+    found = session_document(login, services.store)
     rules = team.sign_on and team.sign_on.rules
     ways = LoginMethods(password=not (rules and rules.only), sign_on=rules.label if rules else None)
     moment = None if login is None or login.roles.blind else services.events.moment()
@@ -137,7 +137,7 @@ def _begin_session(
             name,
             password,
             code=code,
-            on_code=lambda: team.tries.count_code(name),
+            on_code=lambda: team.attempts.count_code(name),
             browser=request.headers.get("user-agent", ""),
             address=address,
             before=team.token(request),
@@ -151,7 +151,7 @@ def _begin_session(
     if login is None:
         raise NotLoggedInError("the account was disabled meanwhile")
     response.set_cookie(**team.device_values(login.name))
-    return session_of(login, store)
+    return session_document(login, store)
 
 
 @router.delete("/session", operation_id="deleteSession", responses=responses(409))
@@ -165,7 +165,7 @@ def log_out(
     if login is not None:
         team.logins.end(login, login.id)
     response.set_cookie(**team.cookie_values(None))
-    return session_of(None, store)
+    return session_document(None, store)
 
 
 @router.put(
@@ -188,7 +188,7 @@ def change_password(
     team.count_try(request, me.name)
     token = team.logins.change_password(me, change.old, change.new)
     response.set_cookie(**team.cookie_values(token))
-    return session_of(me, store)
+    return session_document(me, store)
 
 
 @router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))

@@ -19,7 +19,7 @@ from app.db.session import Session, text_of
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotLoggedInError
 from app.features.people.devices import make_pending_actions, use_code
-from app.features.people.links import find_link_holder, new_token, take, token_hash
+from app.features.people.links import consume_link, find_link_holder, new_token, token_hash
 from app.features.people.login_queries import (
     delete_logins,
     find_identity,
@@ -34,9 +34,9 @@ from app.features.people.queries import (
     person_by_id,
     person_by_name,
 )
-from app.features.people.roles import checked_name, note
+from app.features.people.roles import checked_name, log_account_event
 from app.features.people.second_factor import require_password
-from app.features.people.sign_on_rules import SignOnRules, require_no_identity, shown_of
+from app.features.people.sign_on_rules import SignOnRules, identity_label, require_no_identity
 from app.finite import json_text
 
 LASTS = timedelta(minutes=10)
@@ -210,7 +210,7 @@ class SignOn:
                 )
             if not vouched and has_second_factor(session, person_id):
                 self._require_second_factor(session, person_id, factor)
-            use_identity(session, person_id, shown_of(claims), text_of(self._clock()))
+            use_identity(session, person_id, identity_label(claims), text_of(self._clock()))
 
         try:
             token = self._logins.begin(
@@ -278,7 +278,7 @@ class SignOn:
         found: Any | None,
     ) -> int:
         """Whose a link is; the account is theirs from now on, and the password that they had is none."""
-        person_id = take(session, link, name, password=None)
+        person_id = consume_link(session, link, name, password=None)
         if found is not None and found.person_id != person_id:
             raise self._already_linked_error()
         self._save_identity(session, person_id, claims)
@@ -307,7 +307,7 @@ class SignOn:
                 ),
             )
         person_id = insert_person(session, name, self.rules.new_role, by=name)
-        note(session, name, name, "came by single sign-on", self.rules.new_role)
+        log_account_event(session, name, name, "came by single sign-on", self.rules.new_role)
         self._save_identity(session, person_id, claims)
         return person_id
 
@@ -329,11 +329,13 @@ class SignOn:
         return SignOnResult(None, begun.to)
 
     def _save_identity(self, session: Session, person_id: int, claims: Mapping[str, Any]) -> None:
-        shown, person = shown_of(claims), person_by_id(session, person_id)
+        shown, person = identity_label(claims), person_by_id(session, person_id)
         assert person is not None
         values = {"issuer": self.rules.issuer, "subject": claims["sub"], "shown": shown}
         put_identity(session, {**values, "person_id": person_id, "created": text_of(self._clock())})
-        note(session, person.name, person.name, "single sign-on linked", person.role, account=shown)
+        log_account_event(
+            session, person.name, person.name, "single sign-on linked", person.role, account=shown
+        )
 
     def _person_name(self, person_id: int) -> str:
         with self._store.read() as session:

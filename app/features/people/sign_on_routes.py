@@ -17,8 +17,8 @@ from app.features.people.login_schemas import (
     SignOnStarted,
 )
 from app.features.people.schemas import PasswordOnly
-from app.features.people.session_routes import Me, session_of
-from app.features.people.sign_on_rules import read_login_ways, unlink, unlink_person
+from app.features.people.session_routes import Me, session_document
+from app.features.people.sign_on_rules import read_login_ways, unlink_identity, unlink_person
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
@@ -40,7 +40,7 @@ log = structlog.get_logger("touchline.access")
 def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnStarted:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
-    team.tries.count_challenge(team.address(request))
+    team.attempts.count_challenge(team.address(request))
     asker = secrets.token_urlsafe()
     address = sign_on.begin(
         asker, redirect=team.landing(request), to=body.to, link=body.link, name=body.name
@@ -77,16 +77,18 @@ def finish(
             browser=request.headers.get("user-agent", ""),
             address=address,
             before=team.token(request),
-            on_code=team.tries.count_code,
+            on_code=team.attempts.count_code,
         )
     except AccessError as error:
         log.warning("a single sign-on was refused", address=address, reason=error.message)
         raise
     response.set_cookie(**team.begun_values(None))
     if entered.token is None:
-        return SignOnEnd(session=session_of(team.login(request), store), to=entered.to)
+        return SignOnEnd(session=session_document(team.login(request), store), to=entered.to)
     response.set_cookie(**team.cookie_values(entered.token))
-    return SignOnEnd(session=session_of(team.logins.find(entered.token), store), to=entered.to)
+    return SignOnEnd(
+        session=session_document(team.logins.find(entered.token), store), to=entered.to
+    )
 
 
 @router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))
@@ -131,7 +133,7 @@ def begin_link(
 def remove(body: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
     team.count_try(request, me.name)
-    unlink(store, me, body.password, datetime.now(UTC))
+    unlink_identity(store, me, body.password, datetime.now(UTC))
 
 
 @router.delete(

@@ -18,11 +18,11 @@ from app.features.people.login_queries import (
     count_linked,
     delete_identity,
     delete_logins,
-    identity_of,
+    find_person_identity,
 )
 from app.features.people.logins import Login, LoginMethod
 from app.features.people.queries import all_people, count_people_who_can_log_in, person_by_id
-from app.features.people.roles import Role, note, require_no_token
+from app.features.people.roles import Role, log_account_event, require_no_token
 from app.features.people.second_factor import require_password
 from app.finite import Moment
 
@@ -92,13 +92,13 @@ class SignOnRules:
         return not self.trusted.isdisjoint(methods)
 
 
-def shown_of(claims: Mapping[str, Any]) -> str:
+def identity_label(claims: Mapping[str, Any]) -> str:
     """By what people know an account of the provider."""
     names = (claims.get(name) for name in ("email", "preferred_username", "name", "sub"))
     return next(str(one) for one in names if one)[:100]
 
 
-def origin_of(address: str) -> str:
+def url_origin(address: str) -> str:
     """Scheme, host and port of an address.
 
     Raises:
@@ -186,7 +186,7 @@ def _role_of_new_people(settings: Settings) -> Role | None:
 
 def _allowed_hosts(addresses: Sequence[str]) -> frozenset[str]:
     try:
-        found = [(urlsplit(one), origin_of(one)) for one in addresses]
+        found = [(urlsplit(one), url_origin(one)) for one in addresses]
     except ValueError as error:
         raise _incomplete_error(
             f"{error}, as TOUCHLINE_SSO_ISSUER and TOUCHLINE_SSO_HOSTS need"
@@ -252,14 +252,14 @@ class OwnWays:
 def read_login_ways(store: Store, person_id: int) -> OwnWays:
     """How a person can come in."""
     with store.read() as session:
-        person, row = person_by_id(session, person_id), identity_of(session, person_id)
+        person, row = person_by_id(session, person_id), find_person_identity(session, person_id)
     found = None if row is None else Identity(row.issuer, row.shown, row.created, row.used)
     return OwnWays(person is not None and person.password is not None, found)
 
 
 def require_no_identity(session: Session, person_id: int, rules: SignOnRules) -> None:
     """Raise ConflictError where somebody has an account of the provider already."""
-    found = identity_of(session, person_id)
+    found = find_person_identity(session, person_id)
     if found is not None and found.issuer == rules.issuer:
         raise ConflictError(
             f"an account of {rules.label} is linked with yours already",
@@ -267,7 +267,7 @@ def require_no_identity(session: Session, person_id: int, rules: SignOnRules) ->
         )
 
 
-def unlink(store: Store, login: Login, password: str | None, at: datetime) -> None:
+def unlink_identity(store: Store, login: Login, password: str | None, at: datetime) -> None:
     """Take one's account away; other sessions that began with it end.
 
     Raises:
@@ -286,7 +286,7 @@ def unlink(store: Store, login: Login, password: str | None, at: datetime) -> No
         if delete_identity(session, login.person_id) is None:
             raise NotFoundError("no account of a provider is linked with yours")
         delete_logins(session, login.person_id, but=login.id, way=LoginMethod.SIGN_ON)
-        note(session, login.name, login.name, "single sign-on unlinked", login.role)
+        log_account_event(session, login.name, login.name, "single sign-on unlinked", login.role)
 
 
 def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
@@ -311,7 +311,7 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
                 f"{person.name} is the last admin who can log in", hint="Make another one first."
             )
         delete_logins(session, person_id, way=LoginMethod.SIGN_ON)
-        note(session, actor, person.name, "single sign-on unlinked", person.role)
+        log_account_event(session, actor, person.name, "single sign-on unlinked", person.role)
 
 
 def linked_admins(store: Store, rules: SignOnRules) -> int:

@@ -1,19 +1,29 @@
-"""Which datasets and groups the person of a request may see."""
+"""Which datasets and groups the person of a request may see, and under which names others are shown."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, not_, or_, select, true
+from sqlalchemy import ColumnElement, and_, func, insert, not_, or_, select, true, update
 
+from app.db.log import LogEntry
 from app.db.session import Session
 from app.features.batches.tables import BatchGroupModel
 from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
 from app.features.independent_annotations.tables import GoldModel, IndependentAnnotationModel
+from app.features.people.tables import ActorAliasModel, PersonModel
+from app.features.queue.tables import QueueModel
 from app.soccer.actors import TOKEN, is_actor_of
+
+COPIES = 10**9
+"""Ids of datasets of copies lie above it, and those of all others below: one that is made while
+somebody listens is hidden from them from its first entry on."""
+_ALIASES = select(ActorAliasModel.actor, ActorAliasModel.at, PersonModel.name.label("shown")).join(
+    PersonModel, PersonModel.id == ActorAliasModel.person_id
+)
 
 
 @dataclass(frozen=True)
@@ -71,13 +81,13 @@ def reads_blind() -> bool:
     return reader is not None and bool(reader.batches)
 
 
-def judges_in(dataset_id: int) -> bool:
+def sees_all_work(dataset_id: int) -> bool:
     """Whether whoever asks may know what people made of groups independently."""
     reader = READER.get()
     return reader is None or reader.judges(dataset_id)
 
 
-def seen_in(dataset_id: int, group: Any) -> list[ColumnElement[bool]]:
+def visible_groups_condition(dataset_id: int, group: Any) -> list[ColumnElement[bool]]:
     """What holds of those groups of a dataset that whoever asks may see, by the column of their id."""
     reader = READER.get()
     if reader is None or dataset_id not in reader.batches:
@@ -122,11 +132,6 @@ def is_hidden_group(
         return hidden
     # What other groups show of a camera that they share is no secret.
     return hidden and session.scalar(groups.where(not_(hides))) is None
-
-
-COPIES = 10**9
-"""Ids of datasets of copies lie above it, and those of all others below: one that is made while
-somebody listens is hidden from them from its first entry on."""
 
 
 @dataclass(frozen=True)
@@ -174,3 +179,50 @@ class Visibility:
 
 EVERYTHING = Visibility()
 """Of an admin, and of whoever runs a server alone."""
+
+
+def shown_actor(actor: Any, at: Any) -> ColumnElement[str]:
+    """Under which name it is shown what an actor did at a time; both are columns."""
+    alias = (
+        select(PersonModel.name)
+        .join(ActorAliasModel, ActorAliasModel.person_id == PersonModel.id)
+        .where(ActorAliasModel.actor == actor, at <= ActorAliasModel.at)
+        .scalar_subquery()
+    )
+    return func.coalesce(alias, actor)
+
+
+def columns_shown(model: Any) -> list[ColumnElement[Any]]:
+    """The columns of a table with ``actor`` and ``created``, the actor under the name that is shown."""
+    table = model.__table__
+    rest = [column for column in table.columns if column.name != "actor"]
+    return [*rest, shown_actor(table.c.actor, table.c.created).label("actor")]
+
+
+def shown_entries(session: Session, entries: Iterable[LogEntry]) -> list[LogEntry]:
+    """Entries of the log under the names that are shown."""
+    aliases = {row.actor: row for row in session.execute(_ALIASES)}
+    shown = []
+    for entry in entries:
+        alias = aliases.get(entry.actor)
+        if alias is not None and entry.at <= alias.at:
+            entry = replace(entry, actor=alias.shown)
+        shown.append(entry)
+    return shown
+
+
+def given_aliases(session: Session) -> dict[str, str]:
+    """As whose the work of each actor is shown that was given to somebody."""
+    return {row.actor: row.shown for row in session.execute(_ALIASES)}
+
+
+def find_alias(session: Session, actor: str) -> str | None:
+    """As whose the work of an actor is shown; None where it was given to nobody."""
+    return given_aliases(session).get(actor)
+
+
+def insert_alias(session: Session, actor: str, person_id: int, name: str, at: str, by: str) -> None:
+    """Show what an actor did until now as a person's, in the queue too."""
+    values = {"actor": actor, "person_id": person_id, "at": at, "given_by": by}
+    session.execute(insert(ActorAliasModel), values)
+    session.execute(update(QueueModel).where(QueueModel.reviewer == actor).values(reviewer=name))

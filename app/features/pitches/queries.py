@@ -6,16 +6,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import delete, func, insert, select
+from sqlalchemy import ForeignKey, delete, func, insert, select
+from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.dialects.statements import insert_or_replace
 from app.db.json_columns import parse
 from app.db.log import LogEntry, LogModel, read_log
-from app.db.session import Session
+from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
 from app.features.groups.codecs import lines_from_json, picture_from_json
 from app.features.groups.digest import digest
-from app.features.pitches.tables import PitchEstimateModel
 from app.soccer.annotation import Lines
 from app.soccer.finding import PITCH_SIZE
 from app.soccer.frames import ImageSize
@@ -23,6 +23,25 @@ from app.soccer.pitch import Pitch
 
 PITCH = "pitch"
 """Kind of the log's entries that say how long and wide a pitch is, one for each group."""
+
+
+class PitchEstimateModel(Base):
+    """A size that was estimated, metres; ``inputs`` digests what it was estimated from.
+
+    A length or width without a number is unknown; ``problem`` says why both are.
+    """
+
+    __tablename__ = "pitch_estimate"
+
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"), primary_key=True)
+    match: Mapped[str] = mapped_column(primary_key=True)
+    inputs: Mapped[str]
+    length: Mapped[float | None]
+    width: Mapped[float | None]
+    length_sigma: Mapped[float | None]
+    width_sigma: Mapped[float | None]
+    frames: Mapped[int]
+    problem: Mapped[str | None]
 
 
 @dataclass(frozen=True)

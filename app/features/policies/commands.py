@@ -79,8 +79,7 @@ def set_(
 
 def _read_local_policy(dataset: str) -> tuple[str, dict[str, Any]]:
     """The policy of a dataset in a home, as YAML and as values."""
-    from app.features.policies.service import read_policy
-    from app.features.policies.text import policy_to_yaml, policy_values
+    from app.features.policies.service import policy_to_yaml, policy_values, read_policy
 
     with opened_store() as store:
         state = read_policy(store, dataset)
@@ -102,7 +101,7 @@ def read_policy_option(text: str) -> Policy:
         InputError: The file holds no policy.
     """
     from app.errors import InputError
-    from app.features.policies.text import MAX_CHARACTERS, policy_from_yaml, unknown_policy
+    from app.features.policies.service import MAX_CHARACTERS, policy_from_yaml, unknown_policy
     from app.soccer.policy import POLICIES
 
     if text in POLICIES:

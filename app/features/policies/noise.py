@@ -17,12 +17,17 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import need_dataset, read_dataset_head, save_policy
-from app.features.groups.ball_noise import apply_noise_factors, read_last_ball_actors
+from app.features.groups.group_edits import apply_noise_factors, read_last_ball_actors
 from app.features.groups.state import GroupState, read_states
 from app.features.independent_annotations.queries import is_copy
-from app.features.match_estimates.queries import Factor, Factors, factor_of, read_factors
-from app.features.policies.service import PolicyState, apply_policy, read_policy
-from app.features.policies.text import CUSTOM, policy_with
+from app.features.match_estimates.queries import Factor, Factors, noise_factor, read_factors
+from app.features.policies.service import (
+    CUSTOM,
+    PolicyState,
+    apply_policy,
+    policy_with,
+    read_policy,
+)
 from app.features.solutions.queries import newest_solution, present_solutions
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
 from app.solving.ball_noise import BallNoise, RayResidual, Sigma
@@ -288,7 +293,7 @@ def _factors_by_camera_and_person(found: SourceFactors) -> Factors:
 def _differ_noticeably(wanted: Factors, used: Factors) -> bool:
     """Whether factors differ by more than their estimate wanders with every new ball."""
     places = {item[:2] for item in (*wanted, *used)}
-    ratios = [(factor_of(wanted, *at), factor_of(used, *at)) for at in places]
+    ratios = [(noise_factor(wanted, *at), noise_factor(used, *at)) for at in places]
     return any(abs(new / old - 1) > WANDER for new, old in ratios)
 
 

@@ -10,7 +10,7 @@ from app.db.json_columns import unpack
 from app.db.log import LogModel
 from app.db.session import Session
 from app.features.groups.codecs import policy_from_json
-from app.features.people.alias_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor
 from app.soccer.policy import Policy
 
 

@@ -5,23 +5,27 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from app.errors import InputError
-from app.features.jobs.schemas import JobDocument
+from app.features.jobs.schemas import JobDocument, job_address
 from app.features.policies.schemas import (
     PolicyCatalogue,
     PolicyChange,
     PolicyStateDocument,
     ShippedPolicyDocument,
 )
-from app.features.policies.service import read_policy
-from app.features.policies.text import CUSTOM, policy_from_yaml, policy_with, unknown_policy
+from app.features.policies.service import (
+    CUSTOM,
+    policy_from_yaml,
+    policy_with,
+    read_policy,
+    unknown_policy,
+)
 from app.features.solve.jobs import PolicyJob, request_policy
-from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
-from app.http.job_responses import job_address
+from app.http.documents import document, responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
-from app.http.respond import document, responds
 from app.http.route import Route
 from app.soccer.policy import POLICIES, THRESHOLDS, Policy
 

@@ -7,8 +7,7 @@ from typing import Any
 
 from pydantic import AliasPath, BaseModel, ConfigDict, Field, create_model
 
-from app.features.policies.service import PolicyState
-from app.features.policies.text import MAX_CHARACTERS, policy_to_yaml, policy_values
+from app.features.policies.service import MAX_CHARACTERS, PolicyState, policy_to_yaml, policy_values
 from app.http.documents import Document, ListDocument
 from app.soccer.policy import Asks, CalibrationPolicy, Policy, thresholds_of
 

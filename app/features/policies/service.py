@@ -1,21 +1,49 @@
-"""The policy of a dataset.
-
-Datasets have a first policy, a present one and those before it, and change to another.
-"""
+"""Policies: the one of a dataset and those before it, and policies as text, both ways."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import math
+import re
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any
 
+import yaml
+
+from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
+from app.errors import InputError
 from app.features.datasets.service import read_dataset_head, save_policy
 from app.features.groups.digest import digest
 from app.features.groups.state import require_etag
 from app.features.policies.queries import PolicyVersion, policy_history
 from app.soccer.group import Group
-from app.soccer.policy import ESTIMATED, PAPER, TOUCHLINE, Policy, with_sigmas
+from app.soccer.policy import (
+    CALIBRATION,
+    ESTIMATED,
+    FIXED,
+    LINE_SIGMAS,
+    PAPER,
+    POLICIES,
+    SIGMAS,
+    THRESHOLDS,
+    TOUCHLINE,
+    Policy,
+    Threshold,
+    is_shipped,
+    with_sigmas,
+)
+
+LEAST_SHARE = 0.5
+"""Of the views whose paint could place their camera, so many must have a picture."""
+MAX_CHARACTERS = 20_000
+MAX_DEPTH = 4
+CUSTOM = "custom"
+"""Name of a policy that has none."""
+_BY_NAME = {threshold.name: threshold for threshold in THRESHOLDS}
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._+-]{0,79}")
 
 
 @dataclass(frozen=True)
@@ -92,10 +120,6 @@ def _read_policy_state(session: Session, dataset: str | int) -> PolicyState:
     return PolicyState(found.id, found.name, found.policy, policy_history(session, found.id))
 
 
-LEAST_SHARE = 0.5
-"""Of the views whose paint could place their camera, so many must have a picture."""
-
-
 def first_policy(groups: Iterable[Group]) -> Policy:
     """``touchline`` where most cameras can be drawn onto the paint of their pictures, else ``paper``.
 
@@ -105,3 +129,207 @@ def first_policy(groups: Iterable[Group]) -> Policy:
     views = [view for group in groups for view in group.views if view.can_use_paint]
     pictures = sum(view.media is not None for view in views)
     return TOUCHLINE if pictures > LEAST_SHARE * len(views) else PAPER
+
+
+def policy_from_yaml(text: str) -> Policy:
+    """The policy that a YAML text describes; thresholds that it does not name are those of
+    the shipped policy of its name, else as in ``paper``.
+
+    Raises:
+        InputError: It is no plain YAML, or a field is unknown or impossible; ``pointer`` says
+            which one.
+    """
+    if len(text) > MAX_CHARACTERS:
+        raise InputError(f"a policy has at most {MAX_CHARACTERS} characters")
+    try:
+        value = yaml.load(text, _PlainLoader)
+    except (yaml.YAMLError, ValueError) as error:
+        # ValueError: a scalar that looks like a date and is none.
+        raise InputError(f"this is not a policy in YAML: {_place(error)}") from error
+    except RecursionError as error:
+        raise InputError("this is not a policy in YAML: it is nested too deeply") from error
+    if not isinstance(value, dict):
+        raise InputError("a policy in YAML consists of lines `name: value`")
+    name = value.pop("name", CUSTOM)
+    return policy_with(POLICIES.get(str(name), PAPER), value, name=name)
+
+
+def unknown_policy(name: str, otherwise: str, *, pointer: str | None = None) -> InputError:
+    """What to say of a name that no shipped policy has; ``otherwise``: what else it is not."""
+    nearest = get_close_matches(name.lower(), POLICIES, n=1)
+    meant = f"did you mean {nearest[0]}?" if nearest else f"there are {', '.join(POLICIES)}"
+    return InputError(
+        f'there is no policy "{name}", and {otherwise}; {meant}',
+        hint="A policy of one's own comes with its thresholds.",
+        pointer=pointer,
+    )
+
+
+def policy_to_yaml(policy: Policy) -> str:
+    """A policy as YAML with every threshold, each with a comment that says what it is."""
+    lines = [f"name: {_scalar(policy.name)}", ""]
+    inner = [""]
+    for threshold in THRESHOLDS:
+        name = threshold.name.removeprefix(f"{CALIBRATION}.")
+        line = f"{name}: {_scalar(threshold.value(policy))}"
+        if name == threshold.name:
+            lines.append(f"{line:30}  # {threshold.text}")
+        else:
+            inner.append(f"  {line:28}  # {threshold.text}")
+    return "\n".join([*lines, "", f"{CALIBRATION}:", *inner[1:], ""])
+
+
+def policy_values(policy: Policy) -> dict[str, Json]:
+    """Every threshold by name; those of the calibration's part in a mapping of their own."""
+    values: dict[str, Json] = {CALIBRATION: {}}
+    for threshold in THRESHOLDS:
+        inner = threshold.name.removeprefix(f"{CALIBRATION}.")
+        place = values if inner == threshold.name else values[CALIBRATION]
+        place[inner] = threshold.value(policy)
+    return values
+
+
+def policy_with(
+    policy: Policy, values: Mapping[str, Any], *, name: object = None, pointer: str = ""
+) -> Policy:
+    """A policy with other thresholds and, where one is given, another name.
+
+    Args:
+        policy: What is not named stays as it is here.
+        values: Thresholds by name, those of the calibration's part nested or dotted.
+        name: Of the new policy; a shipped policy's name belongs to its values.
+        pointer: Where the values stand in the request, for errors.
+
+    Raises:
+        InputError: Unknown or impossible.
+    """
+    flat = dict(_flat(values, pointer))
+    for key, value in flat.items():
+        flat[key] = _checked(_BY_NAME[key], value, pointer)
+    if "noise" not in flat and any(flat.get(key, there) != there for key, there in _sigmas(policy)):
+        # Who says a number means it: no estimate takes its place.
+        flat["noise"] = FIXED
+    inner = {key.partition(".")[2]: flat.pop(key) for key in list(flat) if "." in key}
+    calibration = replace(policy.calibration, **inner)
+    chosen = policy.name if name is None else _checked_name(name)
+    changed = replace(policy, **{**flat, CALIBRATION: calibration, "name": chosen})
+    _require_honest(changed)
+    return changed
+
+
+def _sigmas(policy: Policy) -> Iterator[tuple[str, float | None]]:
+    """The noise of a policy by name."""
+    for name in (*SIGMAS, *(f"{CALIBRATION}.{name}" for name in LINE_SIGMAS)):
+        yield name, _BY_NAME[name].value(policy)
+
+
+def _flat(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[str, Any]]:
+    for key, value in values.items():
+        if key == CALIBRATION:
+            if not isinstance(value, dict):
+                raise InputError(
+                    f"{CALIBRATION} is a mapping of thresholds", pointer=f"{pointer}/{CALIBRATION}"
+                )
+            yield from _flat(
+                {f"{CALIBRATION}.{inner}": item for inner, item in value.items()}, pointer
+            )
+        elif key not in _BY_NAME:
+            place = str(key).replace("~", "~0").replace("/", "~1").replace(".", "/")
+            raise InputError(
+                f'a policy has no threshold "{key}"',
+                hint=f"It has {', '.join(_BY_NAME)}.",
+                pointer=f"{pointer}/{place}",
+            )
+        else:
+            yield key, value
+
+
+def _checked(threshold: Threshold, value: object, pointer: str) -> float | bool | str | None:
+    name, place = threshold.name, f"{pointer}/{threshold.name.replace('.', '/')}"
+    if isinstance(threshold.default, bool):
+        if not isinstance(value, bool):
+            raise InputError(f"{name} is true or false", pointer=place)
+        return value
+    if value is None and threshold.optional:
+        return None
+    if threshold.is_word:
+        if not isinstance(value, str) or value not in threshold.choices:
+            raise InputError(f"{name} is {' or '.join(map(str, threshold.choices))}", pointer=place)
+        return value
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or not math.isfinite(float(value)):  # type: ignore[arg-type]
+        raise InputError(f"{name} is a number", pointer=place)
+    found = float(value)  # type: ignore[arg-type]
+    low, high = threshold.minimum, threshold.maximum
+    if (low is not None and found < low) or (high is not None and found > high):
+        unit = f" {threshold.unit}" if threshold.unit else ""
+        raise InputError(f"{name} lies between {low:g} and {high:g}{unit}", pointer=place)
+    return found
+
+
+def _checked_name(name: object) -> str:
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise InputError(
+            "the name of a policy is up to 80 letters, digits, spaces and . _ + -",
+            pointer="/name",
+        )
+    return name
+
+
+def _require_honest(policy: Policy) -> None:
+    """Whoever reads the name of a shipped policy in an export must be able to rely on it."""
+    if policy.name in POLICIES and not is_shipped(policy):
+        raise InputError(
+            f'"{policy.name}" is the name of a policy with other thresholds',
+            hint="Give yours a name of its own.",
+            pointer="/name",
+        )
+
+
+def _scalar(value: object) -> str:
+    """A value as YAML; names are quoted where YAML would read something else."""
+    text: str = yaml.safe_dump(value, allow_unicode=True, width=1000)
+    return text.removesuffix("\n").removesuffix("...").strip()
+
+
+def _place(error: Exception) -> str:
+    mark = getattr(error, "problem_mark", None)
+    problem = str(getattr(error, "problem", None) or "it cannot be read")
+    return problem if mark is None else f"line {mark.line + 1}: {problem}"
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Reads plain values alone: no references, no deep nests, no key twice."""
+
+    def __init__(self, stream: str):
+        super().__init__(stream)
+        self._depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """The next node; an alias could make a small text a huge value."""
+        if self.check_event(yaml.AliasEvent):
+            raise self._refused("references are not allowed")
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise self._refused("it is nested too deeply")
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        """A mapping; of a key that stands twice, nobody knows which one was meant."""
+        seen = set()
+        for key, _ in node.value:
+            problem = None
+            if not isinstance(key, yaml.ScalarNode):
+                problem = "the name of a threshold must be text"
+            elif key.value in seen:
+                problem = f'"{key.value}" is given twice'
+            if problem is not None:
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+            seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+    def _refused(self, problem: str) -> yaml.MarkedYAMLError:
+        mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+        return yaml.MarkedYAMLError(problem=problem, problem_mark=mark)

@@ -125,12 +125,12 @@ class Feedback:
     best: str | None = None
 
 
-def kind_of(truth: SceneTruth) -> str:
+def lesson_kind(truth: SceneTruth) -> str:
     """The kind of a lesson: that of its fault, or ``clean``."""
     return truth.faults[0].kind if truth.faults else CLEAN
 
 
-def judge(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feedback:
+def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feedback:
     """What to say about a practice group as it stands.
 
     Args:
@@ -149,7 +149,7 @@ def judge(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feedback:
 
 
 def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
-    kind = kind_of(truth)
+    kind = lesson_kind(truth)
     if kind == CLEAN:
         return Feedback(OPEN)
     if _is_corrected(truth, group):
@@ -165,7 +165,7 @@ def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
 
 
 def _accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
-    kind = kind_of(truth)
+    kind = lesson_kind(truth)
     if kind == CLEAN:
         if _is_sound(truth, group):
             return words.say(RIGHT, "")
@@ -182,7 +182,7 @@ def _accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
 
 
 def _rejected(truth: SceneTruth, reason: str | None, words: _LessonTexts) -> Feedback:
-    kind = kind_of(truth)
+    kind = lesson_kind(truth)
     if kind == CLEAN:
         return words.say(WRONG, "A good group was lost.")
     if kind not in _REASONS:
@@ -196,7 +196,7 @@ class _LessonTexts:
     """The sentences of a lesson, with letters and numbers put in."""
 
     def __init__(self, truth: SceneTruth, group: Group):
-        self._words = WORDS[kind_of(truth)]
+        self._words = WORDS[lesson_kind(truth)]
         self._values = _values(truth.faults, group)
 
     @property
@@ -241,14 +241,14 @@ def _place(group: Group, view: str) -> int:
 
 def _is_corrected(truth: SceneTruth, group: Group) -> bool:
     """Whether the fault is gone and nothing else was spoilt."""
-    if kind_of(truth) in _REASONS or not _is_sound(truth, group):
+    if lesson_kind(truth) in _REASONS or not _is_sound(truth, group):
         return False
     view = group.view(truth.faults[0].view)
     if view is None or not view.included:
         return False
-    if kind_of(truth) == "missing_ball":
+    if lesson_kind(truth) == "missing_ball":
         return view.ball is not None and view.ball.center is not None
-    if kind_of(truth) == "undrawn_line":
+    if lesson_kind(truth) == "undrawn_line":
         # One line of two is enough for the gate, and the card then says that the group passes.
         return any(fault.marking in view.station.lines for fault in truth.faults)
     return True

@@ -19,7 +19,7 @@ from app.features.datasets.service import delete_dataset, insert_dataset
 from app.features.imports.queries import known_groups
 from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.people.queries import person_by_name, set_dataset_role
-from app.features.people.roles import Role, note
+from app.features.people.roles import Role, log_account_event
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
 from app.features.practice.recording_lessons import (
     FilmTruth,
@@ -197,7 +197,7 @@ def _open(store: Store, person: str | None, actor: str) -> None:
         row = None if person is None else person_by_name(session, person)
         if row is not None and person is not None:
             set_dataset_role(session, row.id, made, Role.LEAD, by=actor)
-            note(session, actor, person, "role in dataset", Role.LEAD, dataset_id=made)
+            log_account_event(session, actor, person, "role in dataset", Role.LEAD, dataset_id=made)
 
 
 def read_recording_practice(

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Request
+from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from app.features.groups.submit import load
 from app.features.jobs.queries import Job
+from app.features.jobs.schemas import by_job, job_answer
 from app.features.practice.recording import RecordingPractice, read_recording_practice
-from app.features.practice.schemas import (
-    LessonDocument,
-    PracticeBody,
-    PracticeDocument,
-    RecordingPracticeDocument,
-)
+from app.features.practice.recording_lessons import LessonName, RecordingLesson
 from app.features.practice.service import (
     Practice,
     PracticeLesson,
@@ -22,21 +19,91 @@ from app.features.practice.service import (
     read_practice,
     request_practice,
 )
-from app.http.access import login_of
+from app.http.access import current_login
 from app.http.deps import Actor, AppServices, Id, Sees
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import Document, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import LOOKS, limit
-from app.http.respond import responds
 from app.http.route import Route
+
+LessonState = Literal["open", "mended", "right", "almost", "wrong"]
+
 
 router = APIRouter(tags=["practice"], route_class=Route)
 
 
+class PracticeBody(BaseModel):
+    """How the practice begins."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    again: bool = Field(
+        default=False, description="Forget verdicts and edits of the lessons and begin again."
+    )
+
+
+class LessonDocument(Document):
+    """One practice group as a lesson."""
+
+    group: int
+    number: int = Field(description="From 1.")
+    total: int
+    title: str
+    question: str = Field(description="What to look for; does not give the answer away.")
+    hint: str = Field(description="A hint where to look.")
+    verdict: str
+    state: LessonState = Field(
+        validation_alias=AliasPath("feedback", "state"),
+        description="`mended`: edited rightly and not judged yet. Weighed against what the "
+        "generator planted, never against what the solver found.",
+    )
+    feedback: str | None = Field(
+        validation_alias=AliasPath("feedback", "sentence"),
+        description="Whether the answer was right, and why.",
+    )
+    best: str | None = Field(
+        validation_alias=AliasPath("feedback", "best"),
+        description="What would have been best, once the group is judged.",
+    )
+
+
+class PracticeDocument(Document):
+    """The practice dataset; no lessons until it is made."""
+
+    dataset: str
+    lessons: list[LessonDocument]
+
+
+class RecordingLessonDocument(Document, shows=RecordingLesson):
+    """One lesson on the practice recording."""
+
+    name: LessonName = Field(description="Which.")
+    question: str = Field(description="What to do.")
+    hint: str = Field(description="With which keys.")
+    state: Literal["open", "almost", "right"] = Field(
+        description="Weighed against the film's truth."
+    )
+    feedback: str = Field(description="What is right and what is not, in words and numbers.")
+    frame: int = Field(description="Where to look: a frame of the recording.")
+    right: int = Field(description="How many shots, frames or links are right.")
+    total: int = Field(description="Of how many.")
+    off: float | None = Field(
+        description="How far from the truth: pixels of the grass (cameras), metres (side), live frames (link)."
+    )
+
+
+class RecordingPracticeDocument(Document):
+    """The practice recording; no lessons until it is made."""
+
+    dataset: str
+    recording: int | None = Field(description="Id of the recording.")
+    lessons: list[RecordingLessonDocument]
+
+
 async def _person(request: Request) -> str | None:
     """Whose practice it is; None where nobody logs in."""
-    login = login_of(request.scope)
+    login = current_login(request.scope)
     return None if login is None else login.name
 
 

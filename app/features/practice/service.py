@@ -22,9 +22,9 @@ from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs, Pool
 from app.features.people.queries import person_by_name, set_dataset_role
-from app.features.people.roles import Role, note
+from app.features.people.roles import Role, log_account_event
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
-from app.features.practice.lessons import WORDS, Feedback, judge, kind_of
+from app.features.practice.lessons import WORDS, Feedback, judge_lesson, lesson_kind
 from app.features.practice.recording import recording_practice_work, require_own_recording
 from app.features.solutions.service import solve_dataset
 from app.formats.soccernet_v3 import ARCHIVE
@@ -206,7 +206,7 @@ def _open_for(store: Store, person: str, actor: str) -> None:
             return
         made = insert_dataset(session, name, PAPER, actor, hidden=True)
         set_dataset_role(session, row.id, made, Role.REVIEWER, by=actor)
-        note(session, actor, person, "role in dataset", Role.REVIEWER, dataset_id=made)
+        log_account_event(session, actor, person, "role in dataset", Role.REVIEWER, dataset_id=made)
 
 
 def read_practice(
@@ -241,7 +241,7 @@ def read_lesson(settings: Settings, state: GroupState) -> PracticeLesson:
 
 def _lesson(state: GroupState, truths: dict[str, SceneTruth]) -> PracticeLesson:
     truth = truths[state.key]
-    words = WORDS[kind_of(truth)]
+    words = WORDS[lesson_kind(truth)]
     return PracticeLesson(
         group=state.id,
         number=list(truths).index(state.key) + 1,
@@ -249,7 +249,7 @@ def _lesson(state: GroupState, truths: dict[str, SceneTruth]) -> PracticeLesson:
         question=words.question,
         hint=words.hint,
         verdict=state.verdict.state,
-        feedback=judge(truth, state.group, state.verdict),
+        feedback=judge_lesson(truth, state.group, state.verdict),
     )
 
 

@@ -7,19 +7,35 @@ came from. Until then no solve has seen it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from app.db.log import LogEntry, group_entries, single_edits
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
 from app.features.datasets.service import read_dataset_head
+from app.features.groups.codecs import ball_from_json
 from app.features.groups.edit import SetBall, need_view
-from app.features.groups.state import GroupState, content_tag_of, require_unchanged
+from app.features.groups.state import GroupState, content_tag_from_etag, require_unchanged
 from app.features.groups.submit import load, submit
-from app.features.groups.view_queries import StoredView, dataset_views, find_view
-from app.features.predictions.queries import PredictedBox, PredictionSet, read_box, read_boxes
+from app.features.groups.view_queries import (
+    StoredView,
+    dataset_views,
+    find_view,
+    group_dataset,
+    group_views,
+)
+from app.features.predictions.queries import (
+    PredictedBox,
+    PredictionSet,
+    count_prediction_sets,
+    read_box,
+    read_boxes,
+    read_group_boxes,
+    read_prediction_sets,
+)
 from app.features.predictions.service import read_set
 from app.features.queue.query import parse_query
 from app.progress import ReportProgress
@@ -93,7 +109,7 @@ class AcceptReport:
 
 
 def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> AcceptPlan:
-    """What ``accept`` would do; saves nothing.
+    """What ``accept_predicted_balls`` would do; saves nothing.
 
     Raises:
         NotFoundError: There is no such dataset or set, or a view has no prediction.
@@ -118,7 +134,7 @@ def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> Acc
     )
 
 
-def accept(
+def accept_predicted_balls(
     store: Store,
     dataset: str | int,
     request: AcceptRequest,
@@ -211,7 +227,11 @@ def accept_box(
 def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
     """Refuse where the person saw a ball; of a state that they did not see ``submit`` judges."""
     balls = need_view(state.group, edit.view).balls
-    if not balls or balls == (edit.ball,) or content_tag_of(state.etag) != content_tag_of(if_match):
+    if (
+        not balls
+        or balls == (edit.ball,)
+        or content_tag_from_etag(state.etag) != content_tag_from_etag(if_match)
+    ):
         return
     raise ConflictError(
         f"view {edit.view} has a ball already",
@@ -298,3 +318,104 @@ def _accept(
 def _still_fits(state: GroupState, item: Accepted, request: AcceptRequest) -> bool:
     view: View | None = state.group.view(item.view)
     return view is not None and (request.replace or not view.balls)
+
+
+@dataclass(frozen=True)
+class AcceptedBall:
+    """A ball that a person took from a set of predictions.
+
+    Attributes:
+        name: Of the set, which may be gone since.
+        score: As predicted; None where the set is gone.
+        actor: Who accepted it, and ``at`` when; None where it was imported so.
+    """
+
+    view_id: int
+    view: str
+    name: str
+    score: float | None
+    actor: str | None
+    at: str | None
+
+
+@dataclass(frozen=True)
+class GroupPredictions:
+    """What was predicted for a group.
+
+    Attributes:
+        sets: How many sets its dataset has.
+        boxes: By view, the newest set first, the surest box first.
+        accepted: Balls of the group as it is now that come from a prediction.
+    """
+
+    sets: int
+    boxes: tuple[tuple[PredictionSet, PredictedBox], ...]
+    accepted: tuple[AcceptedBall, ...]
+
+
+def group_predictions(store: Store, group_id: int) -> GroupPredictions:
+    """What was predicted for a group, and what was accepted of it.
+
+    Raises:
+        NotFoundError: There is no such group.
+    """
+    with store.read() as session:
+        dataset = group_dataset(session, group_id)
+        if dataset is None:
+            raise NotFoundError.group(group_id)
+        boxes = _with_sets(session, read_group_boxes(session, group_id))
+        taken = list(_taken(session, group_id))
+        entries = group_entries(session, group_id) if taken else []
+        count = count_prediction_sets(session, dataset)
+    return GroupPredictions(
+        count, boxes, tuple(_accepted(row, ball, boxes, entries) for row, ball in taken)
+    )
+
+
+def _with_sets(
+    session: Session, boxes: Sequence[PredictedBox]
+) -> tuple[tuple[PredictionSet, PredictedBox], ...]:
+    found = read_prediction_sets(session, {box.set_id for box in boxes})
+    sets = {item.id: item for item in found}
+    return tuple((sets[box.set_id], box) for box in boxes)
+
+
+def _taken(session: Session, group_id: int) -> Iterator[tuple[StoredView, BallAnnotation]]:
+    for view in group_views(session, group_id):
+        yield from ((view, ball) for ball in view.balls if ball.predicted_by)
+
+
+def _accepted(
+    row: StoredView,
+    ball: BallAnnotation,
+    boxes: Iterable[tuple[PredictionSet, PredictedBox]],
+    entries: Sequence[LogEntry],
+) -> AcceptedBall:
+    scores = [
+        box.score
+        for item, box in boxes
+        if (box.view_id, item.name) == (row.id, ball.predicted_by)
+        and ball.box is not None
+        and (box.x, box.y, box.width, box.height)
+        == (ball.box.x, ball.box.y, ball.box.width, ball.box.height)
+    ]
+    entry = next((one for one in reversed(entries) if _places_ball(one, row.key, ball)), None)
+    return AcceptedBall(
+        view_id=row.id,
+        view=row.key,
+        name=ball.predicted_by,
+        score=max(scores, default=None),
+        actor=None if entry is None else entry.actor,
+        at=None if entry is None else entry.at,
+    )
+
+
+def _places_ball(entry: LogEntry, view: str, ball: BallAnnotation) -> bool:
+    """Whether an edit put that ball there; undo and redo only bring back what one said."""
+    if entry.kind != "edit":
+        return False
+    return any(
+        (edit["edit"], edit.get("view")) == ("set_balls", view)
+        and ball in [ball_from_json(value) for value in edit["balls"]]
+        for edit in single_edits(entry.body["edit"])
+    )

@@ -64,7 +64,7 @@ def accept(
     The surest prediction of each view is taken, where it has no ball yet.
     """
     from app.features.predictions.accept import AcceptRequest, plan_accept
-    from app.features.predictions.accept import accept as run_accept
+    from app.features.predictions.accept import accept_predicted_balls as run_accept
     from app.features.predictions.service import find_predictions
 
     with opened_store() as store, show_progress("Accepting") as progress:
@@ -107,7 +107,7 @@ def detect(
 ) -> None:
     """Let a detector look for balls; what it finds stays a prediction until somebody accepts it."""
     from app.features.predictions.detect import DetectRequest, OnnxModel
-    from app.features.predictions.detect import detect as run_detect
+    from app.features.predictions.detect import run_detector as run_detect
 
     settings = read_settings()
     opened = OnnxModel.open(

@@ -181,7 +181,7 @@ class DetectRequest:
     min_score: float = MIN_SCORE
 
 
-def detect(
+def run_detector(
     store: Store,
     dataset: str | int,
     model: OnnxModel,

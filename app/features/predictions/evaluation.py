@@ -1,9 +1,12 @@
-"""Evaluations that are kept: their tables, figures and frames, and what changed between two."""
+"""Stored evaluations: their tables, figures and frames, comparisons, tracks, and export to a folder."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
 
 from app.db.json_columns import Json
 from app.db.session import Session
@@ -17,21 +20,48 @@ from app.evaluation.comparison import (
     compare_tables,
     differing_pins,
 )
-from app.evaluation.result import NUMBERS, Figure, FrameResult, Table
+from app.evaluation.figure_png import figure_png
+from app.evaluation.result import (
+    NUMBERS,
+    Evaluation,
+    Figure,
+    FrameResult,
+    Table,
+    figure_csv,
+    table_csv,
+)
+from app.evaluation.track_scores import TrueTrack, evaluate_tracks
 from app.features.audit.audit_events import add_audit_event
-from app.features.datasets.service import read_dataset_head
-from app.features.predictions import evaluation_queries as frame_rows
-from app.features.predictions.evaluation_queries import (
+from app.features.datasets.service import DatasetHead, read_dataset_head
+from app.features.groups.digest import digest
+from app.features.predictions import queries as frame_rows
+from app.features.predictions.frames import truth_pins
+from app.features.predictions.queries import (
     FrameCondition,
+    PredictionSet,
     dataset_evaluations,
     delete_evaluation,
     find_evaluation,
     read_figure,
+    read_predicted_tracks,
 )
-from app.features.predictions.evaluation_queries import StoredEvaluation as StoredEvaluation
-from app.features.solutions.codec import from_json
+from app.features.predictions.queries import StoredEvaluation as StoredEvaluation
+from app.features.solutions.codec import dumps, from_json, to_json
+from app.features.tracks.codec import track_from_json
+from app.features.tracks.service import accepted_tracks
+from app.features.versions.frozen_queries import read_frozen, read_json
+from app.features.versions.service import Version
+from app.finite import json_text
+from app.formats.safe_path import resolve_inside
+from app.formats.tracks_writer import folder_name
+from app.soccer.solution import SOLVER_VERSION
 
 MAX_PAGE = 500
+
+
+FIGURE_ENDINGS = ("csv", "json", "png")
+Fetch = Callable[[str, str, Path], object]
+"""Writes ``tables`` or ``figures`` of a name with its ending to a file."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +141,7 @@ def remove_evaluation(store: Store, evaluation_id: int, *, actor: str) -> None:
         session.respond(None)
 
 
-def tables_of(evaluation: StoredEvaluation) -> list[Table]:
+def run_tables(evaluation: StoredEvaluation) -> list[Table]:
     """The tables of a run as values."""
     return read_tables(evaluation.tables)
 
@@ -169,7 +199,9 @@ def list_frames(
     return FramePage(items, offset + len(items) if more else None, total)
 
 
-def compare(store: Store, first_id: int, second_id: int, field: str = "error_m") -> RunComparison:
+def compare_runs(
+    store: Store, first_id: int, second_id: int, field: str = "error_m"
+) -> RunComparison:
     """What changed from one run to another of the same dataset.
 
     Raises:
@@ -192,7 +224,7 @@ def compare(store: Store, first_id: int, second_id: int, field: str = "error_m")
         second,
         set(differs) <= {"software_version"},
         differs,
-        compare_tables(tables_of(first), tables_of(second)),
+        compare_tables(run_tables(first), run_tables(second)),
         compare_frames(frames[0], frames[1], field),
     )
 
@@ -210,9 +242,9 @@ def _conditions(query: FrameQuery) -> list[FrameCondition]:
     if query.field is not None:
         field = _checked_field(query.field, "/field")
         where.append(
-            frame_rows.lacks(field)
+            frame_rows.is_missing(field)
             if query.missing
-            else frame_rows.lies_in(field, query.low, query.high)
+            else frame_rows.is_between(field, query.low, query.high)
         )
     return where
 
@@ -225,3 +257,124 @@ def _checked_field(field: str, pointer: str) -> str:
             f'frames have no field "{field}"', hint=f"Fields: {known}.", pointer=pointer
         )
     return field
+
+
+def write_evaluation(store: Store, evaluation: StoredEvaluation, out: Path) -> None:
+    """Write everything of an evaluation into a folder.
+
+    Raises:
+        InputError: The folder cannot be written.
+    """
+    tables = {f"{table.name}.csv": table for table in run_tables(evaluation)}
+    # Its three files come one after the other.
+    figure = lru_cache(maxsize=1)(partial(get_figure, store, evaluation.id))
+
+    def fetch(kind: str, name: str, file: Path) -> None:
+        if kind == "tables":
+            file.write_text(table_csv(tables[name]), encoding="utf-8")
+            return
+        title, _, ending = name.rpartition(".")
+        file.write_bytes(_figure_as(figure(title), ending))
+
+    frames = (vars(frame) for frame in _frames(store, evaluation.id))
+    write_parts(out, evaluation_values(evaluation), frames, fetch)
+
+
+def write_parts(
+    out: Path, values: Mapping[str, Any], frames: Iterable[Mapping[str, Any]], fetch: Fetch
+) -> None:
+    """Write an evaluation, wherever its parts come from, into a folder.
+
+    Args:
+        out: The folder; made where it is missing.
+        values: As ``evaluation_values`` has them.
+        frames: What came of each frame.
+        fetch: Writes a table or figure.
+
+    Raises:
+        InputError: The folder cannot be written.
+        UnsafePathError: A name leads out of it.
+    """
+    tables = [f"{table['name']}.csv" for table in values["tables"]]
+    figures = [f"{name}.{ending}" for name in values["figures"] for ending in FIGURE_ENDINGS]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        text = json_text(values, indent=2) + "\n"
+        (out / "evaluation.json").write_text(text, encoding="utf-8")
+        for kind, names in (("tables", tables), ("figures", figures)):
+            for name in names:
+                fetch(kind, name, resolve_inside(out, name))
+        with (out / "frames.jsonl").open("w", encoding="utf-8") as file:
+            for frame in frames:
+                file.write(json_text(frame, ascii_=True) + "\n")
+    except OSError as error:
+        raise InputError(f"{out} cannot hold the evaluation ({error.strerror})") from error
+
+
+def _figure_as(figure: Figure, ending: str) -> bytes:
+    """A figure as the content of a file: ``csv``, ``json`` or ``png``."""
+    if ending == "png":
+        return figure_png(figure)
+    text = figure_csv(figure) if ending == "csv" else dumps(to_json(figure)) + "\n"
+    return text.encode()
+
+
+def evaluation_values(evaluation: StoredEvaluation) -> dict[str, Any]:
+    """An evaluation as plain values."""
+    return {**vars(evaluation), "figures": list(evaluation.figures)}
+
+
+def _frames(store: Store, evaluation_id: int) -> Iterator[FrameResult]:
+    place: int | None = 0
+    while place is not None:
+        page = list_frames(store, evaluation_id, FrameQuery(), MAX_PAGE, place)
+        yield from page.items
+        place = page.next
+
+
+def track_evaluation(
+    session: Session, dataset: DatasetHead, version: Version | None, predictions: PredictionSet
+) -> tuple[Evaluation, dict[str, Json]]:
+    """What came of it, and what pins the truth.
+
+    Args:
+        session: Any session.
+        dataset: Whose tracks are the truth.
+        version: Whose tracks are; None: those that people accepted and that are not stale.
+        predictions: A set of tracks.
+
+    Raises:
+        InputError: There is no true track, or nothing that is predicted is of an instant of one.
+    """
+    if version is None:
+        values = accepted_tracks(session, dataset)
+        pins = truth_pins(dataset.policy, SOLVER_VERSION, digest(values), "accepted")
+    else:
+        bodies = read_frozen(session, version.dataset_id, version.tracks.values())
+        values = {key: read_json(bodies[name]) for key, name in version.tracks.items()}
+        pins = truth_pins(
+            version.policy, version.solver_version, version.hash, version.groups, version
+        )
+    if not values:
+        where = f'the version "{version.name}"' if version else f'"{dataset.name}"'
+        raise InputError(
+            f"{where} has no track of the ball that a person accepted",
+            hint="Make and accept its tracks, then freeze a version.",
+            pointer="/version",
+        )
+    truth = [_true(key, value) for key, value in sorted(values.items())]
+    return evaluate_tracks(truth, read_predicted_tracks(session, predictions.id)), pins
+
+
+def _true(key: str, value: Json) -> TrueTrack:
+    track = track_from_json(value["track"])
+    return TrueTrack(
+        key,
+        folder_name(key),
+        track.frames,
+        track.times,
+        track.position,
+        track.state,
+        track.mode,
+        tuple((event.kind, event.time_s) for event in track.events),
+    )

@@ -182,7 +182,7 @@ def _evaluate(
     dataset: str, request: SourcesRequest, out: Path | None, progress: ReportProgress
 ) -> tuple[_Values, list[_Values]]:
     """The evaluation and the sets that were made or found for it, as plain values."""
-    from app.features.predictions.folder import evaluation_values, write_evaluation
+    from app.features.predictions.evaluation import evaluation_values, write_evaluation
     from app.features.predictions.sources import evaluate_sources
 
     with opened_store() as store:

@@ -2,39 +2,59 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from app.errors import NotFoundError
-from app.evaluation.comparison import FIELDS
+from app.evaluation.comparison import FIELDS, Difference, FrameOfTwoRuns
 from app.evaluation.figure_png import figure_png
-from app.evaluation.result import FIGURES, NUMBERS, TABLES, Figure, Table, figure_csv, table_csv
-from app.features.jobs.queries import Job
-from app.features.predictions import evaluation as review
-from app.features.predictions.evaluation_schemas import (
-    ComparisonDocument,
-    EvaluationBody,
-    EvaluationDocument,
-    EvaluationList,
-    FrameList,
+from app.evaluation.result import (
+    FIGURES,
+    NUMBERS,
+    TABLES,
+    Cell,
+    Figure,
+    FrameResult,
+    Table,
+    figure_csv,
+    table_csv,
 )
+from app.features.jobs.queries import Job
+from app.features.jobs.schemas import by_job, job_answer
+from app.features.predictions import evaluation as review
+from app.features.predictions.evaluation import RunComparison, read_tables
+from app.features.predictions.evaluation_run import MAX_NAME, EvaluationRequest
 from app.features.predictions.jobs import request_evaluation
+from app.features.versions.schemas import VersionId
 from app.features.versions.service import find_version_id
 from app.finite import MAX_ID
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.headers import saved_as
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import Document, ListDocument, document, no_content, responds
+from app.http.headers import content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import IMAGES, limit
-from app.http.respond import document, no_content, responds
 from app.http.route import Route
+from app.soccer.choices import BoxKind, LiveRule
 
+SetId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]
+
+
+_HEADLINE = (
+    ("detection", "all", "ap_50"),
+    ("localization", "oracle", "mae_m"),
+    ("localization", "oracle", "mae_percent"),
+    ("localization", "oracle", "p_2m"),
+    ("tracks", "all", "mae_m"),
+    ("tracks", "all", "p_2m"),
+    ("track_events", "any", "f1"),
+)
 router = APIRouter(tags=["evaluations"], route_class=Route)
-
 FigureName = StrEnum("FigureName", list(FIGURES))  # type: ignore[misc]
 TableName = StrEnum("TableName", list(TABLES))  # type: ignore[misc]
 FrameField = StrEnum("FrameField", list(NUMBERS))  # type: ignore[misc]
@@ -45,6 +65,147 @@ Limit = Annotated[int, Query(ge=1, le=review.MAX_PAGE)]
 Cursor = Annotated[str | None, Query(max_length=20, description="`next` of the page before.")]
 Bound = Annotated[float | None, Query(ge=-1e9, le=1e9, allow_inf_nan=False)]
 JSON_FILE, CSV_FILE, PNG_FILE = "application/json", "text/csv", "image/png"
+
+
+class EvaluationBody(BaseModel):
+    """What to evaluate, and against what."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"predictions": 3, "version": 1, "split": "test"}]},
+    )
+
+    name: Annotated[str, Field(max_length=MAX_NAME)] = ""
+    predictions: SetId | None = Field(
+        default=None, description="Boxes, cameras or both; or tracks."
+    )
+    careful: SetId | None = Field(
+        default=None, description="Reference boxes, for the table of boxes (the paper's table 1)."
+    )
+    version: VersionId | None = Field(
+        default=None,
+        description="Id, name or hash of a frozen version; null: the dataset as it is now.",
+    )
+    groups: LiveRule = Field(
+        default="passing", description="Without a version: which groups take part."
+    )
+    split: Annotated[str, Field(max_length=50)] | None = Field(
+        default=None, description="Frames of this split alone."
+    )
+    boxes: BoxKind = Field(
+        default="optimized", description="Which box of the dataset is the truth."
+    )
+    min_score: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="Detections with a lower score take no part in localisation."
+    )
+
+    @model_validator(mode="after")
+    def _something(self) -> EvaluationBody:
+        if self.predictions is None and self.careful is None:
+            raise ValueError("give predictions, reference boxes, or both")
+        return self
+
+    def value(self, version: int | None) -> EvaluationRequest:
+        """The request as the review floor takes it; ``version`` is the id of the one it names."""
+        return EvaluationRequest(**{**self.model_dump(), "version": version})
+
+
+def _headline(tables: list[Any]) -> dict[str, Cell | None]:
+    found = {table.name: table for table in read_tables(tables)}
+    return {
+        column: found[name].cell(row, column) for name, row, column in _HEADLINE if name in found
+    }
+
+
+class EvaluationRow(Document):
+    """A run in a list, with its headline numbers."""
+
+    id: int
+    name: str
+    dataset: str
+    created: datetime
+    actor: str
+    predictions: int | None = Field(validation_alias="prediction_set_id")
+    careful: int | None = Field(validation_alias="careful_set_id")
+    version: int | None = Field(validation_alias="version_id")
+    counts: dict[str, int]
+    headline: Annotated[dict[str, Cell], BeforeValidator(_headline)] = Field(
+        validation_alias="tables",
+        description="ap_50, mae_m, mae_percent, p_2m and f1 (of events), those that the run has.",
+    )
+
+
+class EvaluationList(ListDocument[EvaluationRow]):
+    """The runs of a dataset, the newest first."""
+
+
+class EvaluationDocument(EvaluationRow):
+    """A run, complete but for its figures and frames."""
+
+    pins: dict[str, Any] = Field(
+        description="What makes it repeatable: version or digest of the state, policy, solver and "
+        "software version, digests of the predictions, seed."
+    )
+    tables: list[Table]
+    figures: list[str] = Field(description="Names for `/evaluations/{id}/figures/{name}.json`.")
+
+
+class FrameList(ListDocument[FrameResult]):
+    """Frames behind a number; `next` is the cursor of the page after this one."""
+
+    next: Annotated[str, Field(coerce_numbers_to_str=True)] | None
+    total: int
+
+
+class DifferenceDocument(Document, shows=Difference):
+    """One number of both runs; `change` is the second minus the first."""
+
+    first: Cell | None
+    second: Cell | None
+    change: float | None
+
+
+class ComparisonDocument(Document):
+    """Two runs of one dataset, number by number and frame by frame."""
+
+    first: EvaluationRow
+    second: EvaluationRow
+    same_truth: bool = Field(
+        description="Same frames, policy, solver, options and reference boxes: the numbers can be "
+        "compared."
+    )
+    differs: list[str] = Field(
+        description="Pins in which the runs differ: those of `same_truth`, and `software_version`."
+    )
+    numbers: list[DifferenceDocument]
+    field: str
+    shared: int = Field(description="Frames that both runs judged.")
+    better: int
+    worse: int
+    gained: int = Field(description="Frames that only the second run has a value for.")
+    lost: int
+    mean_change: float | None
+    frames: list[FrameOfTwoRuns] = Field(
+        description="Frames that differ: gained and lost ones, then the largest change first."
+    )
+    next: str | None
+    total: int
+
+    @staticmethod
+    def of(found: RunComparison, limit: int, offset: int) -> ComparisonDocument:
+        """The document of a comparison, with one page of its frames."""
+        frames = found.frames.frames
+        shown = frames[offset : offset + limit]
+        more = offset + len(shown) < len(frames)
+        return ComparisonDocument.model_validate(
+            {
+                **vars(found),
+                **vars(found.frames),
+                "frames": shown,
+                "next": str(offset + len(shown)) if more else None,
+                "total": len(frames),
+            }
+        )
 
 
 def _files(description: str, document: type[object], *others: str) -> Responses:
@@ -145,7 +306,7 @@ def get_figure(
         return document(found)
     if ending == "csv":
         return _csv(figure_csv(found), name)
-    shown = {"Content-Disposition": saved_as(name, "inline")}
+    shown = {"Content-Disposition": content_disposition(name, "inline")}
     return Response(figure_png(found), media_type=PNG_FILE, headers=shown)
 
 
@@ -161,7 +322,7 @@ def get_table(
 ) -> Response:
     """One table of an evaluation; 404 where the evaluation has no such table."""
     tables = {
-        item.name: item for item in review.tables_of(review.get_evaluation(store, evaluation))
+        item.name: item for item in review.run_tables(review.get_evaluation(store, evaluation))
     }
     found = tables.get(str(table))
     if found is None:
@@ -221,10 +382,10 @@ def compare_evaluations(
     cursor: Cursor = None,
 ) -> ComparisonDocument:
     """How this evaluation differs from another of the same dataset; changes are this minus that."""
-    found = review.compare(store, other, evaluation, str(field))
+    found = review.compare_runs(store, other, evaluation, str(field))
     return ComparisonDocument.of(found, limit, parse_cursor(cursor) or 0)
 
 
 def _csv(text: str, name: str) -> Response:
-    saved = {"Content-Disposition": saved_as(name)}
+    saved = {"Content-Disposition": content_disposition(name)}
     return Response(text, media_type=f"{CSV_FILE}; charset=utf-8", headers=saved)

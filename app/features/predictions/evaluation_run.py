@@ -15,8 +15,7 @@ from app.evaluation.frame import Detection, Frame
 from app.evaluation.result import Evaluation, Table
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.view_queries import StoredView, dataset_views
-from app.features.predictions.evaluation import read_evaluation
-from app.features.predictions.evaluation_queries import StoredEvaluation, insert_evaluation
+from app.features.predictions.evaluation import read_evaluation, track_evaluation
 from app.features.predictions.frames import (
     LIVE_RULES,
     Truth,
@@ -24,9 +23,14 @@ from app.features.predictions.frames import (
     unknown_rule,
     version_truth,
 )
-from app.features.predictions.queries import PredictionSet, read_boxes, read_predicted_cameras
+from app.features.predictions.queries import (
+    PredictionSet,
+    StoredEvaluation,
+    insert_evaluation,
+    read_boxes,
+    read_predicted_cameras,
+)
 from app.features.predictions.service import read_set
-from app.features.predictions.track_evaluation import track_evaluation
 from app.features.solutions.codec import to_json
 from app.features.versions.service import Version, read_version
 from app.finite import quoted

@@ -17,7 +17,7 @@ from app.features.groups.state import read_states
 from app.features.groups.view_queries import present_ids
 from app.features.versions.membership import read_candidates, require_solved
 from app.features.versions.queries import BATCH, read_rows
-from app.features.versions.service import FrozenGroup, Version, thaw
+from app.features.versions.service import FrozenGroup, Version, read_frozen_groups
 from app.finite import quoted
 from app.formats.manifest import software_version
 from app.soccer.ball_boxes import ball_boxes, has_ball_3d
@@ -52,7 +52,7 @@ def version_truth(session: Session, version: Version, split: str | None) -> Trut
     frames: list[Frame] = []
     gone = 0
     for start in range(0, len(rows), BATCH):
-        frozen = thaw(session, version, rows[start : start + BATCH])
+        frozen = read_frozen_groups(session, version, rows[start : start + BATCH])
         ids = present_ids(session, version.dataset_id, [item.group.key for item in frozen])
         for item in frozen:
             for frame in _frozen_frames(item, ids.get(item.group.key, (0, {})), len(frames)):

@@ -13,14 +13,19 @@ from app.features.datasets.service import get_dataset_head
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
-from app.features.predictions.accept import AcceptReport, AcceptRequest, accept, plan_accept
+from app.features.predictions.accept import (
+    AcceptReport,
+    AcceptRequest,
+    accept_predicted_balls,
+    plan_accept,
+)
 from app.features.predictions.evaluation import list_evaluations
-from app.features.predictions.evaluation_queries import StoredEvaluation
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
     check_evaluation,
     run_evaluation,
 )
+from app.features.predictions.queries import StoredEvaluation
 from app.progress import ReportProgress
 
 EVALUATE, ACCEPT = "evaluate", "bulk"
@@ -118,7 +123,9 @@ def _evaluate(
 def _accept(
     store: Store, dataset_id: int, request: AcceptRequest, actor: str, progress: ReportProgress
 ) -> Json:
-    return accept_result(accept(store, dataset_id, request, actor=actor, progress=progress))
+    return accept_result(
+        accept_predicted_balls(store, dataset_id, request, actor=actor, progress=progress)
+    )
 
 
 def evaluation_result(found: StoredEvaluation) -> dict[str, Any]:

@@ -12,10 +12,15 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.groups.submit import find_view
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import JobDocument
+from app.features.jobs.schemas import ACCEPTED, JobDocument, job_answer
 from app.features.predictions import service as review
-from app.features.predictions.accept import AcceptReport, accept, accept_box, plan_accept
-from app.features.predictions.group_predictions import group_predictions
+from app.features.predictions.accept import (
+    AcceptReport,
+    accept_box,
+    accept_predicted_balls,
+    group_predictions,
+    plan_accept,
+)
 from app.features.predictions.jobs import request_accept
 from app.features.predictions.reader import PredictionFiles, uploaded_files
 from app.features.predictions.schemas import (
@@ -27,16 +32,15 @@ from app.features.predictions.schemas import (
     PredictionSetList,
     ViewPrediction,
     ViewPredictions,
-    size_of,
+    image_size,
 )
-from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id, IfMatch
-from app.http.job_responses import ACCEPTED, job_answer
+from app.http.documents import document, no_content, responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import LOOKS, limit
-from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
 router = APIRouter(tags=["predictions"], route_class=Route)
@@ -130,7 +134,7 @@ def accept_predictions(
     if dry_run or request.dry_run:
         return document(AcceptOutcome.planned(plan_accept(store, request.dataset, value)))
     if request.views is not None:
-        return accept(store, request.dataset, value, actor=actor)
+        return accept_predicted_balls(store, request.dataset, value, actor=actor)
     return request_accept(services.jobs, store, request.dataset, value, actor=actor)
 
 
@@ -213,8 +217,8 @@ def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
         None,
         format=request.format,
         category=request.category,
-        size=size_of(request.size),
-        cameras_size=size_of(request.cameras_size),
+        size=image_size(request.size),
+        cameras_size=image_size(request.cameras_size),
     )
     uploads = (request.upload, request.images_upload, request.cameras_upload)
     return uploaded_files(settings, how, *uploads)

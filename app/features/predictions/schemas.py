@@ -17,8 +17,13 @@ from pydantic import (
     model_validator,
 )
 
-from app.features.predictions.accept import SHOWN, AcceptPlan, AcceptReport, AcceptRequest
-from app.features.predictions.group_predictions import GroupPredictions
+from app.features.predictions.accept import (
+    SHOWN,
+    AcceptPlan,
+    AcceptReport,
+    AcceptRequest,
+    GroupPredictions,
+)
 from app.features.predictions.queries import PredictedBox, PredictionSet
 from app.features.queue.query import MAX_LENGTH
 from app.finite import MAX_ID
@@ -286,6 +291,6 @@ class AcceptOutcome(Document):
         )
 
 
-def size_of(size: Size | None) -> ImageSize | None:
+def image_size(size: Size | None) -> ImageSize | None:
     """A size as a value."""
     return None if size is None else ImageSize(*size)

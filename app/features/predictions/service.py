@@ -1,6 +1,6 @@
 """Predictions: what detectors and calibrators said, brought in, listed and thrown away.
 
-They are a third kind of data beside said and computed: no solve reads them. ``accept`` turns
+They are a third kind of data beside annotated and computed: no solve reads them. ``accept`` turns
 those that a person takes over into edits.
 """
 

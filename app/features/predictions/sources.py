@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 from app.db.store import Store
 from app.errors import NotFoundError
-from app.features.predictions.evaluation_queries import StoredEvaluation
 from app.features.predictions.evaluation_run import EvaluationRequest, check_groups, run_evaluation
-from app.features.predictions.queries import PredictionSet
+from app.features.predictions.queries import PredictionSet, StoredEvaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, find_predictions
 from app.features.versions.service import find_version

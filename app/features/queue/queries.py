@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import (
     Column,
@@ -25,12 +25,12 @@ from sqlalchemy.sql.visitors import iterate
 
 from app.db.dialects.statements import numbers_in
 from app.db.session import Session
-from app.features.agreement.queries import groups_that_came_to
+from app.features.agreement.queries import list_groups_in_states
 from app.features.batches.queries import groups_in_batches
 from app.features.comments.queries import groups_that_mention, groups_with_threads
 from app.features.independent_annotations.queries import groups_with_annotations
 from app.features.paint.proposal_queries import groups_with_open
-from app.features.people.visibility_queries import seen_anywhere, seen_in
+from app.features.people.visibility_queries import seen_anywhere, visible_groups_condition
 from app.features.policies.queries import judged_since
 from app.features.queue.tables import QUEUE_NUMBERS, QUEUE_SCANNED, QueueModel
 from app.features.solutions.queries import is_solved
@@ -55,7 +55,7 @@ _NOT: Mapping[str, Callable[[Any, Any], Any]] = {
 }
 
 
-def compares(column: str, op: str, value: float | str) -> Condition:
+def compare_condition(column: str, op: str, value: float | str) -> Condition:
     """A number or text against a value, by one of < <= > >= =; nothing that is absent does."""
     condition: Condition = _COMPARED[op](_queue_column(column), value)
     return condition
@@ -81,14 +81,14 @@ def is_flag(column: str, value: bool) -> Condition:
     return _queue_column(column).is_(value)
 
 
-def contains(column: str, text: str) -> Condition:
+def contains_text(column: str, text: str) -> Condition:
     """A text holds another."""
     return _queue_column(column).contains(text, autoescape=True)
 
 
-def lists(column: str, item: str) -> Condition:
+def has_list_item(column: str, item: str) -> Condition:
     """A list between commas has an item."""
-    return contains(column, f",{item},")
+    return contains_text(column, f",{item},")
 
 
 def has_all_pictures() -> Condition:
@@ -96,7 +96,7 @@ def has_all_pictures() -> Condition:
     return QueueModel.pictures >= QueueModel.views
 
 
-def is_one_of(ids: Iterable[int]) -> Condition:
+def has_group_id(ids: Iterable[int]) -> Condition:
     """The group's id is one of these."""
     return QueueModel.group_id.in_(numbers_in(ids))
 
@@ -116,7 +116,7 @@ def has_thread(state: str | None = None) -> Condition:
     return QueueModel.group_id.in_(groups_with_threads(state))
 
 
-def mentions(name: str | None = None) -> Condition:
+def mentions_person(name: str | None = None) -> Condition:
     """An open thread mentions somebody, or the person of a name."""
     return QueueModel.group_id.in_(groups_that_mention(name))
 
@@ -131,15 +131,15 @@ def has_annotations(op: str, number: float) -> Condition:
 
 def has_outcome(state: str) -> Condition:
     """Its annotations were compared, in some batch, and came to that."""
-    return QueueModel.group_id.in_(groups_that_came_to(state))
+    return QueueModel.group_id.in_(list_groups_in_states(state))
 
 
-def either(conditions: Iterable[Condition]) -> Condition:
+def any_of(conditions: Iterable[Condition]) -> Condition:
     """At least one of them holds."""
     return or_(*conditions)
 
 
-def opposite(condition: Condition) -> Condition:
+def negate(condition: Condition) -> Condition:
     """It does not hold."""
     return not_(condition)
 
@@ -341,7 +341,7 @@ class Listing:
 
     @property
     def _conditions(self) -> list[ColumnElement[bool]]:
-        seen = seen_in(self.dataset_id, QueueModel.group_id)
+        seen = visible_groups_condition(self.dataset_id, QueueModel.group_id)
         return [QueueModel.dataset_id == self.dataset_id, *self.conditions, *seen]
 
     @property
@@ -427,8 +427,17 @@ def find_place(session: Session, group_id: int, order: Order) -> tuple[int, list
     return None if row is None else (row.dataset_id, order.keys_of(row))
 
 
-def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
-    """Rows (dataset_id, status, groups, solved): how many groups there are, and have a solution."""
+class StateCount(NamedTuple):
+    """How many groups of a dataset have a status, and how many of these a solution."""
+
+    dataset_id: int
+    status: str
+    groups: int
+    solved: int
+
+
+def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[StateCount]:
+    """How many groups datasets have of each status, and how many of these have a solution."""
     statement = (
         select(
             QueueModel.dataset_id,
@@ -442,7 +451,7 @@ def count_states(session: Session, dataset_ids: Sequence[int]) -> Sequence[Any]:
         )
         .group_by(QueueModel.dataset_id, QueueModel.status)
     )
-    return session.execute(statement).all()
+    return session.rows(StateCount, statement)
 
 
 def count_unsolved(session: Session) -> tuple[int, int, str | None]:
@@ -467,7 +476,7 @@ def count_reviewed(session: Session, dataset_id: int) -> dict[tuple[str | None, 
         .where(
             QueueModel.dataset_id == dataset_id,
             QueueModel.reviewer.is_not(None),
-            *seen_in(dataset_id, QueueModel.group_id),
+            *visible_groups_condition(dataset_id, QueueModel.group_id),
         )
         .group_by(QueueModel.reviewer, QueueModel.status)
     )

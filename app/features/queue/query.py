@@ -21,7 +21,7 @@ from difflib import get_close_matches
 from hashlib import sha256
 
 from app.errors import InputError
-from app.features.batches.queries import place_in
+from app.features.batches.queries import place_column
 from app.features.queue import queries as conditions
 from app.features.queue.fields import BY_NAME, FIELDS, ORDERS
 from app.features.queue.queries import Condition, Order
@@ -69,7 +69,7 @@ class Query:
     def order(self) -> Order:
         """The order in which it lists groups."""
         if self.batch is not None:
-            return Order(place_in(self.batch))
+            return Order(place_column(self.batch))
         # "newest" says the direction itself.
         return Order(SORTS[self.sort], self.descending != (self.sort == "newest"))
 
@@ -109,7 +109,7 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
             condition = _condition_of_term(term)
             if term.field == "batch" and not negative and "," not in term.value:
                 batch = int(term.value)
-            found.append(conditions.opposite(condition) if negative else condition)
+            found.append(conditions.negate(condition) if negative else condition)
     return Query(tuple(found), sort or "number", descending, None if sort else batch, text)
 
 
@@ -181,11 +181,11 @@ def _condition_of_term(term: _Term) -> Condition:
     test = _TESTS[term.field]
     # A bare word may hold commas; a field's value is a list of choices.
     values = [term.value] if term.field == "" else term.value.split(",")
-    return conditions.either(test(term, value) for value in values)
+    return conditions.any_of(test(term, value) for value in values)
 
 
 def _listed_ids_condition(term: _Term) -> Condition:
-    return conditions.is_one_of(_parse_id(term, text) for text in term.value.split(","))
+    return conditions.has_group_id(_parse_id(term, text) for text in term.value.split(","))
 
 
 def _parse_id(term: _Term, text: str) -> int:
@@ -204,7 +204,9 @@ def _number_condition(term: _Term) -> Condition:
     column = NUMBERS[term.field]
     if term.value == "none":
         return conditions.is_absent(column)
-    return conditions.compares(column, "=" if term.op == ":" else term.op, _parse_number(term))
+    return conditions.compare_condition(
+        column, "=" if term.op == ":" else term.op, _parse_number(term)
+    )
 
 
 def _parse_number(term: _Term) -> float:
@@ -234,18 +236,18 @@ def _require_choice(term: _Term, value: str) -> str:
 
 def _any_or_none_condition(value: str, some: Condition) -> Condition:
     """``some``; the opposite for ``none``."""
-    return conditions.opposite(some) if value == "none" else some
+    return conditions.negate(some) if value == "none" else some
 
 
 def _status_condition(term: _Term, value: str) -> Condition:
-    return conditions.compares("status", "=", _require_choice(term, value))
+    return conditions.compare_condition("status", "=", _require_choice(term, value))
 
 
 def _finding_condition(term: _Term, value: str) -> Condition:
     column = "dismissed" if term.field == "dismissed" else "findings"
     if value in ("any", "none"):
-        return conditions.compares(column, "=" if value == "none" else ">", "")
-    return conditions.lists(column, _require_choice(term, value))
+        return conditions.compare_condition(column, "=" if value == "none" else ">", "")
+    return conditions.has_list_item(column, _require_choice(term, value))
 
 
 def _gate_condition(term: _Term, value: str) -> Condition:
@@ -254,7 +256,7 @@ def _gate_condition(term: _Term, value: str) -> Condition:
         return conditions.is_flag("solved", False)
     if value == "none":
         return conditions.is_flag("passes", True)
-    return conditions.compares("gate", "=", _require_choice(term, value))
+    return conditions.compare_condition("gate", "=", _require_choice(term, value))
 
 
 def _pictures_condition(term: _Term, value: str) -> Condition:
@@ -262,7 +264,7 @@ def _pictures_condition(term: _Term, value: str) -> Condition:
     choice = _require_choice(term, value)
     if choice == "all":
         return conditions.has_all_pictures()
-    return conditions.compares("pictures", "=" if choice == "none" else ">", 0)
+    return conditions.compare_condition("pictures", "=" if choice == "none" else ">", 0)
 
 
 def _proposal_condition(term: _Term, value: str) -> Condition:
@@ -292,31 +294,31 @@ def _annotations_condition(term: _Term, value: str) -> Condition:
 def _mentions_condition(_term: _Term, value: str) -> Condition:
     """Whom an open thread mentions."""
     if value in ("any", "none"):
-        return _any_or_none_condition(value, conditions.mentions())
-    return conditions.mentions(value.lower())
+        return _any_or_none_condition(value, conditions.mentions_person())
+    return conditions.mentions_person(value.lower())
 
 
 def _view_condition(_term: _Term, value: str) -> Condition:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
-        return conditions.compares("views", "=", int(value[:9]))
-    return conditions.lists("view_keys", value)
+        return conditions.compare_condition("views", "=", int(value[:9]))
+    return conditions.has_list_item("view_keys", value)
 
 
 def _match_condition(_term: _Term, value: str) -> Condition:
-    return conditions.contains("match", value)
+    return conditions.contains_text("match", value)
 
 
 def _text_condition(_term: _Term, value: str) -> Condition:
-    return conditions.either(
-        (conditions.contains("label", value), conditions.contains("key", value))
+    return conditions.any_of(
+        (conditions.contains_text("label", value), conditions.contains_text("key", value))
     )
 
 
 def _exact_text_condition(term: _Term, value: str) -> Condition:
     if value in ("any", "none"):
         missing = conditions.is_empty(term.field)
-        return missing if value == "none" else conditions.opposite(missing)
+        return missing if value == "none" else conditions.negate(missing)
     return conditions.is_text(term.field, value)
 
 

@@ -33,23 +33,23 @@ from app.features.datasets.tables import (
 )
 from app.features.findings.queries import (
     SHOWN,
+    DismissalModel,
     GroupDismissals,
     current_dismissals,
     dismissed_kinds,
-    findings_of,
+    findings_from_rows,
 )
-from app.features.findings.tables import DismissalModel
 from app.features.groups.queries import StoredGroup
-from app.features.people.alias_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor
 from app.features.queue.tables import QueueModel
+from app.features.solutions.codec import SolutionSummary
 from app.features.solutions.queries import (
     SolutionKey,
+    SolutionModel,
     current_solution_id,
     read_solutions,
     read_summary,
 )
-from app.features.solutions.summary import SolutionSummary
-from app.features.solutions.tables import SolutionModel
 from app.features.verdicts.queries import StoredVerdict
 from app.features.verdicts.tables import VerdictModel
 from app.soccer.finding import Finding
@@ -190,7 +190,7 @@ def _queue_rows(session: Session, ids: Sequence[int]) -> list[dict[str, Any]]:
     views, verdicts = _views_by_group(session, ids), _newest_verdicts_by_group(session, ids)
     (findings, dismissals), edited = read_import_findings(session, ids), edited_groups(session, ids)
     heads = _groups_with_summaries(session, ids)
-    own = {head.id: findings_of(findings[head.id], head.inputs_hash) for head, _ in heads}
+    own = {head.id: findings_from_rows(findings[head.id], head.inputs_hash) for head, _ in heads}
     checked = _findings_by_dismissal(session, dismissals, own)
     rows = []
     for head, summary in heads:
@@ -285,7 +285,7 @@ def read_import_findings(
     findings people have dismissed, in one statement.
 
     Returns:
-        Rows for ``findings_of``, and what was dismissed, by group id.
+        Rows for ``findings_from_rows``, and what was dismissed, by group id.
     """
     rows = session.execute(_NOTICED, {"ids": list(ids)}).all()
     found: dict[int, list[Any]] = defaultdict(list)

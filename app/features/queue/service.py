@@ -14,7 +14,7 @@ import numpy as np
 
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
-from app.features.agreement.queries import states_of
+from app.features.agreement.queries import read_group_states
 from app.features.comments.queries import count_open
 from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
@@ -203,7 +203,7 @@ def list_groups(
             more = len(rows) > limit
         ids = [row.group_id for row in rows[:limit]]
         comments, annotations = count_open(session, ids), count_submitted(session, ids)
-        states = states_of(session, list(annotations)) if annotations else {}
+        states = read_group_states(session, list(annotations)) if annotations else {}
     rows = rows[:limit]
     following = encode(parsed, order.keys_of(rows[-1])) if more else None
     found = [
@@ -235,7 +235,7 @@ def list_ids(
     return Ids(tuple(ids), total)
 
 
-def neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
+def find_neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:
     """Where a group stands in a query's order, and up to five groups on either side.
 
     A group that does not match (it was just accepted, say) still has a place in the order.
@@ -309,7 +309,7 @@ ERROR_PERCENT = logarithmic_bins(-2, 1, 6)
 """Of the reprojection error, per cent of the diagonal: from 0.2 px in HD to 220 px."""
 
 
-def places(
+def bin_indices(
     edges: Sequence[float], values: FloatArray, *, open_low: bool, open_high: bool
 ) -> IntArray:
     """The bin of each value, -1 for one in no bin (NaN, or beyond an end that is closed).
@@ -375,7 +375,7 @@ class Summary:
     histograms: dict[str, Histogram]
 
 
-def summary(store: Store, dataset_id: int, query: str = "") -> Summary:
+def summarize_groups(store: Store, dataset_id: int, query: str = "") -> Summary:
     """Progress and histograms over the groups of a dataset that match a query.
 
     Raises:
@@ -404,6 +404,6 @@ def summary(store: Store, dataset_id: int, query: str = "") -> Summary:
 
 def _histogram(column: HistogramColumn, values: Sequence[float | None]) -> Histogram:
     numbers = np.array(values, float)
-    place = places(column.edges, numbers, open_low=True, open_high=column.open_high)
+    place = bin_indices(column.edges, numbers, open_low=True, open_high=column.open_high)
     counts = np.bincount(place[place >= 0], minlength=len(column.edges) - 1)
     return Histogram(column, tuple(counts.tolist()), int(np.isnan(numbers).sum()))

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from app.db.store import Store
 from app.features.people.visibility_queries import is_blind as is_blind
-from app.features.queue.queries import Listing, compares
+from app.features.queue.queries import Listing, compare_condition
 from app.features.queue.query import NUMBERS, parse_query
-from app.features.queue.service import ERROR_PERCENT, SIGMA_M, even_bins, places
+from app.features.queue.service import ERROR_PERCENT, SIGMA_M, bin_indices, even_bins
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 
 
@@ -168,7 +168,7 @@ class Counted:
         return len(self.split)
 
 
-def statistics(store: Store, dataset_id: int, query: str = "") -> Statistics:
+def read_statistics(store: Store, dataset_id: int, query: str = "") -> Statistics:
     """Statistics over the groups of a dataset that match a query.
 
     Raises:
@@ -177,10 +177,10 @@ def statistics(store: Store, dataset_id: int, query: str = "") -> Statistics:
     conditions = parse_query(query).conditions
     with store.read() as session:
         rows = Listing(session, dataset_id, conditions).columns(COLUMNS)
-    return statistics_of(counted(rows))
+    return make_statistics(count_rows(rows))
 
 
-def counted(rows: Sequence[Any]) -> Counted:
+def count_rows(rows: Sequence[Any]) -> Counted:
     """Rows of ``COLUMNS`` as they are counted."""
     nothing: list[tuple[Any, ...]] = [()] * len(COLUMNS)
     split, match, passes, status, *numbers = list(zip(*rows, strict=True)) or nothing
@@ -203,7 +203,7 @@ def counted(rows: Sequence[Any]) -> Counted:
     )
 
 
-def statistics_of(found: Counted) -> Statistics:
+def make_statistics(found: Counted) -> Statistics:
     """The statistics of groups."""
     return Statistics(
         groups=found.groups,
@@ -231,13 +231,15 @@ def bin_query(measure: Measure, place: int) -> str:
 
 
 def _bins(measure: Measure, values: FloatArray) -> IntArray:
-    place = places(measure.edges, values, open_low=measure.open_low, open_high=measure.open_high)
+    place = bin_indices(
+        measure.edges, values, open_low=measure.open_low, open_high=measure.open_high
+    )
     return np.where(np.isnan(values), UNKNOWN, np.where(place < 0, NOWHERE, place))
 
 
 def _cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
     column, row = (
-        places(edges, values, open_low=False, open_high=False)
+        bin_indices(edges, values, open_low=False, open_high=False)
         for edges, values in ((X_EDGES, x), (Y_EDGES, y))
     )
     cell = row * (len(X_EDGES) - 1) + column
@@ -340,7 +342,7 @@ def read_timeline(
     """
     conditions = list(parse_query(query).conditions)
     if match is not None:
-        conditions.append(compares("match", "=", match))
+        conditions.append(compare_condition("match", "=", match))
     with store.read() as session:
         rows = Listing(session, dataset_id, conditions).columns(_SOURCES, by_number=True)
     timeline = Timeline()

@@ -10,7 +10,7 @@ from sqlalchemy import delete, insert, select, update
 from app.db.session import Session, now
 from app.features.datasets.tables import ViewModel
 from app.features.groups.insert_queries import next_id
-from app.features.people.alias_queries import columns_shown
+from app.features.people.visibility_queries import columns_shown
 from app.features.predictions.tables import PredictionModel
 from app.features.recordings.camera_queries import FrameView
 from app.features.recordings.tables import BallRunModel

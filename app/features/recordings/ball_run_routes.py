@@ -23,13 +23,13 @@ from app.features.recordings.ball_runs import (
     remove_run,
 )
 from app.finite import MAX_ID
-from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
+from app.http.documents import document, no_content, responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import QUESTIONS, limit
-from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
 router = APIRouter(

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.errors import NotFoundError
 from app.features.jobs.queries import Job
+from app.features.jobs.schemas import by_job, job_answer
 from app.features.recordings.camera_jobs import request_cameras, request_turn
 from app.features.recordings.camera_output import MEDIA_TYPES, camera_output
 from app.features.recordings.camera_schemas import (
@@ -22,12 +23,11 @@ from app.features.recordings.cameras import get_cameras, list_cameras, pitch_of,
 from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, etag_matches
-from app.http.headers import saved_as
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import document, responds
+from app.http.headers import content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import ZIPS, limit
-from app.http.respond import document, responds
 from app.http.route import Route
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
@@ -139,7 +139,7 @@ def get_file(
     found = get_cameras(store, recording, frame)
     name, content = camera_output(store, found, form)
     headers = {
-        "Content-Disposition": saved_as(name),
+        "Content-Disposition": content_disposition(name),
         "Cache-Control": "private, no-cache",
     }
     return Response(content, media_type=MEDIA_TYPES[form], headers=headers)

@@ -10,7 +10,7 @@ from sqlalchemy.orm import aliased
 
 from app.db.session import Session, now
 from app.features.groups.insert_queries import next_id
-from app.features.people.alias_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor
 from app.features.recordings.tables import RecordingModel, ShotLinkModel
 
 _LIVE, _REPLAY = aliased(RecordingModel), aliased(RecordingModel)

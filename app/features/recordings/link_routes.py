@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from app.features.jobs.queries import Job
+from app.features.jobs.schemas import by_job, job_answer
 from app.features.recordings.link_frames import LinkedFrames, linked_frames
 from app.features.recordings.link_schemas import (
     BallLinkRequest,
@@ -22,13 +23,12 @@ from app.features.recordings.links import add_link, get_link, list_links, remove
 from app.features.recordings.routes import CSV_FILE
 from app.features.tracks.link_ball import request_ball_link
 from app.finite import MAX_ID
-from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import document, no_content, responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import document, no_content, responds
 from app.http.route import Route
 
 router = APIRouter(prefix="/recordings/{recording}", tags=["recordings"], route_class=Route)

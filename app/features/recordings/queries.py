@@ -10,7 +10,7 @@ from sqlalchemy import Select, delete, func, insert, select, update
 from app.db.session import Session, now
 from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
 from app.features.groups.insert_queries import next_id
-from app.features.people.alias_queries import shown_actor
+from app.features.people.visibility_queries import shown_actor
 from app.features.recordings.tables import RecordingModel
 
 

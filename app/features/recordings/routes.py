@@ -11,6 +11,7 @@ from app.canonical import digest_of
 from app.features.datasets.service import dataset_id
 from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, clamp_width
 from app.features.jobs.queries import Job
+from app.features.jobs.schemas import by_job, job_answer
 from app.features.recordings.jobs import (
     InstantOptions,
     request_index,
@@ -35,14 +36,13 @@ from app.features.recordings.service import (
 )
 from app.features.recordings.shots import RecordingShots, get_shots, put_shots, shots_csv
 from app.finite import MAX_ID
-from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DryRun, Id, IfMatch, SeesWhole, etag_matches
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import as_document, document, no_content, responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import IMAGES, limit
-from app.http.respond import as_document, document, no_content, responds
 from app.http.route import Route
 from app.media.images import JPEG
 

@@ -4,12 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sqlalchemy import delete, insert, select
+from sqlalchemy import ForeignKey, UniqueConstraint, delete, insert, select
+from sqlalchemy.orm import Mapped, mapped_column
 
-from app.db.session import Session, now
+from app.db.session import Base, Session, now
 from app.features.groups.insert_queries import next_id
-from app.features.people.alias_queries import shown_actor
-from app.features.saved_views.tables import SavedViewModel
+from app.features.people.visibility_queries import shown_actor
+
+
+class SavedViewModel(Base):
+    """A query of the queue under a name that everybody who works on the dataset sees."""
+
+    __tablename__ = "saved_view"
+    __table_args__ = (UniqueConstraint("dataset_id", "name", name="saved_view_name"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("dataset.id"))
+    name: Mapped[str]
+    query: Mapped[str]
+    actor: Mapped[str]
+    created: Mapped[str]
+
 
 _SAVED = select(
     *(column for column in SavedViewModel.__table__.columns if column.name != "actor"),

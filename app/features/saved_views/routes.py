@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from typing import Annotated
 
-from app.features.datasets.service import dataset_id
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.features.datasets.service import MAX_TITLE, dataset_id
+from app.features.queue.query import MAX_LENGTH
 from app.features.saved_views import service as saved_views
-from app.features.saved_views.schemas import (
-    NewSavedView,
-    ReviewerList,
-    SavedViewList,
-)
 from app.features.saved_views.service import SavedView
 from app.features.verdicts import service as reviewers
+from app.features.verdicts.service import Reviewer
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
+from app.http.documents import ListDocument, document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import document, responds
 from app.http.route import Route
 
 router = APIRouter(tags=["queue"], route_class=Route)
+
+
+class NewSavedView(BaseModel):
+    """A query and the name that it shall have."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"name": "Nearly there", "q": "jac<0.8 jac>0.75"}]},
+    )
+
+    name: Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
+    q: Annotated[str, Field(max_length=MAX_LENGTH)]
+
+
+class SavedViewList(ListDocument[SavedView]):
+    """Saved views, by name."""
+
+
+class ReviewerList(ListDocument[Reviewer]):
+    """Everybody who has judged a group, the most active first."""
 
 
 @router.get(

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import checked_title
-from app.features.people.visibility_queries import judges_in
+from app.features.people.visibility_queries import sees_all_work
 from app.features.queue.fields import reads_hidden_work
 from app.features.queue.queries import Listing
 from app.features.queue.query import parse_query
 from app.features.saved_views.queries import (
+    SavedViewModel,
     dataset_saved_views,
     delete_saved_view,
     find_saved_view,
@@ -115,12 +115,12 @@ def _read_visible_view(session: Session, view_id: int) -> SavedView:
     return _saved_view(row, _count_matching_groups(session, row))
 
 
-def _is_visible(row: Any) -> bool:
+def _is_visible(row: SavedViewModel) -> bool:
     """Whether whoever asks may know of a view: its number of groups answers its query."""
-    return judges_in(row.dataset_id) or not reads_hidden_work(row.query)
+    return sees_all_work(row.dataset_id) or not reads_hidden_work(row.query)
 
 
-def _count_matching_groups(session: Session, row: Any) -> int:
+def _count_matching_groups(session: Session, row: SavedViewModel) -> int:
     """How many groups match; none where a query of an older version is no longer understood."""
     try:
         conditions = parse_query(row.query).conditions
@@ -129,5 +129,5 @@ def _count_matching_groups(session: Session, row: Any) -> int:
     return Listing(session, row.dataset_id, conditions).count()
 
 
-def _saved_view(row: Any, groups: int) -> SavedView:
+def _saved_view(row: SavedViewModel, groups: int) -> SavedView:
     return SavedView(row.id, row.name, row.query, row.actor, row.created, groups)

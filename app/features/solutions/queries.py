@@ -10,36 +10,74 @@ from typing import Any, cast
 from sqlalchemy import (
     BindParameter,
     ColumnElement,
+    ForeignKey,
+    LargeBinary,
     ScalarSelect,
     Table,
+    UniqueConstraint,
     and_,
     bindparam,
     func,
     select,
 )
+from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.statements import insert
 from app.db.json_columns import as_written, inflate, parse
-from app.db.session import Session
+from app.db.session import Base, Session
 from app.errors import ConflictError
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.queue.tables import QueueModel
 from app.features.solutions import codec as value_codec
-from app.features.solutions.summary import SolutionSummary, summarize
-from app.features.solutions.tables import CalibrationModel, SolutionModel
+from app.features.solutions.codec import SolutionSummary, summarize
 from app.finite import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 
 _ELSEWHERE = Calibration(source="", camera=None)
 """Stands in a stored solution for the calibration that is kept under its key."""
-
-
 MOST_SEEN = 200_000
 _SEEN: dict[str, bool] = {}
 """Whether calibrations leave their camera open, by key: they never change."""
 _BATCH = 500
+_KEYS: BindParameter[Any] = bindparam("keys", expanding=True)
+
+
+class CalibrationModel(Base):
+    """A calibration under the key that the solver gives it (compressed JSON)."""
+
+    __tablename__ = "calibration"
+
+    key: Mapped[str] = mapped_column(primary_key=True)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class SolutionModel(Base):
+    """A solution without its calibrations, which ``calibrations`` (JSON list) names.
+
+    ``summary`` (JSON) is what the queue shows of it. ``facts`` is what the gates read of the group
+    (``solving.facts_codec``), NULL for a solution from before they were kept.
+    """
+
+    __tablename__ = "solution"
+    __table_args__ = (
+        UniqueConstraint(
+            "group_id", "inputs_hash", "policy_hash", "solver_version", name="solution_key"
+        ),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    group_id: Mapped[int] = mapped_column(ForeignKey("groups.id"))
+    inputs_hash: Mapped[str]
+    policy_hash: Mapped[str]
+    solver_version: Mapped[str]
+    calibrations: Mapped[str]
+    summary: Mapped[str]
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+    facts: Mapped[bytes | None] = mapped_column(LargeBinary)
+
+
 _SOLUTION = cast(Table, SolutionModel.__table__)
 _SOLUTIONS = select(*_SOLUTION.columns).where(
     _SOLUTION.c.group_id.in_(bindparam("groups", expanding=True)),
@@ -47,7 +85,6 @@ _SOLUTIONS = select(*_SOLUTION.columns).where(
     _SOLUTION.c.inputs_hash.in_(bindparam("inputs", expanding=True)),
 )
 _CALIBRATION = cast(Table, CalibrationModel.__table__)
-_KEYS: BindParameter[Any] = bindparam("keys", expanding=True)
 _CALIBRATIONS = select(*_CALIBRATION.columns).where(_CALIBRATION.c.key.in_(_KEYS))
 _KEPT = select(_CALIBRATION.c.key).where(_CALIBRATION.c.key.in_(_KEYS))
 
@@ -137,14 +174,14 @@ def encode_solution(
         calibrations=calibrations,
         calibration_keys=tuple(view.calibration_key for view in solution.views),
         summary=summarize(group, solution),
-        body=compress(value_codec.to_json(replace(solution, views=bare))),
+        body=compress_json(value_codec.to_json(replace(solution, views=bare))),
         facts=facts,
     )
 
 
 def encode_calibration(calibration: Calibration) -> bytes:
     """A calibration as compressed JSON."""
-    return compress(value_codec.to_json(calibration))
+    return compress_json(value_codec.to_json(calibration))
 
 
 @lru_cache(maxsize=256)
@@ -165,7 +202,7 @@ def decode_camera(body: bytes) -> Calibration:
     return value_codec.from_json(Calibration, parse(text))
 
 
-def compress(value: object) -> bytes:
+def compress_json(value: object) -> bytes:
     """A value of ``value_codec.to_json`` as it is stored."""
     return zlib_ng.compress(value_codec.dumps(value).encode())
 
@@ -287,7 +324,7 @@ def read_summary(text: str) -> SolutionSummary:
     return value_codec.from_json(SolutionSummary, parse(text))
 
 
-def undetermined(session: Session, keys: Collection[str]) -> set[str]:
+def list_undetermined_calibrations(session: Session, keys: Collection[str]) -> set[str]:
     """Those of the keys whose calibration has no camera, or one that its lines leave open."""
     found = {key: _SEEN[key] for key in keys if key in _SEEN}
     unseen = sorted(set(keys) - set(found))

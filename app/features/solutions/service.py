@@ -70,7 +70,7 @@ def contradicted_cameras(
     return found
 
 
-def sentence_of(off: Mapping[str, float], where: str, how: str) -> str:
+def contradiction_sentence(off: Mapping[str, float], where: str, how: str) -> str:
     """What ``contradicted_cameras`` found, and what to do.
 
     Args:
@@ -307,7 +307,7 @@ def solve_dataset(
                 _static_cameras_with_pitches(session, found.id), found.policy
             )
         where = f"{report.failing['jac']:,} of {report.solved:,} groups fail first at the gate jac"
-        report.advice = sentence_of(off, where, _AGAIN) if off else ""
+        report.advice = contradiction_sentence(off, where, _AGAIN) if off else ""
     return report
 
 

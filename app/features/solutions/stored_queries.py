@@ -13,18 +13,19 @@ from app.db.json_columns import Json, as_written, inflate, parse, unpack
 from app.db.session import Session
 from app.errors import StorageError
 from app.features.datasets.tables import DatasetModel, GroupModel, PaintEvidenceModel
-from app.features.paint.queries import reading_of
+from app.features.paint.queries import reading_from_row
 from app.features.solutions import codec as value_codec
+from app.features.solutions.codec import summarize_gates
 from app.features.solutions.queries import (
+    CalibrationModel,
     EncodedSolution,
-    compress,
+    SolutionModel,
+    compress_json,
     decode_solution,
     is_current,
     read_calibrations,
     read_summary,
 )
-from app.features.solutions.summary import summarize_gates
-from app.features.solutions.tables import CalibrationModel, SolutionModel
 from app.soccer.solution import SOLVER_VERSION, Solution
 
 
@@ -75,7 +76,7 @@ class KeptSolution:
             }
             keys = tuple(parse(self.calibrations))
         summary = summarize_gates(read_summary(self.summary), solution)
-        return EncodedSolution({}, keys, summary, compress(value), self.facts)
+        return EncodedSolution({}, keys, summary, compress_json(value), self.facts)
 
 
 def _json_of_changed(
@@ -144,7 +145,7 @@ def solution_batches(session: Session) -> Iterator[Sequence[Any]]:
         after = rows[-1].id
 
 
-def calibrations_of(row: Any) -> list[str]:
+def calibration_keys(row: Any) -> list[str]:
     """Keys of the calibrations that such a row names.
 
     Raises:
@@ -160,7 +161,7 @@ def decode_row(session: Session, row: Any) -> Solution:
     Raises:
         DamagedError: Its body, or a calibration, is not what was written, or is not there.
     """
-    named = calibrations_of(row)
+    named = calibration_keys(row)
     calibrations = read_calibrations(session, named)
     with as_written():
         solution = decode_solution(unpack(row.body), calibrations)
@@ -184,7 +185,7 @@ def damaged_readings(session: Session) -> Iterator[tuple[str, bool]]:
     longer."""
     statement = select(PaintEvidenceModel.digest, PaintEvidenceModel.body)
     for row in _stream_rows(session, statement):
-        yield row.digest, not _is_readable(reading_of, row.digest, row.body)
+        yield row.digest, not _is_readable(reading_from_row, row.digest, row.body)
 
 
 def _stream_rows(session: Session, statement: Select[*tuple[Any, ...]]) -> Iterator[Any]:

@@ -7,16 +7,23 @@ from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
 
 from app.db.idempotency import without_response
 from app.errors import NotFoundError
 from app.features.groups.edit import SetStationCalibration, SetStationLines
 from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document
-from app.features.groups.schemas import GroupDocument, LinesEdit, StationEdit
+from app.features.groups.schemas import (
+    DatasetName,
+    GroupDocument,
+    LineDocuments,
+    LinesEdit,
+    StationEdit,
+    lines_document,
+)
 from app.features.groups.state import GroupState
 from app.features.groups.submit import solve_and_keep
 from app.features.solve.jobs import request_solve
-from app.features.stations.schemas import StationDetail
 from app.features.stations.service import (
     StationState,
     load_station,
@@ -25,17 +32,17 @@ from app.features.stations.service import (
     undo_station,
 )
 from app.finite import MAX_ID
-from app.http.conflicts import current_state
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
+from app.http.documents import responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import LOOKS, limit
-from app.http.respond import responds
 from app.http.route import Route
 from app.http.services import Services
+from app.soccer.choices import CalibrationChoice
 
 router = APIRouter(prefix="/stations", tags=["stations"], route_class=Route)
-
 GroupOfStation = Annotated[
     int | None,
     Query(
@@ -45,6 +52,52 @@ GroupOfStation = Annotated[
     ),
 ]
 STATION_CHANGED: Responses = {**responses(*CONFLICTS), **CHANGED}
+
+
+class StationDetail(BaseModel):
+    """A camera station: the lines that all its views share."""
+
+    id: int
+    dataset: DatasetName
+    key: str
+    shared: bool
+    width: int
+    height: int
+    calibration: CalibrationChoice
+    has_given: bool
+    has_given_covariance: bool = Field(
+        description="Whether its given camera says how far it may be off; an accepted rig does."
+    )
+    flipped: bool
+    lines: LineDocuments
+    proposed: list[str] = Field(
+        description="Markings whose points were accepted as they were proposed from the paint."
+    )
+    not_visible: list[str] = Field(
+        description="Markings that a person says its pictures do not show: JaC does not count them."
+    )
+    groups: int = Field(description="How many groups it takes part in.")
+    revision: int
+    etag: str
+    can_undo: bool
+    can_redo: bool
+
+    @staticmethod
+    def of(state: StationState) -> StationDetail:
+        """The document of a station's state."""
+        station = state.station
+        return StationDetail.model_validate(
+            {
+                **vars(station),
+                **vars(state),
+                **vars(station.size),
+                "dataset": DatasetName(id=state.dataset_id, name=state.dataset),
+                "has_given": station.given is not None,
+                "has_given_covariance": station.given_covariance is not None,
+                "lines": lines_document(station.lines),
+                "groups": len(state.groups),
+            }
+        )
 
 
 @router.get(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from app.db.store import Store
-from app.features.batches.queries import people_of, tracks_given
+from app.features.batches.queries import list_batch_people, tracks_given
 from app.features.datasets.service import dataset_id
 from app.features.tracks.service import Track, list_tracks
 
@@ -65,7 +65,7 @@ def choose_tracks(store: Store, dataset: str | int, choice: TrackChoice) -> list
         given = tracks_given(session, dataset_id(store, dataset))
         ids = {batch for places in given.values() for batch, _ in places}
         people: dict[int, list[str]] = {batch: [] for batch in ids}
-        for row in people_of(session, sorted(ids)):
+        for row in list_batch_people(session, sorted(ids)):
             people[row.batch_id].append(row.name)
     listed = [_listed(track, dict(given.get(track.id, ())), people, choice) for track in tracks]
     found = [one for one in listed if _is_chosen(one, choice)]

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 
 from app.features.jobs.queries import Job
-from app.features.match_estimates.schemas import MatchRequest
+from app.features.jobs.schemas import by_job, job_answer
+from app.features.match_estimates.routes import MatchRequest
 from app.features.tracks import service as tracks
 from app.features.tracks.around import track_around, tracks_of_group
 from app.features.tracks.jobs import TRACKS
@@ -23,14 +24,13 @@ from app.features.tracks.schemas import (
 )
 from app.features.tracks.service import Track
 from app.finite import MAX_ID
-from app.http.conflicts import current_state
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
-from app.http.job_responses import by_job, job_answer
+from app.http.documents import document, responds
+from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import LOOKS, QUESTIONS, limit
-from app.http.respond import document, responds
 from app.http.route import Route
 
 TAGGED = {"headers": {"ETag": {"description": "Of the track.", "schema": {"type": "string"}}}}

@@ -18,7 +18,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.independent_annotations.queries import closed_copies
-from app.features.people.visibility_queries import COPIES, judges_in
+from app.features.people.visibility_queries import COPIES, sees_all_work
 from app.features.queue.fields import reads_hidden_work
 from app.features.queue.queries import Listing, read_columns
 from app.features.queue.query import MAX_LISTED_LENGTH, parse_query
@@ -28,14 +28,14 @@ from app.features.verdicts.queries import (
     Spans,
     StoredBulkVerdict,
     StoredVerdict,
+    append_span,
     find_batch,
     insert_batch,
     insert_verdicts,
     next_verdict_id,
-    pieces,
     read_batches,
+    split_spans,
     update_batch,
-    with_span,
 )
 from app.features.verdicts.service import Verdict, check_verdict
 from app.plural import plural
@@ -237,7 +237,7 @@ def list_batches(
     with store.read() as session:
         while some := read_batches(session, dataset_id, limit, before):
             found += [
-                one for one in some if judges_in(dataset_id) or not reads_hidden_work(one.query)
+                one for one in some if sees_all_work(dataset_id) or not reads_hidden_work(one.query)
             ]
             if len(some) < limit or len(found) >= limit:
                 break
@@ -360,7 +360,7 @@ class BatchRun:
         save_verdicts(session, self._dataset_id, verdicts, actor=self._actor, at=at)
         self.changed += len(verdicts)
         spans = [] if given is None else given.spans
-        self._save_batch(session, at, with_span(spans, [item.id for item in verdicts]))
+        self._save_batch(session, at, append_span(spans, [item.id for item in verdicts]))
 
     def close(self, session: Session) -> None:
         """Say in the log that the batch is complete."""
@@ -421,9 +421,9 @@ def _verdicts(
     ]
 
 
-def chunks(spans: Spans) -> list[tuple[int, int]]:
+def split_for_transactions(spans: Spans) -> list[tuple[int, int]]:
     """The verdicts of some spans in spans of as many as a transaction may have."""
-    return pieces(spans, CHUNK)
+    return split_spans(spans, CHUNK)
 
 
 def save_verdicts(

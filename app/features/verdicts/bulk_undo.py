@@ -16,14 +16,15 @@ from app.features.verdicts.bulk import (
     ASKED,
     BatchRun,
     Refusal,
-    chunks,
     save_verdicts,
     select_groups,
+    split_for_transactions,
 )
 from app.features.verdicts.queries import (
     Spans,
     StoredBulkVerdict,
     StoredVerdict,
+    append_span,
     find_batch,
     inputs_judged,
     judged_between,
@@ -31,7 +32,6 @@ from app.features.verdicts.queries import (
     next_verdict_id,
     read_verdicts,
     update_batch,
-    with_span,
 )
 from app.features.verdicts.service import check_verdict
 
@@ -66,10 +66,10 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     while True:
         with store.write() as session:
             batch = _active_batch(session, batch_id)
-            left = chunks(batch.spans)[number:]
+            left = split_for_transactions(batch.spans)[number:]
             # What another run has taken back is not taken back again: it is not the newest.
             verdicts = _restore_chunk(session, batch, *left[0], actor) if left else []
-            spans = with_span(batch.undo_spans or (), [item.id for item in verdicts])
+            spans = append_span(batch.undo_spans or (), [item.id for item in verdicts])
             update_batch(session, batch_id, undo_spans=spans)
             restored += len({item.group_id for item in verdicts})
             known += len(verdicts)
@@ -233,7 +233,7 @@ def _undo_spans(batch: StoredBulkVerdict) -> Spans:
             "groups",
             hint="Set the verdict again in the queue.",
         )
-    return chunks(batch.undo_spans)
+    return split_for_transactions(batch.undo_spans)
 
 
 def _unfinished_redo(session: Session, batch_id: int, actor: str) -> int | None:

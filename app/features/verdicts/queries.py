@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from sqlalchemy import Table, bindparam, case, func, insert, select, update
 
@@ -18,8 +18,7 @@ from app.features.batches.completion_queries import settle_judged
 from app.features.datasets.tables import GroupModel
 from app.features.groups.insert_queries import next_id
 from app.features.independent_annotations.submission_queries import judge_copy
-from app.features.people.alias_queries import shown_actor
-from app.features.people.visibility_queries import COPIES, seen_in
+from app.features.people.visibility_queries import COPIES, shown_actor, visible_groups_condition
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.finite import json_text
 
@@ -109,9 +108,16 @@ def inputs_judged(
     return {row.group_id: row.inputs_hash for row in session.execute(statement)}
 
 
-def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[Any]:
-    """Rows (actor, last, groups): everybody who judged a group of a dataset, when for the last
-    time, and how many groups since some time."""
+class JudgeCount(NamedTuple):
+    """When a person judged last, and how many groups since some time."""
+
+    actor: str
+    last: str
+    groups: int
+
+
+def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[JudgeCount]:
+    """Everybody who judged a group of a dataset, with the groups that they judged since some time."""
     recent = case((VerdictModel.at >= since, VerdictModel.group_id))
     actor = shown_actor(VerdictModel.actor, VerdictModel.at)
     statement = (
@@ -121,10 +127,13 @@ def count_by_judge(session: Session, dataset_id: int, since: str) -> Sequence[An
             func.count(recent.distinct()).label("groups"),
         )
         .join(GroupModel, GroupModel.id == VerdictModel.group_id)
-        .where(GroupModel.dataset_id == dataset_id, *seen_in(dataset_id, GroupModel.id))
+        .where(
+            GroupModel.dataset_id == dataset_id,
+            *visible_groups_condition(dataset_id, GroupModel.id),
+        )
         .group_by(actor)
     )
-    return session.execute(statement).all()
+    return session.rows(JudgeCount, statement)
 
 
 def next_verdict_id(session: Session) -> int:
@@ -255,7 +264,7 @@ def _batch_columns(values: dict[str, Any]) -> dict[str, Any]:
     return {name: json_text(item) if name in _SPANS else item for name, item in values.items()}
 
 
-def with_span(spans: Spans, ids: Sequence[int]) -> Spans:
+def append_span(spans: Spans, ids: Sequence[int]) -> Spans:
     """Spans together with that of some ids in a row, which often go on where the last one ends."""
     if not ids:
         return spans
@@ -265,7 +274,7 @@ def with_span(spans: Spans, ids: Sequence[int]) -> Spans:
     return [*spans, (first, last)]
 
 
-def pieces(spans: Spans, most: int) -> list[tuple[int, int]]:
+def split_spans(spans: Spans, most: int) -> list[tuple[int, int]]:
     """The same ids in spans of at most so many."""
     return [
         (start, min(start + most - 1, last))

@@ -13,17 +13,17 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.groups.codecs import policy_from_json
-from app.features.people.alias_queries import shown_entries
+from app.features.people.visibility_queries import shown_entries
 from app.features.versions.frozen_queries import (
     SAID,
     SOLUTION,
     fitting_key,
     frozen_batches,
-    json_of,
     known_frozen,
     lost_calibrations,
     members_without_content,
     named_texts,
+    read_json,
 )
 from app.features.versions.queries import all_versions, annotation_rows
 from app.features.versions.service import calibration_names, version_hash
@@ -145,5 +145,5 @@ def _keys_named_in(key: str, body: bytes | None) -> set[str]:
         if fitting_key(key, body) != key:
             raise ValueError(f"{key} is the key of other content")
         if key.startswith(SAID):
-            return named_texts(json_of(body))
-        return calibration_names(json_of(body)) if key.startswith(SOLUTION) else set()
+            return named_texts(read_json(body))
+        return calibration_names(read_json(body)) if key.startswith(SOLUTION) else set()

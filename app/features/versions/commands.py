@@ -61,7 +61,7 @@ def freeze(
 ) -> None:
     """Freeze a dataset as it is now into a version that never changes."""
     from app.features.versions.freeze import MAX_LICENCE, FreezeRequest, plan_freeze
-    from app.features.versions.freeze import freeze as run_freeze
+    from app.features.versions.freeze import freeze_dataset as run_freeze
     from app.soccer.split import Split
 
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))

@@ -122,14 +122,14 @@ def read_diff(session: Session, older: Version, newer: Version) -> VersionDiff:
     )
 
 
-def changelog(store: Store, version_id: int) -> list[str]:
+def version_changelog(store: Store, version_id: int) -> list[str]:
     """What changed since the version before, in sentences."""
     with store.read() as session:
         return read_changelog(session, read_version(session, version_id))
 
 
 def read_changelog(session: Session, version: Version) -> list[str]:
-    """``changelog`` within a session."""
+    """``version_changelog`` within a session."""
     if version.previous is None:
         counts = version.counts
         groups, balls = _count_of_groups(counts["groups"]), plural(counts["balls"], "ball")

@@ -18,7 +18,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
 from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head, require_name
-from app.features.findings.queries import GroupDismissals, findings_of
+from app.features.findings.queries import GroupDismissals, findings_from_rows
 from app.features.groups.codecs import policy_to_json
 from app.features.groups.queries import read_groups
 from app.features.queue.refresh_queries import read_import_findings
@@ -32,12 +32,12 @@ from app.features.versions.frozen_queries import (
     CALIBRATION,
     SOLUTION,
     TRACK,
-    body_of,
-    frames_of,
+    compress_text,
+    frame_places,
     freeze_annotations,
     insert_frozen,
-    json_of,
     known_frozen,
+    read_json,
 )
 from app.features.versions.membership import RULES, Candidate, read_candidates, require_solved
 from app.features.versions.queries import BATCH, has_version, insert_version
@@ -114,13 +114,13 @@ class FreezePlan:
 def plan_freeze(
     store: Store, dataset: str | int, request: FreezeRequest, *, strict: bool = False
 ) -> FreezePlan:
-    """What ``freeze`` would do; saves nothing.
+    """What ``freeze_dataset`` would do; saves nothing.
 
     Args:
         store: The database.
         dataset: Name or id.
         request: What would be frozen.
-        strict: Refuse what ``freeze`` would refuse: no group, or groups that are not solved.
+        strict: Refuse what ``freeze_dataset`` would refuse: no group, or groups that are not solved.
     """
     request.check()
     with store.read() as session:
@@ -143,7 +143,7 @@ def plan_freeze(
     )
 
 
-def freeze(
+def freeze_dataset(
     store: Store,
     dataset: str | int,
     request: FreezeRequest,
@@ -260,13 +260,13 @@ class _Run:
         rows = {}
         for number, item in stored.items():
             annotations, body = freeze_annotations(item.group), solutions[number]
-            key, solved = SOLUTION + digest_of(body), json_of(body)
+            key, solved = SOLUTION + digest_of(body), read_json(body)
             texts.update(annotations.texts)
             bodies[key] = body
             names |= calibration_names(solved)
             rows[number] = self._member(item.group, annotations.key, key, solved)
             if number in dismissals:
-                own = findings_of(noticed[number], item.inputs_hash)
+                own = findings_from_rows(noticed[number], item.inputs_hash)
                 found = [*(_finding(value) for value in solved["findings"]), *own]
                 rows[number]["dismissed"] = _dismissed(found, dismissals[number])
         self._freeze_new(texts, bodies, names)
@@ -285,7 +285,7 @@ class _Run:
             # As ``soccer.ball_boxes.has_ball_3d``: what every format counts as a ball.
             ball = solved["ball"] is not None and view["included"]
             self._balls[side] = self._balls.get(side, 0) + bool(ball)
-        frames = frames_of(group, _facts(group))
+        frames = frame_places(group, _facts(group))
         return {
             "split": split,
             "splits": None if splits is None else canonical(splits),
@@ -302,7 +302,7 @@ class _Run:
         known = known_frozen(self._session, self._dataset.id, {*texts, *bodies, *names})
         fresh: dict[str, bytes | None] = dict.fromkeys(names - known)
         fresh |= {key: body for key, body in bodies.items() if key not in known}
-        fresh |= {key: body_of(text) for key, text in texts.items() if key not in known}
+        fresh |= {key: compress_text(text) for key, text in texts.items() if key not in known}
         if fresh:
             with self._store.write() as session:
                 gone = self._deleted_calibrations(session, names - known)

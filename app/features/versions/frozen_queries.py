@@ -21,8 +21,7 @@ from app.features.groups.codecs import (
     view_from_json,
     view_to_json,
 )
-from app.features.solutions.queries import read_calibration_bodies
-from app.features.solutions.tables import CalibrationModel
+from app.features.solutions.queries import CalibrationModel, read_calibration_bodies
 from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -158,7 +157,7 @@ def _thaw_view(
     return view_from_json({**value, "media": media}, whole)
 
 
-def frames_of(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames | None:
+def frame_places(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Frames | None:
     """Where the frames of a group lie; None where nothing is known of them.
 
     Args:
@@ -222,17 +221,17 @@ def fitting_key(key: str, body: bytes) -> str:
     return prefix + digest_of(body if prefix == SOLUTION else inflate(body))
 
 
-def text_of(body: bytes) -> str:
+def read_text(body: bytes) -> str:
     """The text of frozen JSON."""
     return inflate(body).decode()
 
 
-def json_of(body: bytes) -> Json:
+def read_json(body: bytes) -> Json:
     """The value of frozen JSON."""
     return parse(inflate(body))
 
 
-def body_of(text: str) -> bytes:
+def compress_text(text: str) -> bytes:
     """Frozen JSON of a text."""
     return zlib_ng.compress(text.encode())
 

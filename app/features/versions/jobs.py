@@ -12,7 +12,7 @@ from app.features.datasets.service import get_dataset_head
 from app.features.jobs.queries import DONE, Job
 from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs
-from app.features.versions.freeze import FreezeRequest, freeze, plan_freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset, plan_freeze
 from app.features.versions.service import FREEZE, Version, get_version, list_versions
 from app.features.versions.verify import keep_failure, verify_and_keep
 from app.progress import ReportProgress
@@ -30,7 +30,7 @@ def request_freeze(
     """Freeze a dataset, soon; what can be refused is refused at once.
 
     Raises:
-        InputError, ConflictError: As ``freeze`` does.
+        InputError, ConflictError: As ``freeze_dataset`` does.
     """
     found = get_dataset_head(store, dataset)
     plan_freeze(store, found.id, request, strict=True)
@@ -121,7 +121,9 @@ def version_result(version: Version) -> dict[str, Any]:
 def _freeze_in_worker(
     store: Store, dataset_id: int, request: FreezeRequest, actor: str, progress: ReportProgress
 ) -> Json:
-    return version_result(freeze(store, dataset_id, request, actor=actor, progress=progress))
+    return version_result(
+        freeze_dataset(store, dataset_id, request, actor=actor, progress=progress)
+    )
 
 
 def _verify_in_worker(store: Store, version_id: int, actor: str, progress: ReportProgress) -> Json:

@@ -15,7 +15,7 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
-from app.features.people.alias_queries import columns_shown
+from app.features.people.visibility_queries import columns_shown
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import is_solved
 from app.features.verdicts.tables import VerdictModel

@@ -7,10 +7,10 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Query, Response
 
 from app.features.jobs.queries import Job
-from app.features.jobs.schemas import JobDocument
+from app.features.jobs.schemas import ACCEPTED, JobDocument, by_job, job_answer
 from app.features.versions import jobs as version_jobs
 from app.features.versions import service as versions
-from app.features.versions.diff import changelog, diff_versions
+from app.features.versions.diff import diff_versions, version_changelog
 from app.features.versions.freeze import FreezePlan, plan_freeze
 from app.features.versions.membership import version_manifest
 from app.features.versions.schemas import (
@@ -23,10 +23,9 @@ from app.features.versions.schemas import (
 )
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
-from app.http.job_responses import ACCEPTED, by_job, job_answer
+from app.http.documents import document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.respond import document, responds
 from app.http.route import Route
 
 router = APIRouter(tags=["versions"], route_class=Route)
@@ -120,7 +119,7 @@ def get_manifest(version: VersionId, store: AppStore) -> VersionManifest:
 def get_changelog(version: VersionId, store: AppStore) -> Changelog:
     """What changed since the version before, in sentences."""
     found = versions.get_version(store, version)
-    return Changelog(id=found.id, version=found.name, lines=changelog(store, version))
+    return Changelog(id=found.id, version=found.name, lines=version_changelog(store, version))
 
 
 @router.get("/versions/{version}/diff", operation_id="diffVersions", responses=responses(404))

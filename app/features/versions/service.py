@@ -23,9 +23,9 @@ from app.features.versions.frozen_queries import (
     CALIBRATION,
     FrozenOutline,
     OutlineStation,
-    json_of,
     named_texts,
     read_frozen,
+    read_json,
     thaw_group,
     thaw_outline,
 )
@@ -187,7 +187,9 @@ def read_version(session: Session, version_id: int) -> Version:
     return _versions(session, [row])[0]
 
 
-def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> list[FrozenGroup]:
+def read_frozen_groups(
+    session: Session, version: Version, rows: Sequence[VersionGroup]
+) -> list[FrozenGroup]:
     """Members of a version with their content, calibrations without their markings; at most a few
     hundred.
 
@@ -195,7 +197,7 @@ def thaw(session: Session, version: Version, rows: Sequence[VersionGroup]) -> li
         StorageError: Content is missing.
     """
     bodies = _frozen(session, version, {row.solution or "" for row in rows})
-    solved = [json_of(bodies[row.solution or ""]) for row in rows]
+    solved = [read_json(bodies[row.solution or ""]) for row in rows]
     names = {name for value in solved for name in calibration_names(value)}
     more = _frozen(session, version, names)
     calibrations = {name.removeprefix(CALIBRATION): decode_camera(more[name]) for name in names}
@@ -213,10 +215,10 @@ def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]
         StorageError: Content is missing.
     """
     bodies = _frozen(session, version, {row.said or "" for row in rows})
-    annotations = [json_of(bodies[row.said or ""]) for row in rows]
+    annotations = [read_json(bodies[row.said or ""]) for row in rows]
     shared = {key for value in annotations for key in named_texts(value)}
     more = _frozen(session, version, shared)
-    texts = {key: json_of(more[key]) for key in shared}
+    texts = {key: read_json(more[key]) for key in shared}
     return [
         thaw_group(value, texts, row.frames) for row, value in zip(rows, annotations, strict=True)
     ]

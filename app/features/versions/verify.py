@@ -20,10 +20,10 @@ from app.features.tracks.codec import track_again
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     fitting_key,
-    json_of,
     named_texts,
     read_frozen,
-    text_of,
+    read_json,
+    read_text,
     thaw_group,
 )
 from app.features.versions.queries import (
@@ -231,7 +231,7 @@ def _track_differences(stretch: str, key: str, body: bytes | None) -> Iterator[V
     elif fitting_key(key, body) != key:
         yield VersionDifference(None, place, key, fitting_key(key, body))
     else:
-        value = json_of(body)
+        value = read_json(body)
         now = track_again(value)
         for name, frozen in value["track"].items():
             if canonical(now[name]) != canonical(frozen):
@@ -279,7 +279,7 @@ class _VerifyTasks:
 
     def _make_task(self, rows: tuple[VersionGroup, ...], frozen: Mapping[str, bytes]) -> VerifyTask:
         sound = (row for row in rows if not _missing_keys(row, frozen))
-        annotations = (json_of(frozen[row.said or ""]) for row in sound)
+        annotations = (read_json(frozen[row.said or ""]) for row in sound)
         known = self._calibrate_static_cameras(
             [thaw_group(value, _named_values(value, frozen)) for value in annotations]
         )
@@ -303,9 +303,9 @@ def _named_parts(row: VersionGroup, frozen: Mapping[str, bytes]) -> set[str]:
     """Keys that the annotations and the solution of a group name, as far as those are there."""
     names: set[str] = set()
     if row.said is not None and row.said in frozen:
-        names |= named_texts(json_of(frozen[row.said]))
+        names |= named_texts(read_json(frozen[row.said]))
     if row.solution is not None and row.solution in frozen:
-        names |= calibration_names(json_of(frozen[row.solution]))
+        names |= calibration_names(read_json(frozen[row.solution]))
     return names
 
 
@@ -316,7 +316,7 @@ def _missing_keys(row: VersionGroup, frozen: Mapping[str, bytes]) -> list[str]:
 
 
 def _named_values(annotations: Json, frozen: Mapping[str, bytes]) -> dict[str, Json]:
-    return {key: json_of(frozen[key]) for key in named_texts(annotations)}
+    return {key: read_json(frozen[key]) for key in named_texts(annotations)}
 
 
 def _group_differences(
@@ -328,7 +328,7 @@ def _group_differences(
         return
     try:
         yield from _frozen_differences(row, task)
-        annotations = json_of(task.frozen[row.said or ""])
+        annotations = read_json(task.frozen[row.said or ""])
         group = thaw_group(annotations, _named_values(annotations, task.frozen))
         yield from _split_differences(row, group, task.splitter)
         yield from _solution_differences(row, group, task, known)
@@ -340,7 +340,7 @@ def _group_differences(
 def _frozen_differences(row: VersionGroup, task: VerifyTask) -> Iterator[VersionDifference]:
     """Parts that are not what their key says."""
     annotations, solution = row.said or "", row.solution or ""
-    for key in (annotations, *named_texts(json_of(task.frozen[annotations])), solution):
+    for key in (annotations, *named_texts(read_json(task.frozen[annotations])), solution):
         found = fitting_key(key, task.frozen[key])
         if found != key:
             yield VersionDifference(row.key, "digest", key, found)
@@ -372,16 +372,16 @@ def _solution_differences(
             pairs.append(("calibration.", frozen, body))
     for place, then, now in pairs:
         # Texts, not bytes: another zlib may pack the same text in another way.
-        if text_of(then) != text_of(now):
+        if read_text(then) != read_text(now):
             yield from _unequal_leaves(row.key, place, _parse_frozen(then), _parse_frozen(now))
-    point = json_of(encoded.body)["ball"]
+    point = read_json(encoded.body)["ball"]
     if row.ball != (tuple(point["point"]) if point else None):
         yield VersionDifference(row.key, "ball", row.ball, point and point["point"])
 
 
 def _parse_frozen(body: bytes) -> Json:
     try:
-        return json.loads(text_of(body))
+        return json.loads(read_text(body))
     except ValueError as error:
         raise StorageError("a frozen part is damaged") from error
 

@@ -97,7 +97,7 @@ def read_messages(session: Session, webhook: Any, dataset: str) -> list[Message]
     ]
 
 
-def ping(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
+def ping_message(webhook_id: int, dataset: str, at: str, actor: str) -> Message:
     """A message that says nothing."""
     stamp = "".join(letter for letter in at if letter.isdigit())
     body = _message_body(Kind.PING, at, {"dataset": dataset, "actor": actor})
@@ -164,7 +164,7 @@ def webhook_secret(settings: Settings, salt: str) -> str:
     return f"whsec_{b64encode(made).decode()}"
 
 
-def sign(secret: str, message: str, at: datetime, body: str) -> dict[str, str]:
+def sign_message(secret: str, message: str, at: datetime, body: str) -> dict[str, str]:
     """Headers of a message (standardwebhooks.com)."""
     return {
         "webhook-id": message,

@@ -6,7 +6,7 @@ A message is written in the transaction that it tells of.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
 
@@ -15,9 +15,9 @@ from app.db.dialects.statements import insert
 from app.db.json_columns import Json, parse
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session, now
-from app.features.batches.queries import batch_of, count_work, people_of
+from app.features.batches.queries import count_work, find_batch, list_batch_people
 from app.features.datasets.queries import dataset_name
-from app.features.jobs.tables import JobModel
+from app.features.jobs.queries import JobModel
 from app.features.webhooks.tables import DeliveryModel, WebhookModel
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
@@ -28,19 +28,19 @@ _WEBHOOKS = select(*WebhookModel.__table__.columns)
 _DELIVERIES = select(*DeliveryModel.__table__.columns)
 
 
-def webhooks_of(session: Session, dataset_id: int) -> Sequence[WebhookModel]:
+def read_webhooks(session: Session, dataset_id: int) -> Sequence[WebhookModel]:
     """Every webhook of a dataset, in the order in which they were made."""
     mine = WebhookModel.dataset_id == dataset_id
     return session.rows(WebhookModel, _WEBHOOKS.where(mine).order_by(WebhookModel.id))
 
 
-def webhook_of(session: Session, dataset_id: int, webhook_id: int) -> WebhookModel | None:
+def find_webhook(session: Session, dataset_id: int, webhook_id: int) -> WebhookModel | None:
     """A webhook of a dataset."""
     where = (WebhookModel.id == webhook_id, WebhookModel.dataset_id == dataset_id)
     return session.row(WebhookModel, _WEBHOOKS.where(*where))
 
 
-def webhooks_on(session: Session) -> Sequence[WebhookModel]:
+def list_active_webhooks(session: Session) -> Sequence[WebhookModel]:
     """Every webhook that is told."""
     return session.rows(WebhookModel, _WEBHOOKS.where(WebhookModel.off.is_(None)))
 
@@ -75,21 +75,46 @@ def delete_webhook(session: Session, webhook_id: int) -> None:
     session.execute(delete(WebhookModel).where(WebhookModel.id == webhook_id))
 
 
-def entries_since(session: Session, dataset_id: int, log_id: int, most: int) -> Sequence[Any]:
-    """Rows (id, kind, actor, at, group_id) of a dataset's log after an entry, in order."""
+class LoggedEvent(NamedTuple):
+    """An entry of a dataset's log that webhooks may be told of."""
+
+    id: int
+    kind: str
+    actor: str
+    at: str
+    group_id: int | None
+
+
+def entries_since(
+    session: Session, dataset_id: int, log_id: int, most: int
+) -> Sequence[LoggedEvent]:
+    """Entries of a dataset's log after one of them, in order."""
     columns = (LogModel.id, LogModel.kind, LogModel.actor, LogModel.at, LogModel.group_id)
     where = (
         LogModel.id > log_id,
         LogModel.dataset_id == dataset_id,
         LogModel.kind.not_in((*DEEDS, *_DISTINCT_KINDS)),
     )
-    return session.execute(select(*columns).where(*where).order_by(LogModel.id).limit(most)).all()
+    return session.rows(
+        LoggedEvent, select(*columns).where(*where).order_by(LogModel.id).limit(most)
+    )
+
+
+class EndedJob(NamedTuple):
+    """A job of a dataset that ended."""
+
+    id: int
+    kind: str
+    title: str
+    state: str
+    actor: str
+    ended: str
 
 
 def jobs_ended_since(
     session: Session, dataset_id: int, ended: str, job_id: int, states: Iterable[str]
-) -> Sequence[Any]:
-    """Rows (id, kind, title, state, actor, ended) of a dataset's jobs that ended after another one."""
+) -> Sequence[EndedJob]:
+    """Jobs of a dataset that ended after another one."""
     columns = (
         JobModel.id,
         JobModel.kind,
@@ -101,7 +126,7 @@ def jobs_ended_since(
     later = tuple_(JobModel.ended, JobModel.id) > tuple_(ended, job_id)
     where = (JobModel.dataset_id == dataset_id, later, JobModel.state.in_(states))
     order = (JobModel.ended, JobModel.id)
-    return session.execute(select(*columns).where(*where).order_by(*order)).all()
+    return session.rows(EndedJob, select(*columns).where(*where).order_by(*order))
 
 
 def insert_delivery(session: Session, webhook_id: int, message: str, kind: str, body: str) -> bool:
@@ -153,7 +178,7 @@ def next_due(session: Session) -> str | None:
     )
 
 
-def deliveries_of(
+def read_deliveries(
     session: Session, webhook_id: int, before: int | None, most: int
 ) -> Sequence[DeliveryModel]:
     """What a webhook was told, newest first, from below an id."""
@@ -164,7 +189,7 @@ def deliveries_of(
     return session.rows(DeliveryModel, statement)
 
 
-def delivery_of(session: Session, webhook_id: int, delivery_id: int) -> DeliveryModel | None:
+def find_delivery(session: Session, webhook_id: int, delivery_id: int) -> DeliveryModel | None:
     """A delivery of a webhook."""
     where = (DeliveryModel.id == delivery_id, DeliveryModel.webhook_id == webhook_id)
     return session.row(DeliveryModel, _DELIVERIES.where(*where))
@@ -225,7 +250,7 @@ DISPUTED = "group.disputed"
 HANDED_BACK = "group.handed_back"
 
 
-def listeners(session: Session, dataset_id: int, kind: str) -> list[int]:
+def list_listeners(session: Session, dataset_id: int, kind: str) -> list[int]:
     """Ids of the webhooks of a dataset that are told of a kind."""
     table = WebhookModel
     on = (table.dataset_id == dataset_id, table.off.is_(None))
@@ -256,7 +281,7 @@ def announce(
         batch_id: The batch that it is about, as it is then.
         also: What else is told.
     """
-    hooks = listeners(session, dataset_id, kind)
+    hooks = list_listeners(session, dataset_id, kind)
     if not hooks:
         return 0
     data: dict[str, Json] = {"dataset": dataset_name(session, dataset_id), "actor": actor}
@@ -268,20 +293,20 @@ def announce(
 
 def announce_batch(session: Session, batch_id: int, kind: str, *, actor: str, at: str) -> int:
     """``announce`` what became of a batch at a time; nothing where it is gone."""
-    row = batch_of(session, batch_id)
+    row = find_batch(session, batch_id)
     if row is None:
         return 0
-    event = f"batch{batch_id}_{kind.partition('.')[2]}{stamp(at)}"
+    event = f"batch{batch_id}_{kind.partition('.')[2]}{time_suffix(at)}"
     return announce(session, row.dataset_id, kind, event, actor=actor, at=at, batch_id=batch_id)
 
 
 def batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
     """What a message says of a batch; None where it is gone."""
-    row = batch_of(session, batch_id)
+    row = find_batch(session, batch_id)
     if row is None:
         return None
     count = count_work(session, [batch_id]).get(batch_id)
-    people = [(one.part, one.name) for one in people_of(session, [batch_id])]
+    people = [(one.part, one.name) for one in list_batch_people(session, [batch_id])]
     return {
         "id": row.id,
         "name": row.name,
@@ -296,6 +321,6 @@ def batch_values(session: Session, batch_id: int) -> dict[str, Any] | None:
     }
 
 
-def stamp(at: str) -> str:
+def time_suffix(at: str) -> str:
     """A time as a part of a message's id."""
     return "".join(letter for letter in at if letter.isdigit())

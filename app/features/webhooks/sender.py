@@ -21,17 +21,17 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, ReviewError
 from app.features.batches.progress import notify_of_stalls
 from app.features.datasets.queries import dataset_names
-from app.features.webhooks.messages import Message, read_messages, sign, webhook_secret
+from app.features.webhooks.messages import Message, read_messages, sign_message, webhook_secret
 from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,
     arrived_since,
     due_deliveries,
     insert_delivery,
+    list_active_webhooks,
     next_due,
     update_delivery,
     update_webhook,
-    webhooks_on,
 )
 
 _PORTS = {"http": 80, "https": 443}
@@ -200,13 +200,13 @@ class WebhookSender:
     def look(self) -> int:
         """Write down what webhooks have not been told yet; returns how many messages that makes."""
         with self._store.read() as session:
-            rows = webhooks_on(session)
+            rows = list_active_webhooks(session)
             names = dataset_names(session) if rows else {}
             found = [(row, read_messages(session, row, names[row.dataset_id])) for row in rows]
         if not any(messages for _, messages in found):
             return 0
         with self._store.write() as session:
-            still = {row.id: row for row in webhooks_on(session)}
+            still = {row.id: row for row in list_active_webhooks(session)}
             return sum(
                 _queue_messages(session, row, messages)
                 for row, messages in found
@@ -303,7 +303,9 @@ class WebhookSender:
     async def _post_delivery(self, client: httpx.AsyncClient, row: Any) -> int:
         settings = self._store.settings
         require_allowed(row.url, settings.webhooks)
-        headers = sign(webhook_secret(settings, row.salt), row.message, self._clock(), row.body)
+        headers = sign_message(
+            webhook_secret(settings, row.salt), row.message, self._clock(), row.body
+        )
         headers["Content-Type"] = "application/json"
         async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:
             return answer.status_code

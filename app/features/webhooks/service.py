@@ -15,22 +15,22 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.queries import dataset_name
 from app.features.datasets.service import dataset_id
-from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping, webhook_secret
+from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping_message, webhook_secret
 from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,
     WAITING,
     count_deliveries,
     delete_webhook,
-    deliveries_of,
-    delivery_of,
+    find_delivery,
+    find_webhook,
     insert_delivery,
     insert_webhook,
+    read_deliveries,
+    read_webhooks,
     update_delivery,
     update_webhook,
     waiting_of_kind,
-    webhook_of,
-    webhooks_of,
 )
 from app.features.webhooks.sender import require_allowed
 from app.finite import Moment
@@ -106,7 +106,7 @@ def make_webhook(
     number, salt = dataset_id(store, dataset), new_salt()
     secret = webhook_secret(store.settings, salt)
     with store.write() as session:
-        if len(webhooks_of(session, number)) >= MOST:
+        if len(read_webhooks(session, number)) >= MOST:
             raise ConflictError(
                 f"a dataset has at most {MOST} webhooks", hint="Delete one of them."
             )
@@ -176,7 +176,9 @@ def list_deliveries(
     number = dataset_id(store, dataset)
     with store.read() as session:
         _read_webhook(session, number, webhook_id)
-        return [_delivery_from_row(row) for row in deliveries_of(session, webhook_id, before, most)]
+        return [
+            _delivery_from_row(row) for row in read_deliveries(session, webhook_id, before, most)
+        ]
 
 
 def send_again(store: Store, dataset: str, webhook_id: int, delivery_id: int) -> Delivery:
@@ -184,10 +186,10 @@ def send_again(store: Store, dataset: str, webhook_id: int, delivery_id: int) ->
     number = dataset_id(store, dataset)
     with store.write() as session:
         _require_turned_on(_read_webhook(session, number, webhook_id))
-        if delivery_of(session, webhook_id, delivery_id) is None:
+        if find_delivery(session, webhook_id, delivery_id) is None:
             raise NotFoundError(f"this webhook has no delivery {delivery_id}")
         update_delivery(session, delivery_id, {"state": WAITING, "attempts": 0, "next_at": now()})
-        return _delivery_from_row(delivery_of(session, webhook_id, delivery_id))
+        return _delivery_from_row(find_delivery(session, webhook_id, delivery_id))
 
 
 def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Delivery:
@@ -198,10 +200,10 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
         waiting = waiting_of_kind(session, webhook_id, Kind.PING)
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
-            return _delivery_from_row(delivery_of(session, webhook_id, waiting.id))
-        message = ping(webhook_id, dataset_name(session, number), now(), actor)
+            return _delivery_from_row(find_delivery(session, webhook_id, waiting.id))
+        message = ping_message(webhook_id, dataset_name(session, number), now(), actor)
         insert_delivery(session, webhook_id, message.id, message.kind, message.body)
-        return _delivery_from_row(deliveries_of(session, webhook_id, None, 1)[0])
+        return _delivery_from_row(read_deliveries(session, webhook_id, None, 1)[0])
 
 
 def _require_turned_on(webhook: Webhook) -> None:
@@ -227,14 +229,14 @@ def _checked_kinds(kinds: Iterable[Kind]) -> list[str]:
 
 
 def _read_webhook(session: Session, dataset: int, webhook_id: int) -> Webhook:
-    row = webhook_of(session, dataset, webhook_id)
+    row = find_webhook(session, dataset, webhook_id)
     if row is None:
         raise NotFoundError(f"this dataset has no webhook {webhook_id}")
     return _webhook_from_row(row, count_deliveries(session, [webhook_id]))
 
 
 def _read_webhooks(session: Session, dataset: int) -> list[Webhook]:
-    rows = webhooks_of(session, dataset)
+    rows = read_webhooks(session, dataset)
     counts = count_deliveries(session, [row.id for row in rows])
     return [_webhook_from_row(row, counts) for row in rows]
 

@@ -31,7 +31,7 @@ from app.features.what_if.cache import (
     cache_block_list,
     cached_table,
 )
-from app.features.what_if.table import EMPTY, YieldTable, join_tables, table_of
+from app.features.what_if.table import EMPTY, YieldTable, join_tables, make_table
 from app.solving.facts import NOTHING, Facts, group_facts
 from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
 
@@ -55,8 +55,8 @@ def read_tables(session: Session, rows: Sequence[Any]) -> tuple[YieldTable, Yiel
         )
         solved = [row for row in chunk if row.group_id in found]
         others += [row for row in chunk if row.group_id not in found]
-        tables.append(table_of(solved, facts_from_bytes([found[row.group_id] for row in solved])))
-    return join_tables([table_of([], NOTHING), *tables]), table_of(others, NOTHING)
+        tables.append(make_table(solved, facts_from_bytes([found[row.group_id] for row in solved])))
+    return join_tables([make_table([], NOTHING), *tables]), make_table(others, NOTHING)
 
 
 def _read_facts(session: Session, solution_ids: Sequence[int]) -> dict[int, bytes]:

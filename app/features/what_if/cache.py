@@ -16,7 +16,7 @@ import numpy as np
 import structlog
 
 from app.durable import replace_file
-from app.features.what_if.block_results import BlockResults, noise_of
+from app.features.what_if.block_results import BlockResults, click_noise
 from app.features.what_if.table import FIGURES, HEADS, YieldTable
 from app.finite import json_text
 from app.geometry.arrays import BoolArray, IntArray
@@ -278,7 +278,7 @@ def delete_table(folder: Path) -> None:
 
 
 def _policy_key(policy: Policy) -> list[Any]:
-    return [policy.hash, *noise_of(policy)]
+    return [policy.hash, *click_noise(policy)]
 
 
 def _block_path(folder: Path, name: str) -> Path:

@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from app.features.what_if.block_results import map_in_threads, noise_of
-from app.features.what_if.counts import (
+from app.features.what_if.block_results import (
     DISTANCES,
     FINDINGS,
     GroupCounts,
     Leak,
+    click_noise,
     find_split_leaks,
+    map_in_threads,
     sum_counts,
 )
 from app.features.what_if.service import Block, Snapshot, YieldStore
@@ -110,7 +111,7 @@ def get_yield(
         return block.count_present if same else block.count_under(policy)
 
     # Who tries another noise judges every group anew; else threads would wait for each other.
-    side_by_side = noise_of(policy) != noise_of(snapshot.policy)
+    side_by_side = click_noise(policy) != click_noise(snapshot.policy)
     total = sum_counts((map_in_threads if side_by_side else map)(count_block, snapshot.blocks))
     return _make_yield(snapshot, policy, total, unanswered)
 

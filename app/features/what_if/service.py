@@ -15,9 +15,14 @@ from app.db.check import Check
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError, OverloadedError, ReviewError
-from app.features.datasets.queries import dataset_names, find_dataset, policy_of
+from app.features.datasets.queries import dataset_names, find_dataset, policy_from_row
 from app.features.groups.revision_queries import count_changes, count_groups
-from app.features.what_if.block_results import BlockResults, map_in_threads
+from app.features.what_if.block_results import (
+    BlockResults,
+    GroupCounts,
+    count_table_groups,
+    map_in_threads,
+)
 from app.features.what_if.blocks import DatasetBlocks
 from app.features.what_if.cache import (
     ARRAYS,
@@ -27,7 +32,6 @@ from app.features.what_if.cache import (
     delete_table,
     map_arrays,
 )
-from app.features.what_if.counts import GroupCounts, count_table_groups
 from app.features.what_if.table import EMPTY, YieldTable, join_tables
 from app.geometry.arrays import BoolArray
 from app.plural import plural
@@ -308,7 +312,7 @@ def read_policy(session: Session, dataset_id: int) -> Policy:
     row = find_dataset(session, dataset_id)
     if row is None:
         raise NotFoundError.dataset(dataset_id)
-    return policy_of(row.policy)
+    return policy_from_row(row.policy)
 
 
 def _not_ready_error(kept: _YieldEntry) -> OverloadedError:

@@ -22,7 +22,7 @@ from app.errors import NotFoundError
 from app.features.datasets.queries import dataset_names
 from app.features.groups.revision_queries import changed_group_ids, count_groups, newest_change_id
 from app.features.queue.queries import columns_from, read_columns
-from app.features.queue.statistics import COLUMNS, Counted, Statistics, counted, statistics_of
+from app.features.queue.statistics import COLUMNS, Counted, Statistics, count_rows, make_statistics
 from app.features.verdicts.queries import judged_since, newest_verdict
 from app.features.what_if.cache import map_arrays, write_arrays
 from app.features.what_if.service import AT_ONCE, read_policy
@@ -86,7 +86,7 @@ class StatisticsStore:
                 self._kept.pop(dataset_id, None)
                 self._cache_file(dataset_id).unlink(missing_ok=True)
                 raise
-        return statistics_of(found.counted)
+        return make_statistics(found.counted)
 
     def refresh_large_datasets(self) -> None:
         """Read those datasets that would let somebody wait."""
@@ -128,12 +128,12 @@ def _read_all_columns(session: Session, dataset_id: int, policy: str) -> _Datase
     ids, parts = [], []
     for rows in _column_batches(session, dataset_id):
         ids.append(np.array([row[0] for row in rows], np.int64))
-        parts.append(counted([row[1:] for row in rows]))
+        parts.append(count_rows([row[1:] for row in rows]))
     return _DatasetColumns(
         policy,
         **_current_marks(session),
         group_id=np.concatenate(ids or [np.zeros(0, np.int64)]),
-        counted=_join_counted(parts) if parts else counted([]),
+        counted=_join_counted(parts) if parts else count_rows([]),
     )
 
 
@@ -169,7 +169,7 @@ def _update_columns(session: Session, dataset_id: int, kept: _DatasetColumns) ->
     stays = ~np.isin(kept.group_id, np.array(ids, np.int64))
     group_id = np.concatenate([kept.group_id[stays], new])
     joined = _join_counted(
-        [_select_groups(kept.counted, stays), counted([row[1:] for row in rows])]
+        [_select_groups(kept.counted, stays), count_rows([row[1:] for row in rows])]
     )
     order = np.argsort(group_id, kind="stable")
     return _DatasetColumns(

@@ -140,7 +140,7 @@ class YieldTable:
         )
 
 
-def table_of(rows: Sequence[Any], facts: Facts) -> YieldTable:
+def make_table(rows: Sequence[Any], facts: Facts) -> YieldTable:
     """The table of rows as ``groups_from`` returns them, with their facts or none."""
     splits, split = _encode_names([row.split for row in rows])
     matches, match = _encode_names([row.match for row in rows])
@@ -190,4 +190,4 @@ def _join_encoded_names(
     return tuple(different), np.concatenate(codes)
 
 
-EMPTY = table_of([], NOTHING)
+EMPTY = make_table([], NOTHING)

@@ -24,9 +24,8 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import InputError, JobCancelled, NotFoundError, OverloadedError, StorageError
 from app.features.datasets.service import dataset_id
-from app.features.exports.folder import ExportFolder
-from app.features.exports.jobs import export_work
-from app.features.exports.service import export
+from app.features.exports.jobs import ExportFolder, export_work
+from app.features.exports.service import export_dataset
 from app.features.imports.sources import Source, import_source
 from app.features.jobs import runner as job_run
 from app.features.jobs.runner import JobProgress
@@ -61,8 +60,8 @@ class TestExports:
     ) -> None:
         settings = imported.settings
         out = target_path(settings, "s3://frames/out/league.zip")
-        export(imported, "league", "coco", out, everything=True, images="copy")
-        local = export(
+        export_dataset(imported, "league", "coco", out, everything=True, images="copy")
+        local = export_dataset(
             imported, "league", "coco", tmp_path / "l.zip", everything=True, images="copy"
         )
         data, _ = out.store.read_whole(out.key, 2**30)
@@ -79,7 +78,7 @@ class TestExports:
         self, settings: Settings, imported: Store, door: ClassLimiter
     ) -> None:
         out = target_path(settings, "s3://frames/out/twice.zip")
-        export(imported, "league", "parquet", out, everything=True)
+        export_dataset(imported, "league", "parquet", out, everything=True)
         before = out.store.head(out.key)
         with pytest.raises(RuntimeError), out.store.writing(out.key, "application/zip") as file:
             file.write(b"half of it")
@@ -87,27 +86,27 @@ class TestExports:
         assert out.store.head(out.key) == before
         door.writes_fail_after = 0
         with pytest.raises(StorageError, match="refuses the keys"):
-            export(imported, "league", "soccernet-v3", out, everything=True, images="copy")
+            export_dataset(imported, "league", "soccernet-v3", out, everything=True, images="copy")
         door.reset()
         assert out.store.head(out.key) == before
-        export(imported, "league", "soccernet-v3", out, everything=True)
+        export_dataset(imported, "league", "soccernet-v3", out, everything=True)
         assert out.store.head(out.key) != before
 
     def test_the_manifest_is_written_last_and_removed_first_when_a_folder_is_exported_again(
         self, settings: Settings, imported: Store, door: ClassLimiter
     ) -> None:
         out = target_path(settings, "s3://frames/out/folder")
-        export(imported, "league", "soccernet-v3", out, everything=True, images="copy")
+        export_dataset(imported, "league", "soccernet-v3", out, everything=True, images="copy")
         written = [line.rsplit("/", 1)[-1] for line in door.asked if line.startswith("PUT")]
         assert written[-1] == "manifest.json"
         first = {item.key for item in out.store.below(out.key)}
-        export(imported, "league", "soccernet-v3", out, everything=True)
+        export_dataset(imported, "league", "soccernet-v3", out, everything=True)
         second = {item.key for item in out.store.below(out.key)}
         assert second < first and f"{out.key}/manifest.json" in second
         door.reset()
         door.writes_fail_after = 1
         with pytest.raises(StorageError):
-            export(imported, "league", "soccernet-v3", out, everything=True)
+            export_dataset(imported, "league", "soccernet-v3", out, everything=True)
         door.reset()
         with pytest.raises(NotFoundError):
             out.store.head(f"{out.key}/manifest.json")
@@ -117,7 +116,7 @@ class TestExports:
             open_store(settings, "frames").put(key, b"somebody's own")
         for name in ("own.zip", "own", ""):
             with pytest.raises(InputError, match=r"not an earlier export|name a folder"):
-                export(
+                export_dataset(
                     imported,
                     "league",
                     "parquet",
@@ -131,7 +130,7 @@ class TestExports:
     ) -> None:
         closed = stored_settings(tmp_path / "closed", door, exports=False)
         with pytest.raises(InputError, match="only read from"):
-            export(
+            export_dataset(
                 imported,
                 "league",
                 "parquet",

@@ -18,7 +18,7 @@ from app.db.home import (
 )
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.datasets.orphan_queries import expire_cache
+from app.features.datasets.queries import expire_cache
 from app.features.imports.upload_queries import UploadWriter, get_upload, keep_upload
 from tests.unit.db.homes import say
 
@@ -214,7 +214,7 @@ class TestExpireCache:
         age(folder / "b.jpg")
         found = [(str(folder), [], ["a.jpg", "b.jpg"])]
         monkeypatch.setattr(
-            "app.features.datasets.orphan_queries.os.walk",
+            "app.features.datasets.queries.os.walk",
             lambda top: found if top == settings.cache else [],
         )
         assert expire_cache(settings) == 1

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from app.errors import InputError
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.formats.cameras_reader import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.parquet_reader import read_parquet
@@ -40,7 +40,7 @@ class TestWideLenses:
     ) -> None:
         fill(group)
         with pytest.raises(InputError, match=f"{kind} has no place for the {lens} lens of view"):
-            export(store, "demo", kind, tmp_path / "out", everything=True)
+            export_dataset(store, "demo", kind, tmp_path / "out", everything=True)
         assert not (tmp_path / "out").exists()
 
     @pytest.mark.parametrize("kind", ["issia", "issia-3d"])
@@ -53,18 +53,20 @@ class TestWideLenses:
         station = replace(view.station, given=camera)
         fill(group.with_view(replace(view, station=station)))
         with pytest.raises(InputError, match=f"lens of view {view.key} of group 10"):
-            export(store, "demo", kind, tmp_path / "out", everything=True)
+            export_dataset(store, "demo", kind, tmp_path / "out", everything=True)
 
     @pytest.mark.parametrize("kind", ["soccernet-v3", "gamestate", "yolo"])
     def test_a_format_without_cameras_does_not_mind(
         self, store, fill, group, tmp_path, kind
     ) -> None:
         fill(group)
-        assert export(store, "demo", kind, tmp_path / "out", everything=True).counts["groups"]
+        assert export_dataset(store, "demo", kind, tmp_path / "out", everything=True).counts[
+            "groups"
+        ]
 
     def test_camera_files_bring_it_back(self, store, fill, group, lens, tmp_path) -> None:
         fill(group)
-        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        export_dataset(store, "demo", "cameras", tmp_path / "out", everything=True)
         found = read_cameras(tmp_path / "out", Report())
         (camera,) = [camera for camera in found.values() if camera.is_wide]
         assert camera == group.views[1].station.given
@@ -76,6 +78,6 @@ class TestWideLenses:
         self, store, fill, group, tmp_path, kind, read
     ) -> None:
         fill(group)
-        out = export(store, "demo", kind, tmp_path / "out", everything=True).out
+        out = export_dataset(store, "demo", kind, tmp_path / "out", everything=True).out
         (again,) = read(out, Report())
         assert again.views[1].station.given == group.views[1].station.given

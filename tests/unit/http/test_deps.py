@@ -9,8 +9,8 @@ import pytest
 
 from app.errors import InputError
 from app.http.deps import get_actor, get_services, get_store, require_if_match
+from app.http.documents import get_keyed_request
 from app.http.errors import PreconditionRequiredError
-from app.http.respond import get_keyed_request
 
 
 class TestRequireIfMatch:

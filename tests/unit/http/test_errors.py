@@ -29,7 +29,12 @@ from app.errors import (
 from app.features.batches.service import Presence
 from app.features.groups.schemas import LinesEdit
 from app.features.people.schemas import NewSession
-from app.http.errors import PreconditionRequiredError, StaleStateError, install_handlers, status_of
+from app.http.errors import (
+    PreconditionRequiredError,
+    StaleStateError,
+    http_status,
+    install_handlers,
+)
 
 
 class RefusalError(Exception):
@@ -77,7 +82,7 @@ CASES: list[tuple[ReviewError, int]] = [
 class TestStatusOf:
     @pytest.mark.parametrize(("error", "status"), CASES, ids=lambda v: str(v)[:20])
     def test_each_branch_of_the_tree_has_its_status(self, error: ReviewError, status: int) -> None:
-        assert status_of(error) == status
+        assert http_status(error) == status
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from structlog.testing import capture_logs
 
 from app.errors import InputError
 from app.http.errors import install_handlers
-from app.http.headers import FIXED, SecurityHeaders, content_security_policy, saved_as
+from app.http.headers import FIXED, SecurityHeaders, content_disposition, content_security_policy
 from app.http.request_log import RequestLog
 
 
@@ -80,7 +80,7 @@ class TestMistakes:
 
 class TestSavedAs:
     def test_a_name_of_any_letters_is_a_header_that_browsers_read(self) -> None:
-        assert saved_as("cup_0-5.npz") == 'attachment; filename="cup_0-5.npz"'
-        assert saved_as('Łódź "1".npz', "inline") == (
+        assert content_disposition("cup_0-5.npz") == 'attachment; filename="cup_0-5.npz"'
+        assert content_disposition('Łódź "1".npz', "inline") == (
             "inline; filename=\"__d_ _1_.npz\"; filename*=UTF-8''%C5%81%C3%B3d%C5%BA%20%221%22.npz"
         )

@@ -22,8 +22,7 @@ from starlette.testclient import TestClient
 
 from app.db.store import Store
 from app.errors import DamagedError, StorageError
-from app.features.groups.large_edit_routes import LargeGroupSolver
-from app.features.groups.preview_routes import PreviewSolver
+from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.features.imports.ingest import ingest
 from app.http import metrics
 from app.http.request_limits import EDITS, REQUEST_CLASSES

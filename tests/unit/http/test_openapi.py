@@ -8,7 +8,7 @@ from jsonschema import Draft202012Validator
 from openapi_spec_validator import validate
 
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
-from app.http.route import routes_of
+from app.http.route import list_routes
 
 Document = dict[str, Any]
 
@@ -118,7 +118,7 @@ class TestDocument:
         assert count > 100
 
     def test_says_with_what_one_may_ask(self, app, document) -> None:
-        routes = dict(routes_of(app))
+        routes = dict(list_routes(app))
         schemes = document["components"]["securitySchemes"]
         assert (schemes["session"]["in"], schemes["token"]["scheme"]) == ("cookie", "bearer")
         assert document["security"] == [{"session": []}, {"token": []}, {}]

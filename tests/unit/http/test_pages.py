@@ -11,8 +11,7 @@ import pytest
 from fastapi import FastAPI
 
 from app.http.errors import install_handlers
-from app.http.pages import PAGES, install_pages
-from app.http.site import Site, script_hashes
+from app.http.pages import PAGES, Site, install_pages, script_hashes
 
 
 class TestPages:

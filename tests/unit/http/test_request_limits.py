@@ -36,15 +36,15 @@ from app.http.request_limits import (
     ClassLimiter,
     ClassLimiters,
     RequestClass,
-    turn,
+    wait_for_turn,
 )
-from app.http.route import routes_of
+from app.http.route import list_routes
 from app.main import PREFIX
 
 
 class TestLaneOf:
     def test_stands_with_the_route(self, app: FastAPI) -> None:
-        lanes_of = {name: route.lane for name, route in routes_of(app)}
+        lanes_of = {name: route.lane for name, route in list_routes(app)}
         for lane, names in {
             LOOKS: (
                 "GET /groups/{group}",
@@ -96,7 +96,7 @@ class TestLaneOf:
                 assert lanes_of[f"{method} {PREFIX}{path}"] is lane, name
 
     def test_health_waits_for_nobody_and_pages_for_each_other_alone(self, app: FastAPI) -> None:
-        lanes_of = {name: route.lane for name, route in routes_of(app)}
+        lanes_of = {name: route.lane for name, route in list_routes(app)}
         free = {name for name, lane in lanes_of.items() if lane is None}
         styles = "GET /assets/{version}/all.css"
         assert free == {"GET /healthz", "GET /readyz", "GET /metrics", styles}
@@ -126,7 +126,7 @@ class TestLaneOf:
     def test_every_route_that_changes_something_has_one(self, app: FastAPI) -> None:
         assert [
             name
-            for name, route in routes_of(app)
+            for name, route in list_routes(app)
             if not name.startswith("GET ") and route.lane in (None, LOOKS, READS, STREAMS, ZIPS)
         ] == []
 
@@ -172,7 +172,7 @@ class Service:
             scope[LOGIN] = Named(who)
 
         async def run() -> None:
-            async with turn(self.doors.of(lane, scope), scope) as refusal:
+            async with wait_for_turn(self.doors.of(lane, scope), scope) as refusal:
                 response = refusal or await self.app(scope)
             self.statuses.append(response.status_code)
             self.bodies.append(bytes(response.body))

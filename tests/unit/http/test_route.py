@@ -13,7 +13,7 @@ from app.http.bodies import MAX_STRANGERS_BYTES
 from app.http.errors import install_handlers
 from app.http.permissions import Action, OwnedKind, Where, may, open_to_all
 from app.http.request_limits import ClassLimiters
-from app.http.route import Gate, Route, answer_no_route, require_permissions, routes_of
+from app.http.route import Gate, Route, answer_no_route, list_routes, require_permissions
 
 JSON = [(b"content-type", b"application/json")]
 BYTES = {"requestBody": {"content": {"application/octet-stream": {}}}}
@@ -206,7 +206,7 @@ class TestPermissions:
             require_permissions(mounted)
 
     def test_every_route_of_the_application_is_known_by_its_address(self, app: FastAPI) -> None:
-        routes = dict(routes_of(app))
+        routes = dict(list_routes(app))
         assert len(routes) > 200
         ball = routes["PATCH /api/v1/views/{view}/ball"].permission
         assert (ball.action, dict(ball.names)) == (Action.ANNOTATE, {"view": OwnedKind.VIEW})

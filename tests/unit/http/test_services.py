@@ -12,8 +12,8 @@ import pytest
 from app import features
 from app.config import Settings
 from app.errors import BusyError
+from app.features.maintenance import upkeep as upkeep
 from app.features.match_estimates.jobs import MatchJob
-from app.features.upkeep import service as upkeep
 from app.http import services as module
 from app.http.services import STOP_SECONDS, Services
 

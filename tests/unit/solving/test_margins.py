@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.features.solutions.summary import summarize
+from app.features.solutions.codec import summarize
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, group, view

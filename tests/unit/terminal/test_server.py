@@ -23,14 +23,13 @@ from app.db.store import Store
 from app.errors import InputError, UnsafePathError
 from app.features.batches.service import get_batch
 from app.features.imports.ingest import ingest
-from app.features.independent_annotations.gold_queries import mark_gold, unmark_gold
+from app.features.independent_annotations.queries import mark_gold, unmark_gold
 from app.features.people.access_tokens import new_token_text
 from app.features.people.logins import Login
 from app.features.people.roles import DatasetRoles, Role, Scope
 from app.features.people.service import invite
-from app.features.policies.text import policy_to_yaml
-from app.features.predictions.evaluation import get_evaluation
-from app.features.predictions.folder import evaluation_values
+from app.features.policies.service import policy_to_yaml
+from app.features.predictions.evaluation import evaluation_values, get_evaluation
 from app.features.predictions.service import list_predictions
 from app.features.solutions.service import solve_dataset
 from app.features.solve.jobs import solve_fully

@@ -10,25 +10,24 @@ from app.evaluation.agreement_limits import AgreementLimits
 from app.features.agreement import service as weigh
 from app.features.agreement.adjudicate import (
     adopt_into_group,
-    decide,
+    decide_case,
     get_case,
     list_waiting,
     return_for_correction,
 )
-from app.features.agreement.compare import read_limits, set_limits
-from app.features.agreement.service import BY_ITSELF, after_submission
+from app.features.agreement.service import BY_ITSELF, after_submission, read_limits, set_limits
 from app.features.groups.edit import SetBall
-from app.features.groups.history import history
+from app.features.groups.history import read_history
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
+from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
-from app.features.independent_annotations.return_work import return_annotation
 from app.features.independent_annotations.service import (
     get_annotation,
     list_annotations,
 )
-from app.features.integrity.database import examine
+from app.features.integrity.database import examine_database
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.queue.service import list_groups
@@ -58,7 +57,7 @@ def ball_x(state: GroupState) -> float:
 
 
 def kinds(store: Store, group_id: int) -> list[tuple[str, str]]:
-    return [(entry.kind, entry.actor) for entry in history(store, group_id)]
+    return [(entry.kind, entry.actor) for entry in read_history(store, group_id)]
 
 
 class TestAfterHandIn:
@@ -73,7 +72,7 @@ class TestAfterHandIn:
         assert ("agreement", BY_ITSELF) in kinds(store, state.id)
         assert all(get_annotation(store, one.id).settled for one in (first, second))
         assert list_waiting(store, state.dataset) == []
-        assert [str(check) for check in examine(store) if not check.ok] == []
+        assert [str(check) for check in examine_database(store) if not check.ok] == []
 
     @pytest.mark.parametrize(("moved", "comes_to"), [(2.0, "agreed"), (40.0, "open")])
     def test_what_a_stopped_server_left_is_compared_by_the_next_one(
@@ -148,14 +147,14 @@ class TestDecide:
         case = get_case(store, state.id, actor="lea")
         assert [take.person for take in case.annotations] == ["ann", "ben"]
         assert not case.own and case.refused is None
-        after = decide(store, state.id, takes[1].id, actor="lea")
+        after = decide_case(store, state.id, takes[1].id, actor="lea")
         assert ball_x(after) == ball_x(state) + 40
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "lea")
         said = kinds(store, state.id)
         assert ("edit", "ben") in said and ("agreement", "lea") in said
         with pytest.raises(NotFoundError, match="waits for a decision"):
-            decide(store, state.id, takes[0].id, actor="lea")
-        assert [str(check) for check in examine(store) if not check.ok] == []
+            decide_case(store, state.id, takes[0].id, actor="lea")
+        assert [str(check) for check in examine_database(store) if not check.ok] == []
 
     def test_is_done_whole_or_not_at_all(self, store, state, takes, monkeypatch) -> None:
         before = kinds(store, state.id)
@@ -164,18 +163,18 @@ class TestDecide:
             raise OSError("the power went")
 
         with monkeypatch.context() as broken:
-            broken.setattr(weigh, "give_verdict_of", fail)
+            broken.setattr(weigh, "copy_verdict_to_original", fail)
             with pytest.raises(OSError, match="power"):
-                decide(store, state.id, takes[1].id, actor="lea")
+                decide_case(store, state.id, takes[1].id, actor="lea")
         assert load(store, state.id).etag == state.etag
         assert kinds(store, state.id) == before
         assert not any(get_annotation(store, one.id).settled for one in takes)
         assert [one.group for one in list_waiting(store, state.dataset)] == [state.id]
-        after = decide(store, state.id, takes[1].id, actor="lea")
+        after = decide_case(store, state.id, takes[1].id, actor="lea")
         assert (ball_x(after), after.verdict.actor) == (ball_x(state) + 40, "lea")
 
     def test_begins_a_third_one_without_a_verdict_of_who_decided(self, store, state, takes) -> None:
-        after = decide(store, state.id, takes[1].id, as_start=True, actor="lea")
+        after = decide_case(store, state.id, takes[1].id, as_start=True, actor="lea")
         assert ball_x(after) == ball_x(state) + 40
         assert after.verdict.actor == "ben"
         assert list_waiting(store, state.dataset) == []
@@ -189,11 +188,11 @@ class TestDecide:
         invite(store, "rob", Role.REVIEWER, actor="lea")
         assert "rob can decide" in (get_case(store, state.id, actor="ann (token x)").refused or "")
         with pytest.raises(ForbiddenError, match="rob can decide"):
-            decide(store, state.id, takes[0].id, actor="ann")
+            decide_case(store, state.id, takes[0].id, actor="ann")
 
     def test_takes_nothing_that_does_not_wait_here(self, store, state, takes) -> None:
         with pytest.raises(NotFoundError, match="annotation 99"):
-            decide(store, state.id, 99, actor="lea")
+            decide_case(store, state.id, 99, actor="lea")
 
 
 class TestHandBack:
@@ -243,7 +242,7 @@ class TestHandBack:
             "submissions:none": every - 1, "submissions>=0": every,
         }  # fmt: skip
         assert {query: found(query) for query in asked} == asked
-        decide(store, state.id, takes[1].id, actor="lea")
+        decide_case(store, state.id, takes[1].id, actor="lea")
         assert [found(f"annotations:{one}") for one in ("waiting", "decided")] == [0, 1]
         assert (
             list_groups(store, state.dataset_id, "submissions:2").items[0].annotations == "decided"

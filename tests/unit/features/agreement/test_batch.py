@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.db.store import Store
-from app.features.agreement.adjudicate import decide, get_case, list_waiting
+from app.features.agreement.adjudicate import decide_case, get_case, list_waiting
 from app.features.agreement.service import after_submission
 from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.progress import my_work
@@ -73,7 +73,7 @@ def test_what_agrees_is_over_and_the_rest_waits_for_the_third(store, batch) -> N
     group = waiting[0].group
     assert load(store, group).verdict.state == "unreviewed"
     case = get_case(store, group, actor="cy")
-    after = decide(store, group, case.annotations[1].id, actor="cy")
+    after = decide_case(store, group, case.annotations[1].id, actor="cy")
     assert (after.verdict.state, after.verdict.actor) == ("accepted", "cy")
     assert get_batch(store, batch.id).settled == 2
     assert list_waiting(store, batch.dataset_id) == []

@@ -6,9 +6,9 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.audit.audit_events import adopt, adopted_by
-from app.features.groups.history import history
-from app.features.groups.replay import replay
+from app.features.audit.audit_events import assign_local_work, find_owner_of_local_work
+from app.features.groups.history import read_history
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
@@ -18,7 +18,7 @@ from app.features.people.service import find_person, invite
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import list_reviewers, set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.queries import all_versions
 from tests.scenes import make_scenes
 
@@ -49,7 +49,7 @@ def test_the_work_of_before_is_shown_as_theirs_and_the_log_keeps_its_name(store:
     scene = make_scenes(groups=1, seed=3, faults=False)[0].group
     ingest(store, "d", [scene], source="files", actor="local")
     solve_dataset(store, "d")
-    freeze(store, "d", FreezeRequest(name="v1", groups="passing"), actor="local")
+    freeze_dataset(store, "d", FreezeRequest(name="v1", groups="passing"), actor="local")
     judge(store, "deferred", "local")
     with store.write() as session:
         insert_job(session, NewJob("export", "before", "local", 1))
@@ -57,16 +57,18 @@ def test_the_work_of_before_is_shown_as_theirs_and_the_log_keeps_its_name(store:
     invite(store, "anna", Role.LEAD, actor="local")
     anna = find_person(store, "anna").id
     assert shown(store) == ("local", "local", ["local"])
-    assert adopt(store, anna, actor="ada") == "anna"
+    assert assign_local_work(store, anna, actor="ada") == "anna"
     assert shown(store) == ("anna", "anna", ["anna"])
-    assert {entry.actor for entry in history(store, 1)} == {"anna"}
+    assert {entry.actor for entry in read_history(store, 1)} == {"anna"}
     assert list_groups(store, 1, "reviewer:anna", 10, None, None).total == 1
 
     with store.read() as session:
-        assert replay(session) == read_state_snapshot(session), "the log, its chain and the tables"
+        assert replay_log(session) == read_state_snapshot(session), (
+            "the log, its chain and the tables"
+        )
     with pytest.raises(ConflictError, match=r"shown as .* already"):
-        adopt(store, anna, actor="ada")
-    assert adopted_by(store) == "anna"
+        assign_local_work(store, anna, actor="ada")
+    assert find_owner_of_local_work(store) == "anna"
 
     judge(store, "rejected", "local")
     with store.write() as session:

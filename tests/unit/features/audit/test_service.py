@@ -14,15 +14,14 @@ from app.features.audit.service import KINDS, Family, every_entry, read_audit
 from app.features.batches.service import NewBatch, change_batch, make_batch, remove_batch
 from app.features.comments.service import begin_thread
 from app.features.groups.edit import IncludeView, SetBall, SetLines
+from app.features.groups.history import redo, undo
 from app.features.groups.replay import _STEPS
 from app.features.groups.submit import load, submit, submit_all
-from app.features.groups.undo import redo, undo
 from app.features.jobs.service import Jobs
 from app.features.people.links import use_link
 from app.features.people.logins import Logins
-from app.features.people.members import give_role
 from app.features.people.roles import DatasetRoles, Role
-from app.features.people.service import invite
+from app.features.people.service import give_role, invite
 from app.features.people.visibility_queries import EVERYTHING
 from app.features.verdicts.service import set_verdict
 from tests.waiting import SECONDS

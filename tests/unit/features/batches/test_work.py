@@ -26,9 +26,9 @@ from app.features.batches.service import (
     read_batch,
     remove_batch,
 )
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.submit import load
-from app.features.independent_annotations.gold import mark, unmark
+from app.features.independent_annotations.gold import mark_group, unmark_group
 from app.features.independent_annotations.queries import INDEPENDENT, annotation_of_copy
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import person_by_name
@@ -77,7 +77,7 @@ def leases(store, clock) -> Leases:
 
 def make_gold(store, group: int) -> None:
     judge(store, group, "cy")
-    mark(store, group, "imported", actor="cy")
+    mark_group(store, group, "imported", actor="cy")
 
 
 def judge(store, group: int, actor: str, state: str = "rejected") -> None:
@@ -129,7 +129,7 @@ class TestBatch:
         with pytest.raises(NotFoundError):
             get_batch(store, batch.id)
         with store.read() as session:
-            replay(session)
+            replay_log(session)
 
 
 class TestGoldGroups:
@@ -148,7 +148,7 @@ class TestGoldGroups:
         assert [(one.id, one.gold_every) for one in list_batches(store, dataset)] == [(plain, None)]
         make_gold(store, groups[5])
         change_batch(store, plain, gold_every=2, actor="lead")
-        unmark(store, groups[5], actor="cy")
+        unmark_group(store, groups[5], actor="cy")
         assert change_batch(store, plain, gold_every=2, name="c", actor="lead").name == "c"
 
     @pytest.mark.parametrize(
@@ -309,7 +309,7 @@ class TestLeases:
         lease = leases.submit(batch, groups[3], ADA, actor="ada")
         assert lease.batch.submitted == 1 and my_work(store, lambda _: ADA)[0].returned == []
         with store.read() as session:
-            assert groups[3] in replay(session).groups
+            assert groups[3] in replay_log(session).groups
 
     @pytest.mark.parametrize("every", [0, 1001])
     def test_gold_groups_come_at_least_once_in_a_thousand(self, store, dataset, groups, every):
@@ -386,7 +386,7 @@ class TestLeases:
         self, store, dataset, groups, leases, monkeypatch
     ):
         batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead").id
-        look = leases_module.own_of
+        look = leases_module.find_own_annotation
 
         def closing(*arguments):
             found = look(*arguments)
@@ -394,7 +394,7 @@ class TestLeases:
             change_batch(store, batch, actor="lead", state="closed")
             return found
 
-        monkeypatch.setattr(leases_module, "own_of", closing)
+        monkeypatch.setattr(leases_module, "find_own_annotation", closing)
         with pytest.raises(ConflictError, match="closed"):
             leases.submit(batch, groups[0], ADA, actor="ada")
 

@@ -9,16 +9,15 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, InputError, NotFoundError
 from app.features.comments import service as comments
-from app.features.groups.history import history
-from app.features.groups.replay import rebuild
+from app.features.groups.history import read_history
+from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import read_etags
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify, read_all, read_notifications
 from app.features.people.logins import Login, read_roles
-from app.features.people.members import give_role
 from app.features.people.queries import person_by_name
 from app.features.people.roles import Role
-from app.features.people.service import change_person, invite
+from app.features.people.service import change_person, give_role, invite
 from app.features.queue.changes import read_changes
 from app.features.queue.service import list_groups
 
@@ -57,7 +56,7 @@ class TestThreads:
         thread = comments.begin_thread(
             store, group, " Is this the ball? ", actor="anna", view="7_1.png", at=(612.0, 330.5)
         )
-        comments.reply(store, group, thread.id, "It is.", actor="bob (token lens)")
+        comments.add_reply(store, group, thread.id, "It is.", actor="bob (token lens)")
         (read,) = comments.list_threads(store, group)
         assert (read.view, read.x, read.y, read.resolved) == ("7_1.png", 612.0, 330.5, None)
         said = [(one.actor, one.text) for one in read.comments]
@@ -67,18 +66,20 @@ class TestThreads:
         thread = comments.begin_thread(store, group, "One", actor="anna")
         mine = thread.comments[0].id
         for change in (
-            lambda: comments.change(store, group, thread.id, mine, "Two", actor="bob"),
-            lambda: comments.remove(store, group, thread.id, mine, actor="bob"),
+            lambda: comments.edit_comment(store, group, thread.id, mine, "Two", actor="bob"),
+            lambda: comments.delete_comment(store, group, thread.id, mine, actor="bob"),
         ):
             with pytest.raises(ForbiddenError):
                 change()
-        changed = comments.change(store, group, thread.id, mine, "Two", actor="anna (token x)")
+        changed = comments.edit_comment(
+            store, group, thread.id, mine, "Two", actor="anna (token x)"
+        )
         assert (changed.comments[0].text, changed.comments[0].edited is not None) == ("Two", True)
-        comments.reply(store, group, thread.id, "Three", actor="bob")
-        comments.remove(store, group, thread.id, mine, actor="anna")
+        comments.add_reply(store, group, thread.id, "Three", actor="bob")
+        comments.delete_comment(store, group, thread.id, mine, actor="anna")
         (read,) = comments.list_threads(store, group)
         assert [one.text for one in read.comments] == [None, "Three"]
-        comments.remove(store, group, thread.id, read.comments[1].id, actor="bob")
+        comments.delete_comment(store, group, thread.id, read.comments[1].id, actor="bob")
         assert comments.list_threads(store, group) == []
 
     def test_what_cannot_be_said_is_refused_with_its_field(self, store: Store, group: int) -> None:
@@ -97,11 +98,11 @@ class TestThreads:
         thread = comments.begin_thread(store, group, "One", actor="anna")
         mine = thread.comments[0].id
         for asked in (
-            lambda: comments.reply(store, other, thread.id, "Two", actor="anna"),
-            lambda: comments.resolve(store, other, thread.id, True, actor="anna"),
-            lambda: comments.change(store, other, thread.id, mine, "Two", actor="anna"),
-            lambda: comments.remove(store, other, thread.id, mine, actor="anna"),
-            lambda: comments.change(store, group, thread.id, 99, "Two", actor="anna"),
+            lambda: comments.add_reply(store, other, thread.id, "Two", actor="anna"),
+            lambda: comments.resolve_thread(store, other, thread.id, True, actor="anna"),
+            lambda: comments.edit_comment(store, other, thread.id, mine, "Two", actor="anna"),
+            lambda: comments.delete_comment(store, other, thread.id, mine, actor="anna"),
+            lambda: comments.edit_comment(store, group, thread.id, 99, "Two", actor="anna"),
         ):
             with pytest.raises(NotFoundError):
                 asked()
@@ -112,7 +113,7 @@ class TestThreads:
         assert list_groups(store, 1).items[0].comments == 1
         asked = ("comments:open", "comments:resolved", "mentions:bob", "mentions:anna")
         assert [found(store, query) for query in asked] == [1, 0, 1, 0]
-        comments.resolve(store, group, thread.id, True, actor="bob")
+        comments.resolve_thread(store, group, thread.id, True, actor="bob")
         assert list_groups(store, 1).items[0].comments == 0
         assert [found(store, query) for query in asked] == [0, 1, 0, 0]
         assert [found(store, f"comments:{word}") for word in ("any", "none")] == [1, 0]
@@ -125,10 +126,10 @@ class TestLog:
         with store.read() as session:
             before, position = read_etags(session, [group]), newest_entry(session)
         thread = comments.begin_thread(store, group, "One", actor="anna")
-        comments.change(store, group, thread.id, thread.comments[0].id, "Two", actor="anna")
-        comments.resolve(store, group, thread.id, True, actor="bob")
-        comments.remove(store, group, thread.id, thread.comments[0].id, actor="anna")
-        said = [entry for entry in history(store, group) if entry.kind == "comment"]
+        comments.edit_comment(store, group, thread.id, thread.comments[0].id, "Two", actor="anna")
+        comments.resolve_thread(store, group, thread.id, True, actor="bob")
+        comments.delete_comment(store, group, thread.id, thread.comments[0].id, actor="anna")
+        said = [entry for entry in read_history(store, group) if entry.kind == "comment"]
         assert [(one.actor, one.body["did"], one.body.get("text")) for one in said] == [
             ("anna", "said", "One"),
             ("anna", "edited", "Two"),
@@ -145,7 +146,7 @@ class TestLog:
         self, store: Store, group: int
     ) -> None:
         comments.begin_thread(store, group, "@anna One", actor="bob")
-        rebuild(store)
+        rebuild_tables(store)
         (thread,) = comments.list_threads(store, group)
         assert (thread.comments[0].text, thread.comments[0].mentions) == ("@anna One", ("anna",))
 
@@ -161,28 +162,28 @@ class TestMentions:
     def test_only_who_sees_the_group_can_be_completed_and_is_told(
         self, store: Store, group: int
     ) -> None:
-        assert comments.people_of(store, group) == ["anna", "bob"]
+        assert comments.list_mentionable_people(store, group) == ["anna", "bob"]
         thread = comments.begin_thread(store, group, "@bob @carl @nobody @anna", actor="anna")
         assert thread.comments[0].mentions == ("anna", "bob")
         assert [told(store, name) for name in ("anna", "bob", "carl")] == [[], ["mention"], []]
         with store.read() as session:
             carl = person_by_name(session, "carl").id
         give_role(store, "demo", carl, Role.VIEWER, actor="local")
-        assert comments.people_of(store, group) == ["anna", "bob", "carl"]
+        assert comments.list_mentionable_people(store, group) == ["anna", "bob", "carl"]
         assert told(store, "carl") == []
 
     def test_who_spoke_before_hears_of_a_reply_and_who_is_named_once(
         self, store: Store, group: int
     ) -> None:
         thread = comments.begin_thread(store, group, "One", actor="anna")
-        comments.reply(store, group, thread.id, "Two", actor="bob")
-        comments.reply(store, group, thread.id, "@bob three", actor="anna")
+        comments.add_reply(store, group, thread.id, "Two", actor="bob")
+        comments.add_reply(store, group, thread.id, "@bob three", actor="anna")
         assert told(store, "anna") == ["reply"]
         assert told(store, "bob") == ["mention"]
 
     def test_who_spoke_through_a_token_hears_of_a_reply(self, store: Store, group: int) -> None:
         thread = comments.begin_thread(store, group, "One", actor="anna (token lens)")
-        comments.reply(store, group, thread.id, "Two", actor="bob")
+        comments.add_reply(store, group, thread.id, "Two", actor="bob")
         assert told(store, "anna") == ["reply"]
 
     def test_who_is_disabled_is_not_mentioned(self, store: Store, group: int) -> None:
@@ -197,10 +198,12 @@ class TestMentions:
     ) -> None:
         thread = comments.begin_thread(store, group, "@bob look", actor="anna")
         mine = thread.comments[0].id
-        comments.change(store, group, thread.id, mine, "@bob @local look here", actor="anna")
+        comments.edit_comment(store, group, thread.id, mine, "@bob @local look here", actor="anna")
         assert told(store, "bob") == ["mention"]
         other = comments.begin_thread(store, group, "look", actor="anna")
-        comments.change(store, group, other.id, other.comments[0].id, "@bob look", actor="anna")
+        comments.edit_comment(
+            store, group, other.id, other.comments[0].id, "@bob look", actor="anna"
+        )
         assert told(store, "bob") == ["mention", "mention"]
 
     def test_a_thread_is_full_some_day(
@@ -208,9 +211,9 @@ class TestMentions:
     ) -> None:
         monkeypatch.setattr(comments, "MOST", 2)
         thread = comments.begin_thread(store, group, "One", actor="anna")
-        comments.reply(store, group, thread.id, "Two", actor="bob")
+        comments.add_reply(store, group, thread.id, "Two", actor="bob")
         with pytest.raises(ConflictError, match="at most 2 comments"):
-            comments.reply(store, group, thread.id, "Three", actor="bob")
+            comments.add_reply(store, group, thread.id, "Three", actor="bob")
 
 
 class TestBell:

@@ -10,7 +10,7 @@ from app.features.datasets.queries import (
     find_dataset,
     group_ids,
     insert_dataset_row,
-    policy_of,
+    policy_from_row,
     update_policy,
 )
 from app.soccer.policy import PAPER, STRICT
@@ -37,7 +37,7 @@ class TestDatasets:
             update_policy(session, added, STRICT)
             rows = dataset_rows(session)
             assert [row.id for row in rows] == [added, 1]
-            assert (policy_of(rows[0].policy), rows[0].policy_hash) == (STRICT, STRICT.hash)
+            assert (policy_from_row(rows[0].policy), rows[0].policy_hash) == (STRICT, STRICT.hash)
             assert dataset_names(session) == {1: "demo", added: "alder"}
             assert dataset_name(session, added) == "alder"
             assert (group_ids(session, 1), group_ids(session, added)) == ([1], [])

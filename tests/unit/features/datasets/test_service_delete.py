@@ -12,24 +12,23 @@ from app.errors import ConflictError, NotFoundError, StorageError
 from app.features.datasets import service as module
 from app.features.datasets.service import delete_dataset, get_dataset, list_datasets, read_contents
 from app.features.groups.edit import SetBall
-from app.features.groups.history import history
-from app.features.groups.replay import rebuild, replay
+from app.features.groups.history import read_history
+from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins, read_roles
-from app.features.people.members import give_role
 from app.features.people.roles import DatasetRoles, Role, Scope
-from app.features.people.service import invite
+from app.features.people.service import give_role, invite
 from app.features.queue.service import list_groups
 from app.features.saved_views.service import save_view
+from app.features.solutions.queries import CalibrationModel
 from app.features.solutions.service import solve_dataset
-from app.features.solutions.tables import CalibrationModel
 from app.features.tables import Base
 from app.features.verdicts.bulk import give_verdicts
-from app.features.webhooks.queries import insert_webhook, webhooks_of
+from app.features.webhooks.queries import insert_webhook, read_webhooks
 from app.features.what_if.service import YieldStore
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
@@ -107,8 +106,8 @@ class TestDeleteDataset:
         assert log_entries(two) == [*before, ("dataset_deleted", 1)]
         with two.read() as session:
             assert verify_chain(session) == len(before) + 1
-            assert replay(session) == read_state_snapshot(session)
-        assert rebuild(two) == 2
+            assert replay_log(session) == read_state_snapshot(session)
+        assert rebuild_tables(two) == 2
 
     def test_no_id_is_given_again(self, two: Store, make_group) -> None:
         old = [row.id for row in list_groups(two, 2, limit=500).items]
@@ -119,11 +118,11 @@ class TestDeleteDataset:
         (row,) = list_groups(two, 3).items
         assert row.id > max(old)
         with pytest.raises(NotFoundError):
-            history(two, old[0])
+            read_history(two, old[0])
         with pytest.raises(NotFoundError):
             load(two, old[0])
         with two.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_calibrations_that_the_other_dataset_uses_stay(self, two: Store) -> None:
         assert rows(two, "calibration") == 3
@@ -159,7 +158,7 @@ class TestDeleteDataset:
             delete_dataset(two, "demo", confirm="demo", actor="eve")
         monkeypatch.undo()
         with two.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
         solve_dataset(two, "demo")
         assert get_dataset(two, "demo").solved == 3
         delete_dataset(two, "demo", confirm="demo", actor="eve")
@@ -177,10 +176,10 @@ class TestDeleteDataset:
         made = get_dataset(two, "demo")
         assert (made.id, made.groups) == (3, 0)
         with two.read() as session:
-            assert [row.url for row in webhooks_of(session, made.id)] == ["https://a.example"]
+            assert [row.url for row in read_webhooks(session, made.id)] == ["https://a.example"]
         with two.read() as session:
             assert read_roles(session, person.id, Role.VIEWER).single == {3: Role.NONE}
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
             assert dialect_in(session).count_lost_references(session) == 0
         assert [one.dataset for one in AccessTokens(two).of_person(person.id)] == ["demo"]
 

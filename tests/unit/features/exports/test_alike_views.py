@@ -17,11 +17,11 @@ import pytest
 import touchline
 from app.errors import InputError
 from app.evaluation.frame_names import FrameNames, NamedFrame
-from app.features.exports.service import ExportReport, export, require_possible
+from app.features.exports.service import ExportReport, export_dataset, require_possible
 from app.features.groups.submit import load
 from app.features.imports.cameras import ingest_cameras
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.cameras_reader import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.export_formats import FORMATS, TRACKS, options_used_by
@@ -187,7 +187,9 @@ class TestEveryFormat:
         out = tmp_path / "out"
         boxes = "annotated" if "boxes" in options_used_by(name) else "optimized"
         try:
-            report = export(store, "demo", name, out, everything=True, boxes=boxes, images=images)
+            report = export_dataset(
+                store, "demo", name, out, everything=True, boxes=boxes, images=images
+            )
         except InputError as error:
             assert name in PRESCRIBED and name not in FITTING.get(scheme, ())
             of_format = scheme.startswith(PRESCRIBED[name])
@@ -237,12 +239,12 @@ class TestEveryFormat:
         for group_id in fill(*made("alike", tmp_path / "in")):
             etag = load(store, group_id).etag
             set_verdict(store, group_id, "accepted", None, "known", if_match=etag, actor="ann")
-        freeze(store, "demo", FreezeRequest("v1"), actor="ann")
+        freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann")
         for out, version in (("live", None), ("frozen", "v1")):
             options = {"images": "copy", "version": version}
             if "views" in options_used_by(name):
                 options["views"] = "all"
-            export(store, "demo", name, tmp_path / out, **options)
+            export_dataset(store, "demo", name, tmp_path / out, **options)
         assert on_disk(tmp_path / "live") == on_disk(tmp_path / "frozen")
         pictures = [file for file in on_disk(tmp_path / "frozen") if is_picture(file)]
         assert len(pictures) == 6
@@ -259,7 +261,7 @@ class TestEveryFormat:
         self, store, fill, tmp_path: Path
     ) -> None:
         fill(*made("from SoccerNet", tmp_path / "in"))
-        export(store, "demo", "coco", tmp_path / "out", everything=True, images="copy")
+        export_dataset(store, "demo", "coco", tmp_path / "out", everything=True, images="copy")
         assert [name for name in on_disk(tmp_path / "out") if is_picture(name)] == [
             f"l/s/{name}" for name in (
                 "m/Frames-v3/7.png", "m/Frames-v3/7_1.png", "m/Frames-v3/8.png", "n/Frames-v3/7.png",
@@ -273,7 +275,7 @@ class TestEveryFormat:
         shown = replace(second.views[0], media=first.views[0].media)
         fill(first, replace(second, views=(shown,)))
         for images in ("copy", "link"):
-            report = export(
+            report = export_dataset(
                 store, "demo", "coco", tmp_path / images, everything=True, images=images
             )
             assert (report.counts["images"], report.counts["pictures"]) == (3, 2)
@@ -283,7 +285,7 @@ class TestWhatIsWrittenIsFoundAgain:
     def test_cameras_fit_the_views_that_they_are_of(self, store, fill, tmp_path: Path) -> None:
         fill(*made("alike", tmp_path / "in"))
         for name in ("cameras", "sn-calibration"):
-            export(store, "demo", name, tmp_path / name, everything=True)
+            export_dataset(store, "demo", name, tmp_path / name, everything=True)
             cameras = read_cameras(tmp_path / name, Report())
             report = ingest_cameras(store, "demo", cameras, source="x", actor="ann")
             assert (report.unchanged, report.changed, report.problems) == (6, 0, [])
@@ -295,7 +297,7 @@ class TestWhatIsWrittenIsFoundAgain:
     ) -> None:
         groups = made(scheme, tmp_path / "in")
         fill(*groups)
-        export(store, "demo", name, tmp_path / "out", everything=True, images="copy")
+        export_dataset(store, "demo", name, tmp_path / "out", everything=True, images="copy")
         views = [(group, view) for group in groups for view in group.views]
         known = FrameNames.of(
             NamedFrame(number, group.key, view.key, group.match, SIZE)
@@ -314,7 +316,9 @@ class TestLinks:
         groups = made("alike", tmp_path / "in")
         fill(*groups)
         Path(groups[1].views[0].media.path).unlink()
-        report = export(store, "demo", "coco", tmp_path / "out", everything=True, images="link")
+        report = export_dataset(
+            store, "demo", "coco", tmp_path / "out", everything=True, images="link"
+        )
         assert report.missing_images == ("kick-1, north: picture-2.png is not there",)
         assert report.counts["pictures"] == 5
         assert len([name for name in on_disk(tmp_path / "out") if is_picture(name)]) == 5

@@ -13,10 +13,10 @@ import pytest
 
 from app.db.store import Store
 from app.features.datasets.service import get_dataset
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.submit import load
 from app.features.predictions.frames import live_truth, version_truth
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import find_version
 from app.formats.parquet_writer import import_pyarrow
 from app.soccer.annotation import BallAnnotation, make_lines
@@ -45,7 +45,7 @@ def mixed(store: Store, fill, make_group) -> Store:
     solution = load(store, ids[1]).solution
     assert solution is not None
     assert [view.included for view in solution.views] == [True, True, False]
-    freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+    freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
     return store
 
 
@@ -94,7 +94,7 @@ class TestCounts:
     ) -> None:
         dataset = get_dataset(mixed, "demo")
         version = find_version(mixed, dataset.id, "v1")
-        export(mixed, "demo", format_, tmp_path / "out", boxes=boxes, version="v1")
+        export_dataset(mixed, "demo", format_, tmp_path / "out", boxes=boxes, version="v1")
         manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
         balls, written = READ[format_](tmp_path / "out")
         assert version.counts["balls"] == 4
@@ -117,7 +117,7 @@ class TestCounts:
             ("everything", {"everything": True}),
             ("not asked", {"version": "v1"}),
         ):
-            export(mixed, "demo", format_, tmp_path / name, **options)
+            export_dataset(mixed, "demo", format_, tmp_path / name, **options)
             manifest = json.loads((tmp_path / name / "manifest.json").read_text())
             said[name] = (READ[format_](tmp_path / name)[1], manifest["settings"]["views"])
         assert said == {"asked": (5, "all"), "everything": (5, "all"), "not asked": (4, "valid")}
@@ -125,7 +125,7 @@ class TestCounts:
     def test_a_frame_that_teaches_nobody_is_not_copied_to_yolo(
         self, mixed: Store, tmp_path: Path
     ) -> None:
-        export(mixed, "demo", "yolo", tmp_path / "out", version="v1")
+        export_dataset(mixed, "demo", "yolo", tmp_path / "out", version="v1")
         assert "8_2" not in (tmp_path / "out/frames.csv").read_text()
         assert list((tmp_path / "out").rglob("*8_2*")) == []
 
@@ -133,17 +133,17 @@ class TestCounts:
     def test_an_export_of_everything_counts_the_same(
         self, mixed: Store, tmp_path: Path, format_: str
     ) -> None:
-        report = export(mixed, "demo", format_, tmp_path / "out", everything=True)
+        report = export_dataset(mixed, "demo", format_, tmp_path / "out", everything=True)
         assert report.counts["balls"] == 4
 
     def test_static_cameras_count_alike(
         self, store: Store, fill, make_static, tmp_path: Path
     ) -> None:
         fill(make_static(10), make_static(11))
-        freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+        freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         version = find_version(store, get_dataset(store, "demo").id, "v1")
         for name in ("issia-3d", "coco", "parquet", "yolo"):
-            report = export(store, "demo", name, tmp_path / name, version="v1")
+            report = export_dataset(store, "demo", name, tmp_path / name, version="v1")
             assert report.counts["balls"] == version.counts["balls"] == 6
 
     def test_the_evaluation_judges_the_same_balls(self, mixed: Store) -> None:
@@ -166,8 +166,10 @@ class TestBoxOfAViewApart:
     def test_it_is_the_annotated_one_in_every_format(
         self, mixed: Store, tmp_path: Path, kind: str
     ) -> None:
-        export(mixed, "demo", "coco", tmp_path / "coco", boxes=kind, version="v1", views="all")
-        export(mixed, "demo", "parquet", tmp_path / "parquet", boxes=kind, version="v1")
+        export_dataset(
+            mixed, "demo", "coco", tmp_path / "coco", boxes=kind, version="v1", views="all"
+        )
+        export_dataset(mixed, "demo", "parquet", tmp_path / "parquet", boxes=kind, version="v1")
         (path,) = (tmp_path / "coco" / "annotations").iterdir()
         value = json.loads(path.read_text())
         (image,) = (item["id"] for item in value["images"] if item["view"] == "8_2.png")
@@ -181,7 +183,7 @@ class TestBoxOfAViewApart:
     def test_everything_tells_its_error_and_no_optimised_box(
         self, mixed: Store, tmp_path: Path
     ) -> None:
-        export(mixed, "demo", "coco", tmp_path / "out", everything=True)
+        export_dataset(mixed, "demo", "coco", tmp_path / "out", everything=True)
         (path,) = (tmp_path / "out" / "annotations").iterdir()
         value = json.loads(path.read_text())
         (image,) = (item["id"] for item in value["images"] if item["view"] == "8_2.png")

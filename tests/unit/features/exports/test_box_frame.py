@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Media
@@ -96,7 +96,7 @@ def off_centre(picture: Path, box: list[float]) -> np.ndarray:
 
 @pytest.mark.parametrize(("name", "crops"), [("coco", coco_crops), ("yolo", yolo_crops)])
 def test_a_crop_by_the_box_has_the_ball_in_its_middle(store, balls: Path, name: str, crops) -> None:
-    export(store, "demo", name, balls, everything=True, boxes="annotated", images="copy")
+    export_dataset(store, "demo", name, balls, everything=True, boxes="annotated", images="copy")
     found = [off_centre(picture, box) for picture, box in crops(balls)]
     assert len(found) >= len(CENTERS)
     assert np.abs(found).max() < 0.1

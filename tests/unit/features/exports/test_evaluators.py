@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from app.db.store import Store
-from app.features.exports.service import export
-from app.features.file_tools.score import score_files
+from app.features.exports.service import export_dataset
+from app.features.file_tools.calibrate import score_files
 from app.soccer.annotation import Extras
 from app.soccer.frames import ImageSize
 from tests.foreign_readers import read_by
@@ -34,7 +34,7 @@ def written(store: Store, fill, make_group, tmp_path: Path):
     fill(*groups)
 
     def write(format_: str) -> Path:
-        return export(store, "demo", format_, tmp_path / format_, everything=True).out
+        return export_dataset(store, "demo", format_, tmp_path / format_, everything=True).out
 
     return write
 

@@ -13,7 +13,7 @@ import pytest
 
 from app.db.store import Store
 from app.features.datasets.service import get_dataset
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
@@ -185,7 +185,7 @@ def test_the_list_says_what_the_groups_say(solved: Store) -> None:
 def test_parquet_says_what_the_groups_say(solved: Store, tmp_path: Path) -> None:
     """Each column that is called like a number of the view's ball, or of the 3D ball, is that."""
     parquet = pytest.importorskip("pyarrow.parquet")
-    out = export(solved, "demo", "parquet", tmp_path / "out", everything=True).out
+    out = export_dataset(solved, "demo", "parquet", tmp_path / "out", everything=True).out
     written = parquet.read_table(out / "views.parquet").to_pylist()
     groups, compared = groups_of(solved), set()
     for row in written:
@@ -205,7 +205,7 @@ def test_parquet_says_what_the_groups_say(solved: Store, tmp_path: Path) -> None
 
 
 def test_the_table_of_soccernet_v3d_says_what_the_groups_say(solved: Store, tmp_path: Path) -> None:
-    out = export(solved, "demo", "soccernet-v3d", tmp_path / "out", everything=True).out
+    out = export_dataset(solved, "demo", "soccernet-v3d", tmp_path / "out", everything=True).out
     with (out / "SNv3D.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     groups = groups_of(solved)

@@ -8,7 +8,7 @@ from app.db.store import Store
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.exports.queries import exported_groups, left_out_groups, newest_entry_time
 from app.features.queue.tables import QueueModel
-from app.features.solutions.tables import SolutionModel
+from app.features.solutions.queries import SolutionModel
 from app.soccer.solution import SOLVER_VERSION
 
 ACCEPTED = {"status": "accepted", "solved": True, "passes": True}

@@ -18,9 +18,9 @@ from app.features.exports import routes as module
 from app.features.imports.ingest import ingest
 from app.features.jobs import runner as job_run
 from app.features.jobs.service import Jobs
+from app.features.maintenance.upkeep import clean_up
 from app.features.solutions.service import solve_dataset
-from app.features.upkeep.service import clean_up
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.export_formats import FORMATS
 from app.media.frames import SentPicture
 from app.soccer.frames import ImageSize
@@ -114,7 +114,7 @@ class TestMakeExport:
         self, app, api, called_by: str
     ) -> None:
         request = FreezeRequest("v1", groups="passing")
-        version = freeze(app.state.services.store, "broadcast", request, actor="local")
+        version = freeze_dataset(app.state.services.store, "broadcast", request, actor="local")
         called = {"id": version.id, "hash": version.hash[:12], "name": "v1"}[called_by]
         answer = api.post(API, json={**ORDER, "all": False, "version": called})
         assert answer.status_code == 202

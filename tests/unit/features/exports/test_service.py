@@ -12,7 +12,13 @@ import numpy as np
 import pytest
 
 from app.errors import InputError, NotFoundError
-from app.features.exports.service import FORMATS, TRACKS, export, possible_formats, require_possible
+from app.features.exports.service import (
+    FORMATS,
+    TRACKS,
+    export_dataset,
+    possible_formats,
+    require_possible,
+)
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
@@ -62,7 +68,7 @@ class TestExport:
     def test_accepted_groups_go_out_and_others_stay(self, store, three, tmp_path) -> None:
         judge(store, three[0], "accepted")
         judge(store, three[1], "rejected", "bad_calibration")
-        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        report = export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert {row["main_action"] for row in table(report.out)} == {"7"}
         assert (report.counts["groups"], report.left_out) == (1, {})
 
@@ -70,9 +76,9 @@ class TestExport:
         self, store, three, tmp_path
     ) -> None:
         judge(store, three[2], "accepted", note="seen on video")
-        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        report = export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert {row["main_action"] for row in table(report.out)} == {"9"}
-        export(store, "demo", "soccernet-v3d", tmp_path / "all", everything=True)
+        export_dataset(store, "demo", "soccernet-v3d", tmp_path / "all", everything=True)
         verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "all")}
         assert verdicts["9"] == "accepted: overrides reprojection: seen on video"
         assert verdicts["7"] == "unreviewed"
@@ -82,9 +88,12 @@ class TestExport:
     ) -> None:
         judge(store, three[2], "accepted", note="seen on video")
         with pytest.raises(InputError, match="has a view that a detector may learn from for yolo"):
-            export(store, "demo", "yolo", tmp_path / "out")
+            export_dataset(store, "demo", "yolo", tmp_path / "out")
         assert not (tmp_path / "out").exists()
-        assert export(store, "demo", "yolo", tmp_path / "out", views="all").counts["labels"] == 2
+        assert (
+            export_dataset(store, "demo", "yolo", tmp_path / "out", views="all").counts["labels"]
+            == 2
+        )
 
     def test_an_override_of_one_gate_covers_no_other_that_fails_later(
         self, store, three, tmp_path
@@ -95,7 +104,7 @@ class TestExport:
         change_policy(store, "demo", wide, if_match=None, actor="ann")
         solve_dataset(store, "demo")
         judge(store, three[0], "accepted", note="the baseline is known")
-        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        report = export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert {row["main_action"] for row in table(report.out)} == {"7"}
         assert report.left_out == {"failing": 1}
 
@@ -106,14 +115,14 @@ class TestExport:
         state = judge(store, three[1], "accepted")
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
         submit(store, three[1], SetBall("8.png", ball), if_match=state.etag, actor="ben")
-        report = export(store, "demo", "soccernet-v3d", tmp_path / "out")
+        report = export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert {row["main_action"] for row in table(report.out)} == {"7"}
         assert report.left_out == {"stale": 1}
 
     @pytest.mark.parametrize("out", ["out", "out.zip"])
     def test_nothing_to_export_leaves_no_file(self, store, three, tmp_path, out: str) -> None:
         with pytest.raises(InputError, match="no group has been accepted"):
-            export(store, "demo", "soccernet-v3d", tmp_path / out)
+            export_dataset(store, "demo", "soccernet-v3d", tmp_path / out)
         assert not (tmp_path / out).exists()
 
     @pytest.mark.parametrize("state", ["unreviewed", "stale"])
@@ -124,7 +133,7 @@ class TestExport:
             etag = judge(store, three[0], "accepted").etag
             submit(store, three[0], SetBall("7.png", None), if_match=etag, actor="ben")
         with pytest.raises(InputError) as caught:
-            export(store, "demo", "soccernet-v3d", tmp_path / "out")
+            export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert caught.value.hint is None
 
     @pytest.mark.parametrize("out", ["out", "out.zip"])
@@ -133,7 +142,7 @@ class TestExport:
     ) -> None:
         fill(make_group(7), solved=False)
         with pytest.raises(InputError, match=r"no group of .* has a camera") as caught:
-            export(store, "demo", "cameras", tmp_path / out, everything=True)
+            export_dataset(store, "demo", "cameras", tmp_path / out, everything=True)
         assert caught.value.hint is None
         assert list(tmp_path.glob("*out*")) == []
 
@@ -144,7 +153,7 @@ class TestExport:
         views = tuple(replace(view, balls=()) for view in group.views)
         fill(replace(group, views=views))
         with pytest.raises(InputError, match="has a ball for issia-3d"):
-            export(store, "demo", "issia-3d", tmp_path / "out", everything=True)
+            export_dataset(store, "demo", "issia-3d", tmp_path / "out", everything=True)
         assert list(tmp_path.glob("*out*")) == []
 
     def test_a_stale_verdict_says_so_in_an_export_of_everything(
@@ -154,18 +163,18 @@ class TestExport:
         etag = judge(store, three[1], "accepted").etag
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
         submit(store, three[1], SetBall("8.png", ball), if_match=etag, actor="ben")
-        export(store, "demo", "soccernet-v3d", tmp_path / "out", everything=True)
+        export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out", everything=True)
         verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "out")}
         assert verdicts == {"7": "accepted", "8": "accepted (stale)", "9": "unreviewed"}
 
     def test_an_empty_dataset_has_nothing_either(self, store, tmp_path) -> None:
         ensure_dataset(store, "demo", "ann")
         with pytest.raises(InputError, match="holds no groups"):
-            export(store, "demo", "cameras", tmp_path / "out", everything=True)
+            export_dataset(store, "demo", "cameras", tmp_path / "out", everything=True)
 
     def test_the_manifest_says_what_it_is(self, store, three, tmp_path) -> None:
         state = judge(store, three[0], "accepted")
-        export(store, "demo", "soccernet-v3d", tmp_path / "out.zip", boxes="exact")
+        export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out.zip", boxes="exact")
         manifest = json.loads(files(tmp_path / "out.zip")["manifest.json"])
         assert (manifest["dataset"], manifest["version"]) == ("demo", None)
         assert manifest["date"] == state.verdict.at
@@ -188,7 +197,7 @@ class TestExport:
         cells = set()
         for kind, box in expected.items():
             out = tmp_path / kind
-            export(store, "demo", "soccernet-v3d", out, everything=True, boxes=kind)
+            export_dataset(store, "demo", "soccernet-v3d", out, everything=True, boxes=kind)
             assert ball_corners(out, "7.png") == pytest.approx(
                 [box.x, box.y, box.x + box.width, box.y + box.height]
             )
@@ -203,7 +212,7 @@ class TestExport:
     def test_formats_without_a_chosen_box_claim_none(
         self, store, three, tmp_path, form: str
     ) -> None:
-        export(store, "demo", form, tmp_path / "out.zip", everything=True)
+        export_dataset(store, "demo", form, tmp_path / "out.zip", everything=True)
         manifest = json.loads(files(tmp_path / "out.zip")["manifest.json"])
         assert "boxes" not in manifest["settings"]
 
@@ -220,7 +229,7 @@ class TestExport:
     ) -> None:
         (name,) = asked
         for run in (
-            lambda: export(store, "demo", form, tmp_path / "out", everything=True, **asked),
+            lambda: export_dataset(store, "demo", form, tmp_path / "out", everything=True, **asked),
             lambda: require_possible(store, "demo", form, everything=True, **asked),
         ):
             with pytest.raises(InputError, match=f"{form} does not use --{name}") as refused:
@@ -249,26 +258,26 @@ class TestExport:
         self, store, fill, make_group, make_static, tmp_path
     ) -> None:
         fill(make_group(7), make_static(10), make_static(11))
-        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        export_dataset(store, "demo", "cameras", tmp_path / "out", everything=True)
         manifest = json.loads((tmp_path / "out/manifest.json").read_text())
         assert manifest["licence"].count("soccer-net.org") == 1
         assert manifest["licence"].count("CNR-ISSIA") == 1
 
     def test_the_same_state_makes_the_same_bytes(self, store, three, tmp_path) -> None:
         for name in ("a.zip", "b.zip"):
-            export(store, "demo", "soccernet-v3d", tmp_path / name, everything=True)
+            export_dataset(store, "demo", "soccernet-v3d", tmp_path / name, everything=True)
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
     @pytest.mark.parametrize("form", OF_BROADCAST)
     def test_every_format_of_broadcast_groups(self, store, three, tmp_path, form: str) -> None:
-        report = export(store, "demo", form, tmp_path / "out.zip", everything=True)
+        report = export_dataset(store, "demo", form, tmp_path / "out.zip", everything=True)
         assert report.counts["groups"] == 3
         assert len(files(tmp_path / "out.zip")) > 1
 
     def test_static_cameras_go_out_as_issia_3d(self, store, fill, make_static, tmp_path) -> None:
         fill(make_static(10), make_static(11))
         calls: list[tuple] = []
-        report = export(
+        report = export_dataset(
             store,
             "demo",
             "issia-3d",
@@ -283,7 +292,7 @@ class TestExport:
 
     def test_groups_that_do_not_fit_the_format_leave_no_file(self, store, three, tmp_path) -> None:
         with pytest.raises(InputError, match="not from ISSIA"):
-            export(store, "demo", "issia-3d", tmp_path / "out", everything=True)
+            export_dataset(store, "demo", "issia-3d", tmp_path / "out", everything=True)
         assert list(tmp_path.glob("*out*")) == []
 
     @pytest.mark.parametrize(
@@ -292,11 +301,11 @@ class TestExport:
     def test_unknown_options_are_refused(self, store, three, tmp_path, options) -> None:
         values = {"format": "cameras", **options}
         with pytest.raises(InputError):
-            export(store, "demo", values.pop("format"), tmp_path / "out.zip", **values)
+            export_dataset(store, "demo", values.pop("format"), tmp_path / "out.zip", **values)
 
     def test_an_unknown_dataset_is_not_found(self, store, tmp_path) -> None:
         with pytest.raises(NotFoundError):
-            export(store, "nothing", "cameras", tmp_path / "out")
+            export_dataset(store, "nothing", "cameras", tmp_path / "out")
 
 
 class TestImages:
@@ -314,7 +323,7 @@ class TestImages:
 
     def test_frames_are_copied_and_missing_ones_named(self, store, framed, tmp_path) -> None:
         _, data = framed
-        report = export(
+        report = export_dataset(
             store, "demo", "soccernet-v3", tmp_path / "out", everything=True, images="copy"
         )
         (copied,) = (tmp_path / "out").rglob("7.png")
@@ -333,14 +342,14 @@ class TestImages:
         fill(group.with_view(first).with_view(replace(second, media=None)))
         for images, named in (("copy", 1), ("none", 0)):
             out = tmp_path / images
-            report = export(store, "demo", "yolo", out, everything=True, images=images)
+            report = export_dataset(store, "demo", "yolo", out, everything=True, images=images)
             assert len(report.missing_images) == named
             assert all("no picture came with it" in line for line in report.missing_images)
 
     def test_labels_name_the_images_that_were_copied(self, store, framed, tmp_path) -> None:
         _, data = framed
         for form in ("yolo", "coco", "parquet"):
-            export(store, "demo", form, tmp_path / form, everything=True, images="copy")
+            export_dataset(store, "demo", form, tmp_path / form, everything=True, images="copy")
         with (tmp_path / "yolo/frames.csv").open(newline="") as file:
             rows = {row["view"]: row for row in csv.DictReader(file)}
         assert (rows["7.png"]["present"], rows["7_1.png"]["present"]) == ("True", "False")
@@ -354,7 +363,7 @@ class TestImages:
 
     def test_the_manifest_knows_frames_that_are_not_copied(self, store, framed, tmp_path) -> None:
         _, data = framed
-        export(store, "demo", "soccernet-v3", tmp_path / "out", everything=True)
+        export_dataset(store, "demo", "soccernet-v3", tmp_path / "out", everything=True)
         manifest = json.loads((tmp_path / "out/manifest.json").read_text())
         (item,) = manifest["media"]
         assert (item["view"], item["bytes"]) == ("7.png", len(data))

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from app.errors import InputError, NotFoundError
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.export_formats import FORMATS, TRACKS
 from app.soccer.split import Split
 
@@ -35,7 +35,7 @@ def version(store, fill, make_group):
     judge(store, ids[0], "accepted")
     judge(store, ids[1], "accepted", note="seen on video")
     judge(store, ids[2], "rejected", "sides_confused")
-    return freeze(store, "demo", FreezeRequest("v1", licence="ours"), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest("v1", licence="ours"), actor="ann")
 
 
 class TestVersionSource:
@@ -45,11 +45,11 @@ class TestVersionSource:
     def test_every_format_is_the_same_bytes_after_later_edits(
         self, store, version, tmp_path, name: str
     ) -> None:
-        export(store, "demo", name, tmp_path / "a.zip", version="v1")
+        export_dataset(store, "demo", name, tmp_path / "a.zip", version="v1")
         etag = load(store, 1).etag
         submit(store, 1, SetBall("7.png", None), if_match=etag, actor="ben")
         judge(store, 2, "rejected", "bad_calibration")
-        export(store, "demo", name, tmp_path / "b.zip", version=version.hash[:12])
+        export_dataset(store, "demo", name, tmp_path / "b.zip", version=version.hash[:12])
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
     @pytest.mark.parametrize("name", STATIC)
@@ -57,15 +57,15 @@ class TestVersionSource:
         self, store, fill, make_static, tmp_path, name: str
     ) -> None:
         fill(make_static(10), make_static(9))
-        freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+        freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         for out in ("a.zip", "b.zip"):
-            export(store, "demo", name, tmp_path / out, version="v1")
+            export_dataset(store, "demo", name, tmp_path / out, version="v1")
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
     def test_the_manifest_is_stamped_with_verdicts_and_their_reasons(
         self, store, version, tmp_path
     ) -> None:
-        export(store, "demo", "cameras", tmp_path / "a.zip", version="v1")
+        export_dataset(store, "demo", "cameras", tmp_path / "a.zip", version="v1")
         manifest = manifest_of(tmp_path / "a.zip")
         assert (manifest["version"], manifest["date"]) == ("v1", version.created)
         assert (manifest["licence"], manifest["verdicts"]) == ("ours", {"accepted": 2})
@@ -78,7 +78,7 @@ class TestVersionSource:
     def test_the_reason_of_an_override_stands_beside_its_image(
         self, store, version, tmp_path
     ) -> None:
-        export(store, "demo", "soccernet-v3d", tmp_path / "out", version="v1")
+        export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out", version="v1")
         (path,) = (tmp_path / "out").rglob("Labels-v3D.json")
         actions = json.loads(path.read_text())["actions"]
         told = {key: value["imageMetadata"].get("verdict") for key, value in actions.items()}
@@ -89,16 +89,16 @@ class TestVersionSource:
 
     def test_the_split_of_the_version_is_what_lists_say(self, store, version, tmp_path) -> None:
         split = Split("camera", test_cameras=("7_1.png",))
-        freeze(store, "demo", FreezeRequest("v2", split=split), actor="ann")
-        export(store, "demo", "soccernet-v3d", tmp_path / "out", version="v2")
+        freeze_dataset(store, "demo", FreezeRequest("v2", split=split), actor="ann")
+        export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out", version="v2")
         test = (tmp_path / "out" / "SNv3D-test.txt").read_text().splitlines()
         assert [line.rpartition("/")[2] for line in test] == ["7_1"]
 
     def test_a_version_exports_exactly_its_own_groups(self, store, version, tmp_path) -> None:
         with pytest.raises(InputError, match="always exports exactly its own groups"):
-            export(store, "demo", "cameras", tmp_path / "x", version="v1", everything=True)
+            export_dataset(store, "demo", "cameras", tmp_path / "x", version="v1", everything=True)
         with pytest.raises(NotFoundError, match='no version "v9"'):
-            export(store, "demo", "cameras", tmp_path / "x", version="v9")
+            export_dataset(store, "demo", "cameras", tmp_path / "x", version="v9")
         assert not (tmp_path / "x").exists()
 
 
@@ -110,4 +110,4 @@ class TestLiveSource:
         judge(store, ids[0], "accepted")
         upgrade_solver()
         with pytest.raises(InputError, match="unsolved"):
-            export(store, "demo", "coco", tmp_path / "a.zip")
+            export_dataset(store, "demo", "coco", tmp_path / "a.zip")

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from app.errors import DatasetFormatError, InputError
-from app.features.file_tools.calibrate import calibrate_files
+from app.features.file_tools.calibrate import calibrate_files, score_files
 from app.features.file_tools.matches import estimate_pitch_of_files
-from app.features.file_tools.score import score_files
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_writer import write_line_files
 from app.soccer.annotation import make_lines

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.errors import DatasetFormatError
-from app.features.file_tools.matches import read_matches, shares_of
+from app.features.file_tools.matches import match_shares, read_matches
 from app.formats.sn_calibration import LineFile
 from app.solving.match_position import FramePlace
 from tests.cameras import SIZE
@@ -36,22 +36,22 @@ class TestSharesOf:
     def test_a_frame_takes_no_part_in_its_own_prior(self):
         four = files("1", "2", "3", "4")
         named = dict.fromkeys("1234", "cup")
-        (first, *_) = shares_of(four, places(90.0, 60.0, 60.0, 60.0), named)
+        (first, *_) = match_shares(four, places(90.0, 60.0, 60.0, 60.0), named)
         assert first.match == "cup"
         assert first.others.prior(0.0).mean[1] == pytest.approx(60.0, abs=0.01)
 
     def test_the_places_of_a_match_are_held_once(self):
         four, named = files("1", "2", "3", "4"), dict.fromkeys("1234", "cup")
-        shares = shares_of(four, [None, *places(90.0, 60.0, 60.0)], named)
+        shares = match_shares(four, [None, *places(90.0, 60.0, 60.0)], named)
         assert len({id(share.others._equations) for share in shares}) == 1
         assert len(shares[0].others._equations) == 3
 
     def test_matches_are_guessed_in_the_order_of_the_names(self):
         mixed = files("4", "1", "3", "2")
-        found = shares_of(mixed, places(80.0, 60.0, 80.0, 60.0), None)
+        found = match_shares(mixed, places(80.0, 60.0, 80.0, 60.0), None)
         assert [share.match for share in found] == ["1", "0", "1", "0"]
 
     def test_a_frame_that_is_not_named_gets_nothing(self):
         four = files("1", "2", "3", "4", "5")
-        *_, last = shares_of(four, places(*[60.0] * 5), dict.fromkeys("1234", "cup"))
+        *_, last = match_shares(four, places(*[60.0] * 5), dict.fromkeys("1234", "cup"))
         assert last.others.prior(0.0) is None

@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import DatasetFormatError
 from app.features.file_tools.calibrate import calibrate_files
-from app.features.file_tools.matches import estimate_picture_of_files, picture_for, read_picture
+from app.features.file_tools.matches import choose_picture, estimate_picture_of_files, read_picture
 from app.formats.cameras_reader import read_cameras
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
@@ -69,7 +69,7 @@ class TestCalibrateFiles:
 
 class TestPictureFor:
     def test_too_few_frames_are_told_and_nothing_is_done(self, tmp_path: Path) -> None:
-        picture, told = picture_for(write(tmp_path, count=2), SIZE, None)
+        picture, told = choose_picture(write(tmp_path, count=2), SIZE, None)
         assert picture is None
         assert "needs 3" in told["problem"]
 

@@ -18,15 +18,15 @@ from app.features.findings.service import (
     set_dismissal,
 )
 from app.features.groups.edit import SetBall
-from app.features.groups.history import history
-from app.features.groups.replay import rebuild
+from app.features.groups.history import read_history
+from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
 from app.features.queue.refresh_queries import differing_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.membership import version_manifest
 from app.features.versions.verify import verify
 from app.soccer.annotation import BallAnnotation
@@ -114,7 +114,7 @@ class TestSetDismissal:
         assert (again.etag, again.revision) == (after.etag, found.revision)
         assert again.etag != found.etag
         assert again.solution == found.solution
-        assert [entry.kind for entry in history(store, found.id)] == ["import", "dismissal"]
+        assert [entry.kind for entry in read_history(store, found.id)] == ["import", "dismissal"]
 
     def test_it_is_taken_back(self, store, found) -> None:
         after = dismiss(store, dismiss(store, found, first(found)), first(found), dismissed=False)
@@ -133,7 +133,7 @@ class TestSetDismissal:
             assert list_groups(store, found.dataset_id, f"dismissed:{kind}").total == 1
         # A verdict, an own solution and the log rebuilt leave the row as it is.
         set_verdict(store, found.id, "deferred", if_match=after.etag, actor="ann")
-        assert rebuild(store) == 1
+        assert rebuild_tables(store) == 1
         assert list_groups(store, found.dataset_id, "finding:none dismissed:any").total == 1
         with store.read() as session:
             assert differing_rows(session)[1] == []
@@ -202,11 +202,11 @@ class TestVersions:
         (number,) = fill(make_group(9, shift=80.0))
         state = load(store, number)
         set_verdict(store, number, "accepted", None, "seen", if_match=state.etag, actor="ann")
-        plain = freeze(store, "demo", FreezeRequest("v1"), actor="ann")
+        plain = freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann")
         state = dismiss(store, load(store, number), first(state), note="fine")
-        checked = freeze(store, "demo", FreezeRequest("v2"), actor="ann")
+        checked = freeze_dataset(store, "demo", FreezeRequest("v2"), actor="ann")
         state = dismiss(store, state, first(state), dismissed=False)
-        again = freeze(store, "demo", FreezeRequest("v3"), actor="ann")
+        again = freeze_dataset(store, "demo", FreezeRequest("v3"), actor="ann")
         assert again.hash == plain.hash != checked.hash
         assert verify(store, checked.id).ok
         (told,) = version_manifest(store, checked.id)["frozen"]["dismissed"]

@@ -12,7 +12,7 @@ from app.features.groups.edit_codec import REQUEST_POINTS
 from app.http.services import Services
 from tests.databases import content
 from tests.unit.http.group_requests import etag_of, send, take_handed_in
-from tests.unit.http.test_respond import stopped_after_a_commit
+from tests.unit.http.test_documents_respond import stopped_after_a_commit
 
 API = "/api/v1"
 EDITS = f"{API}/datasets/broadcast/edits"

@@ -6,9 +6,8 @@ from app.features.datasets.service import dataset_id
 from app.features.groups import group_edits
 from app.features.groups.edit import SetPitch
 from app.features.groups.group_edits import edit_groups
-from app.features.groups.history import history
+from app.features.groups.history import read_history, undo
 from app.features.groups.submit import load
-from app.features.groups.undo import undo
 from app.features.solutions.service import stale_groups
 
 WIDE, USUAL = SetPitch(105.0, 70.0), SetPitch(105.0, 68.0)
@@ -37,17 +36,19 @@ class TestGiveEdits:
         for number in ids:
             state = load(store, number)
             assert state.group.pitch.width == 70.0
-            entry = history(store, number)[-1]
+            entry = read_history(store, number)[-1]
             assert (entry.actor, entry.body["why"]) == ("ann", "measured")
             back = undo(store, number, if_match=state.etag, actor="bob")
             assert back.group.pitch.width == 68.0
 
     def test_what_changes_nothing_leaves_no_trace_but_where_more_is_said(self, store, ids) -> None:
-        before = {number: (load(store, number).etag, len(history(store, number))) for number in ids}
+        before = {
+            number: (load(store, number).etag, len(read_history(store, number))) for number in ids
+        }
         assert give(store, ids, lambda some: dict.fromkeys(some, USUAL), always_logged=ids[1]) == 1
         for number in ids:
             etag, entries = before[number]
-            assert len(history(store, number)) == entries + (number == ids[1])
+            assert len(read_history(store, number)) == entries + (number == ids[1])
             assert (load(store, number).etag == etag) == (number != ids[1])
 
     def test_who_has_no_edit_is_left_alone(self, store, ids) -> None:

@@ -7,9 +7,8 @@ import pytest
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.groups.edit import SetBall, SetLines, SetStationLines
-from app.features.groups.history import EntryChanges, history, read_entry_changes
+from app.features.groups.history import EntryChanges, read_entry_changes, read_history, undo
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.stations.service import load_station, submit_station
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint
@@ -19,7 +18,7 @@ BALL = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
 
 
 def steps(store: Store, group: int) -> list[EntryChanges]:
-    return [read_entry_changes(store, group, entry.id) for entry in history(store, group)]
+    return [read_entry_changes(store, group, entry.id) for entry in read_history(store, group)]
 
 
 class TestReadStep:
@@ -68,12 +67,12 @@ class TestReadStep:
         edit = SetStationLines({"Middle line": HERE})
         submit_station(store, camera.id, edit, if_match=camera.etag, actor="ann")
         second = fill(make_static(10), make_static(11))[1]
-        kinds = [[entry.kind for entry in history(store, group)] for group in (first, second)]
+        kinds = [[entry.kind for entry in read_history(store, group)] for group in (first, second)]
         assert kinds == [["import", "station_edit"], ["import"]]
 
     def test_an_entry_of_another_group_is_unknown(self, store: Store, fill, make_group) -> None:
         one, other = fill(make_group(7), make_group(8))
-        (entry,) = history(store, other)
+        (entry,) = read_history(store, other)
         for group in (one, 99):
             with pytest.raises(NotFoundError):
                 read_entry_changes(store, group, entry.id)

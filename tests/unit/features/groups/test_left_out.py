@@ -7,21 +7,21 @@ from dataclasses import replace
 import pytest
 
 from app.errors import InputError
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.digest import group_inputs_hash, source_hash
 from app.features.groups.edit import IncludeView, SetBall, SetLines
 from app.features.groups.edit_codec import edit_from_json
-from app.features.groups.replay import rebuild, replay
+from app.features.groups.history import redo, undo
+from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import redo, undo
 from app.features.imports.ingest import ingest
 from app.features.imports.merge import merge_edits
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.queue.service import list_groups
 from app.features.verdicts.bulk import give_verdicts
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import freeze_annotations
 from app.features.versions.verify import verify
 from app.formats.file_tree import DEFAULT_LIMITS
@@ -105,8 +105,8 @@ class TestUndo:
     def test_the_log_alone_gives_it_again(self, store, state) -> None:
         change(store, LEAVE)
         with store.read() as session:
-            assert replay(session) == read_state_snapshot(session)
-        rebuild(store)
+            assert replay_log(session) == read_state_snapshot(session)
+        rebuild_tables(store)
         assert why(store) == WHY
 
     def test_another_reason_is_an_edit_that_computes_nothing_anew(self, store, state) -> None:
@@ -135,9 +135,9 @@ class TestDigests:
 class TestVersions:
     def test_a_version_keeps_it_and_comes_out_the_same(self, store, state) -> None:
         change(store, LEAVE)
-        version = freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+        version = freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         change(store, IncludeView("7_1.png", False))
-        plain = freeze(store, "demo", FreezeRequest("v2", groups="passing"), actor="ann")
+        plain = freeze_dataset(store, "demo", FreezeRequest("v2", groups="passing"), actor="ann")
         assert version.hash != plain.hash
         assert verify(store, version.id).ok and verify(store, plain.id).ok
 
@@ -212,7 +212,7 @@ class TestFixed:
 class TestCarried:
     def test_another_installation_learns_why(self, store, there, state, tmp_path) -> None:
         change(store, LEAVE)
-        export(store, "demo", "touchline", tmp_path / "carried.zip")
+        export_dataset(store, "demo", "touchline", tmp_path / "carried.zip")
         report = Report()
         carried = tmp_path / "carried.zip"
         merge_edits(there, "demo", carried, report, DEFAULT_LIMITS, source="here", actor="zoe")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from app.features.imports.ingest import ingest
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.soccer.group import FARTHEST, Group, Media
 
 API = "/api/v1"
@@ -123,7 +123,7 @@ class TestVerified:
     def test_the_result_stays_with_the_version(self, api, app) -> None:
         services = app.state.services
         request = FreezeRequest("v1", groups="passing")
-        version = freeze(services.store, "broadcast", request, actor="local")
+        version = freeze_dataset(services.store, "broadcast", request, actor="local")
         address = f"{API}/versions/{version.id}"
         assert api.get(address).json()["verified"] is None
         job = api.post(f"{address}/verify").json()

@@ -13,8 +13,7 @@ from fastapi import FastAPI
 
 from app.config import Settings
 from app.errors import DamagedError
-from app.features.groups.large_edit_routes import LargeGroupSolver
-from app.features.groups.preview_routes import PreviewSolver
+from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.http.request_limits import LARGE_BYTES
 from tests.waiting import SECONDS
 

@@ -7,12 +7,12 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.groups.ball_noise import apply_noise_factors
 from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
-from app.features.groups.replay import rebuild, replay
+from app.features.groups.group_edits import apply_noise_factors
+from app.features.groups.history import redo, undo
+from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import redo, undo
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import ingest
 from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
@@ -87,7 +87,7 @@ def _import_changed(store: Store, make_group, make_static) -> None:
 class TestReplay:
     def test_the_log_alone_gives_the_state_of_the_tables(self, busy: Store) -> None:
         with busy.read() as session:
-            replayed, present = replay(session), read_state_snapshot(session)
+            replayed, present = replay_log(session), read_state_snapshot(session)
         assert replayed.groups == present.groups
         assert replayed.stations == present.stations
         assert replayed.verdicts == present.verdicts
@@ -97,7 +97,7 @@ class TestReplay:
 
     def test_the_inputs_hashes_of_the_tables_follow_from_it(self, busy: Store) -> None:
         with busy.read() as session:
-            replayed = replay(session)
+            replayed = replay_log(session)
             stored = dict(session.execute(text("SELECT id, inputs_hash FROM groups")).all())
         assert {key: replayed.inputs_hash(key) for key in replayed.groups} == stored
 
@@ -105,14 +105,14 @@ class TestReplay:
         with busy.write() as session:
             session.execute(text("UPDATE view SET included = NOT included WHERE key = '8.png'"))
         with busy.read() as session:
-            assert replay(session) != read_state_snapshot(session)
+            assert replay_log(session) != read_state_snapshot(session)
 
     def test_a_log_that_was_tampered_with_is_refused(self, busy: Store) -> None:
         with busy.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER log_refuses_update"))
             session.execute(text("UPDATE log SET actor = 'eve' WHERE id = 3"))
         with busy.read() as session, pytest.raises(StorageError, match="row 3 of the log"):
-            replay(session)
+            replay_log(session)
 
 
 class TestRebuild:
@@ -124,7 +124,7 @@ class TestRebuild:
             session.execute(text("DELETE FROM queue"))
             session.execute(text("DELETE FROM view WHERE key = '7.png'"))
             session.execute(text("UPDATE station SET lines = '{}'"))
-        assert rebuild(busy) == 4
+        assert rebuild_tables(busy) == 4
         with busy.read() as session:
             assert read_state_snapshot(session) == before
             again = session.execute(text("SELECT * FROM queue ORDER BY group_id")).all()

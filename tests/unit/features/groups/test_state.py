@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from app.db.store import Store
 from app.features.groups.edit import IncludeView, SetStationLines
+from app.features.groups.history import undo
 from app.features.groups.state import (
     GroupHead,
     GroupState,
-    content_tag_of,
+    content_tag_from_etag,
     group_etag,
     read_etags,
     read_group_head,
 )
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.imports.ingest import ingest
 from app.features.stations.service import load_station, submit_station, undo_station
 from app.features.verdicts.service import set_verdict
@@ -58,7 +58,7 @@ class TestReadEtags:
         after = load(store, one)
         assert etags_of(store, one) == {one: after.etag} != {one: before.etag}
         # What was said is the same: an edit of another view still goes through.
-        assert content_tag_of(after.etag) == content_tag_of(before.etag)
+        assert content_tag_from_etag(after.etag) == content_tag_from_etag(before.etag)
 
     def test_other_thresholds_under_the_same_name_are_another(self) -> None:
         etags = {group_etag("said", policy, "custom", (), 0) for policy in ("one", "two")}

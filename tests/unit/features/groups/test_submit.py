@@ -18,10 +18,9 @@ from app.errors import (
 )
 from app.features.groups import state as state_module
 from app.features.groups.edit import IncludeView, SetBall, SetBalls, SetLines, SetPicture
-from app.features.groups.history import history
+from app.features.groups.history import read_history, undo
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, preview, solve_and_keep, submit
-from app.features.groups.undo import undo
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions import queries as solutions
@@ -119,7 +118,7 @@ class TestSubmit:
         assert after.policy == STRICT
         assert after.solution == solve(after.group, STRICT)
         assert load(store, state.id) == after
-        assert [item.kind for item in history(store, state.id)] == ["import", "edit"]
+        assert [item.kind for item in read_history(store, state.id)] == ["import", "edit"]
 
     def test_of_many_at_once_one_wins_and_nothing_is_mixed(self, store, state) -> None:
         results: list[object] = []
@@ -140,7 +139,7 @@ class TestSubmit:
         assert len(results) == 6
         assert len(winners) == 1
         assert load(store, state.id).group == winners[0].group
-        assert len(history(store, state.id)) == 2
+        assert len(read_history(store, state.id)) == 2
 
     def test_two_views_of_one_group_at_once_are_a_conflict_too(self, store, state) -> None:
         change(store, state, SetBall("7.png", BALL))
@@ -157,7 +156,7 @@ class TestSubmit:
     def test_what_changes_nothing_makes_no_revision(self, store, state) -> None:
         same = SetBalls("7.png", state.group.view("7.png").balls)
         assert change(store, state, same) == state
-        assert len(history(store, state.id)) == 1
+        assert len(read_history(store, state.id)) == 1
 
     def test_lines_of_a_shared_station_name_the_station(self, store, fill, make_static) -> None:
         state = load(store, fill(make_static())[0])
@@ -213,7 +212,7 @@ class TestPreview:
 class TestHistory:
     def test_an_unknown_group_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
-            history(store, 99)
+            read_history(store, 99)
 
 
 class TestCost:

@@ -10,11 +10,10 @@ import pytest
 
 from app.errors import OverloadedError
 from app.features.groups.edit import SetBall, SetLines
-from app.features.groups.history import history
-from app.features.groups.replay import rebuild, replay
+from app.features.groups.history import read_history, redo, undo
+from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, preview, submit
-from app.features.groups.undo import redo, undo
 from app.features.groups.view_paint import PaintFollower
 from app.features.paint.service import take_back_paint
 from app.features.policies.service import change_policy
@@ -71,14 +70,14 @@ class TestFollow:
         assert (first.source, kinds(painted)) == ("paint", [])
         truth = scenes()[0].truth.view(key).camera
         assert np.linalg.norm(first.camera.position - truth.position) < 0.25
-        assert [entry.kind for entry in history(painted, 1)][-2:] == ["edit", "paint"]
+        assert [entry.kind for entry in read_history(painted, 1)][-2:] == ["edit", "paint"]
         assert load(painted, 1) == after
 
     def test_an_edit_of_a_ball_looks_at_no_picture(self, painted, paint, looked):
         view = load(painted, 1).group.views[0]
         change(painted, paint, SetBall(view.key, None))
         assert looked == []
-        assert [entry.kind for entry in history(painted, 1)][-1] == "edit"
+        assert [entry.kind for entry in read_history(painted, 1)][-1] == "edit"
 
     def test_undo_and_redo_take_it_along(self, painted, paint):
         before = calibrations(painted)
@@ -98,9 +97,9 @@ class TestFollow:
     def test_the_log_tells_it_again(self, painted, paint):
         change(painted, paint, without_a_line(painted))
         with painted.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
         before = load(painted, 1).stored
-        rebuild(painted)
+        rebuild_tables(painted)
         assert load(painted, 1).stored == before
 
     def test_taking_back_a_reading_takes_back_the_one_of_the_dataset(self, painted, paint):

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from app.features.groups.edit import SetBall
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.body import GONE
@@ -65,4 +65,4 @@ class TestNoteGone:
         state = load(store, three[1])
         assert (state.group.view("8.png").ball, state.stored.edited_views) == (ball, {"8.png"})
         with store.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)

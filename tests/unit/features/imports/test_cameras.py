@@ -8,9 +8,9 @@ import pytest
 
 from app.errors import NotFoundError
 from app.features.datasets.service import get_dataset
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.edit import SetLines, SetStationCamera
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
@@ -67,7 +67,7 @@ class TestIngestCameras:
         after = load_station(store, station.id).station
         assert (after.given, after.given_covariance) == (opposite, None)
         with store.read() as session:
-            assert replay(session).stations[station.id].station == after
+            assert replay_log(session).stations[station.id].station == after
 
     def test_how_well_it_is_known_comes_along_and_counts_for_the_ball(
         self, store, state, tmp_path
@@ -86,10 +86,10 @@ class TestIngestCameras:
             station = after.group.view("7_1.png").station
             assert station.given_covariance == pytest.approx(known, rel=1e-9)
             with store.read() as session:
-                assert replay(session) == read_state_snapshot(session)
+                assert replay_log(session) == read_state_snapshot(session)
             sigmas.append(after.solution.ball.sigma_m)
         assert sigmas[1] > 2 * sigmas[0]
-        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        export_dataset(store, "demo", "cameras", tmp_path / "out", everything=True)
         (file,) = (tmp_path / "out").rglob("camera_7_1.json")
         told = json.loads(file.read_text())["covariance"]
         assert np.diag(told)[:3] == pytest.approx([1.0] * 3)

@@ -12,7 +12,7 @@ from app.db.log import LogModel
 from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import get_dataset
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.findings.queries import group_findings
 from app.features.findings.service import FindingName, set_dismissal
 from app.features.groups.edit import (
@@ -22,11 +22,10 @@ from app.features.groups.edit import (
     SetStationCamera,
     SetStationLines,
 )
-from app.features.groups.history import history
-from app.features.groups.replay import replay
+from app.features.groups.history import read_history, undo
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.edits_export import GROUPS, STATIONS
 from app.features.imports.ingest import ingest
@@ -37,7 +36,7 @@ from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station, submit_station, undo_station
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation, Extras
@@ -53,7 +52,7 @@ def bring(tmp_path: Path) -> Callable:
     """Carries the dataset of one home to another; returns what the import says."""
 
     def run(source: Store, target: Store, out: str = "carried.zip", dry_run: bool = False):
-        export(source, "demo", "touchline", tmp_path / out)
+        export_dataset(source, "demo", "touchline", tmp_path / out)
         return bring_file(target, tmp_path / out, dry_run=dry_run)
 
     return run
@@ -85,7 +84,7 @@ def entries(store: Store) -> int:
 def assert_replays(store: Store) -> None:
     """The log still rebuilds the tables."""
     with store.read() as session:
-        assert replay(session) == read_state_snapshot(session)
+        assert replay_log(session) == read_state_snapshot(session)
 
 
 def findings(store: Store, group_id: int) -> list[str]:
@@ -130,7 +129,7 @@ class TestRoundTrip:
         assert (report.new, report.problems) == (4, [])
         solve_dataset(there, "demo")
         hashes = {
-            freeze(home, "demo", FreezeRequest("v1", groups="passing"), actor="x").hash
+            freeze_dataset(home, "demo", FreezeRequest("v1", groups="passing"), actor="x").hash
             for home in (store, there)
         }
         assert len(hashes) == 1
@@ -148,7 +147,9 @@ class TestRoundTrip:
         bring(store, there)
         assert load(there, 1).stored.edited_views == {"7.png"}
         assert not load(there, 2).stored.edited
-        told = [entry.body["carried"] for entry in history(there, 1) if "carried" in entry.body]
+        told = [
+            entry.body["carried"] for entry in read_history(there, 1) if "carried" in entry.body
+        ]
         assert [entry["actor"] for entry in told[0]] == ["ann", "ann"]
 
     @pytest.mark.parametrize("back", [False, True])
@@ -165,9 +166,9 @@ class TestRoundTrip:
         self, store, busy, tmp_path
     ) -> None:
         for name in ("a.zip", "b.zip"):
-            export(store, "demo", "touchline", tmp_path / name)
+            export_dataset(store, "demo", "touchline", tmp_path / name)
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
-        export(store, "demo", "touchline", tmp_path / "c")
+        export_dataset(store, "demo", "touchline", tmp_path / "c")
         assert "/frames/" not in (tmp_path / "c" / GROUPS).read_text()
 
     def test_a_dry_run_says_the_same_and_keeps_nothing(self, store, there, busy, bring) -> None:
@@ -177,7 +178,7 @@ class TestRoundTrip:
 
     def test_a_frozen_version_is_not_carried(self, store, busy, tmp_path) -> None:
         with pytest.raises(InputError, match="carries the whole dataset"):
-            export(store, "demo", "touchline", tmp_path / "x", version="v1")
+            export_dataset(store, "demo", "touchline", tmp_path / "x", version="v1")
 
 
 @pytest.fixture
@@ -403,7 +404,7 @@ class TestBrokenFiles:
         self, store, there, fill, make_group, tmp_path, path, value
     ) -> None:
         fill(make_group(7), make_group(8))
-        export(store, "demo", "touchline", tmp_path / "out")
+        export_dataset(store, "demo", "touchline", tmp_path / "out")
         lines = (tmp_path / "out" / GROUPS).read_text().splitlines()
         record = json.loads(lines[0])
         place = record
@@ -419,7 +420,7 @@ class TestBrokenFiles:
         self, store, there, fill, make_group, tmp_path
     ) -> None:
         fill(make_group(7))
-        export(store, "demo", "touchline", tmp_path / "out")
+        export_dataset(store, "demo", "touchline", tmp_path / "out")
         record = json.loads((tmp_path / "out" / GROUPS).read_text())
         for view in record["group"]["views"]:
             view["media"] = ["/etc/passwd", None, None]

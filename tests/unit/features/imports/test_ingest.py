@@ -9,10 +9,9 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import get_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
-from app.features.groups.history import history
+from app.features.groups.history import read_history, undo
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import ensure_dataset, ingest
 from app.features.stations.service import load_station, submit_station
@@ -375,7 +374,7 @@ class TestAChangedSource:
 
     def test_the_log_has_each_import_of_a_group(self, store, state, make_group) -> None:
         again(store, with_ball(make_group(), "7.png", 300.0))
-        assert [entry.kind for entry in history(store, state.id)] == ["import", "import"]
+        assert [entry.kind for entry in read_history(store, state.id)] == ["import", "import"]
 
     def test_an_edit_of_lines_stays(self, store, state, make_group) -> None:
         edit = SetLines("7.png", {"Middle line": None})

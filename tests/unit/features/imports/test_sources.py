@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import dataset_id, get_dataset, list_datasets
 from app.features.datasets.tables import GroupModel
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
@@ -54,7 +54,7 @@ def hashes(store: Store, dataset: str) -> dict[str, str]:
 
 def there_and_back(store: Store, form: str, out: Path, **options: object) -> dict[str, Group]:
     """Export "demo" and import what was written as "again"."""
-    export(store, "demo", form, out, everything=True)
+    export_dataset(store, "demo", form, out, everything=True)
     size = SIZE if form in USERS["size"] else None
     source = Source(form, out, size=size, **options)  # type: ignore[arg-type]
     imported = import_source(store, "again", source, store.settings)
@@ -116,7 +116,7 @@ class TestThereAndBack:
     ) -> None:
         there_and_back(store, form, tmp_path / "first")
         solve_dataset(store, "again")
-        export(store, "again", form, tmp_path / "second", everything=True)
+        export_dataset(store, "again", form, tmp_path / "second", everything=True)
         again = Source(form, tmp_path / "second", size=SIZE if form in USERS["size"] else None)
         imported = import_source(store, "third", again, store.settings)
         assert imported.result.new == len(groups_of(store, "again"))
@@ -172,7 +172,7 @@ class TestThereAndBack:
 
     def test_cameras_go_where_they_came_from(self, store, fill, make_group, tmp_path) -> None:
         fill(make_group(7))
-        export(store, "demo", "cameras", tmp_path / "out", everything=True)
+        export_dataset(store, "demo", "cameras", tmp_path / "out", everything=True)
         views = [
             replace(view, station=replace(view.station, given=None)) for view in make_group(7).views
         ]
@@ -311,7 +311,7 @@ class TestDryRun:
     ) -> None:
         monkeypatch.setattr("app.features.imports.ingest.BATCH", 1)
         fill(make_static(1), make_static(2), make_static(3), solved=False)
-        export(store, "demo", "issia-3d", tmp_path, everything=True)
+        export_dataset(store, "demo", "issia-3d", tmp_path, everything=True)
         import_source(store, "again", Source("issia-3d", tmp_path), store.settings)
         wider = Source("issia-3d", tmp_path, size=ImageSize(1921, 1080))
         dry = import_source(store, "again", wider, store.settings, dry_run=True)

@@ -20,7 +20,7 @@ from app.features.imports.upload_queries import (
     keep_upload,
     list_uploads,
 )
-from app.features.imports.upload_quota import quota_of, used_bytes
+from app.features.imports.upload_quota import person_quota, used_bytes
 
 
 @pytest.fixture
@@ -43,9 +43,9 @@ def send(
 
 class TestQuotaOf:
     def test_counts_on_the_server_of_a_team_alone(self, settings: Settings) -> None:
-        assert quota_of(settings) == 1000
-        assert quota_of(settings.model_copy(update={"upload_quota_bytes": 0})) is None
-        assert quota_of(settings.model_copy(update={"team": False})) is None
+        assert person_quota(settings) == 1000
+        assert person_quota(settings.model_copy(update={"upload_quota_bytes": 0})) is None
+        assert person_quota(settings.model_copy(update={"team": False})) is None
 
 
 class TestQuota:

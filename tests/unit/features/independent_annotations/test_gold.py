@@ -8,20 +8,20 @@ import pytest
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.groups.edit import SetBall, SetLines
-from app.features.groups.history import history
+from app.features.groups.history import read_history
 from app.features.groups.submit import load, submit
+from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.errors import polyline_distance
 from app.features.independent_annotations.gold import (
-    mark,
+    mark_group,
     median_interval,
     read_report,
     start_with,
-    unmark,
+    unmark_group,
     wilson,
 )
-from app.features.independent_annotations.gold_queries import gold_truth
 from app.features.independent_annotations.known_truth import Terms, begin_next
-from app.features.independent_annotations.return_work import return_annotation
+from app.features.independent_annotations.queries import gold_truth
 from app.features.independent_annotations.service import submit_annotation
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import BallAnnotation
@@ -42,7 +42,7 @@ def terms(store, fill, make_group) -> Terms:
     """A batch of two groups of three; the third one is gold."""
     groups = fill(*(make_group(number) for number in (1, 2, 3)))
     judge(store, groups[2])
-    mark(store, groups[2], "imported", actor="lea")
+    mark_group(store, groups[2], "imported", actor="lea")
     dataset_id = load(store, groups[0]).dataset_id
     return Terms(4, dataset_id, groups[:2], 2, True, "2000", gold_every=2)
 
@@ -50,28 +50,28 @@ def terms(store, fill, make_group) -> Terms:
 class TestMark:
     def test_only_a_group_with_a_verdict_is_made_gold(self, store, state) -> None:
         with pytest.raises(ConflictError):
-            mark(store, state.id, "bare", actor="lea")
+            mark_group(store, state.id, "bare", actor="lea")
         with pytest.raises(InputError):
-            mark(store, state.id, "half", actor="lea")
+            mark_group(store, state.id, "half", actor="lea")
         judge(store, state.id)
-        assert mark(store, state.id, "bare", actor="lea").start == "bare"
-        assert unmark(store, state.id, actor="lea").group == state.id
+        assert mark_group(store, state.id, "bare", actor="lea").start == "bare"
+        assert unmark_group(store, state.id, actor="lea").group == state.id
         with pytest.raises(NotFoundError):
-            unmark(store, state.id, actor="lea")
+            unmark_group(store, state.id, actor="lea")
 
     def test_the_history_of_a_group_does_not_tell_that_it_is_gold(self, store, state) -> None:
         judge(store, state.id)
-        before = [entry.kind for entry in history(store, state.id)]
+        before = [entry.kind for entry in read_history(store, state.id)]
         etag = load(store, state.id).etag
-        mark(store, state.id, "bare", actor="lea")
-        assert [entry.kind for entry in history(store, state.id)] == before
+        mark_group(store, state.id, "bare", actor="lea")
+        assert [entry.kind for entry in read_history(store, state.id)] == before
         assert load(store, state.id).etag == etag
 
 
 class TestStartWith:
     def test_what_is_true_stays_although_the_group_is_another_by_now(self, store, state) -> None:
         judge(store, state.id)
-        marked = mark(store, state.id, "bare", actor="lea")
+        marked = mark_group(store, state.id, "bare", actor="lea")
         with store.read() as session:
             truth = gold_truth(session, state.id)
         view = state.group.views[0]
@@ -88,7 +88,7 @@ class TestStartWith:
         with pytest.raises(NotFoundError, match="there is no group 99"):
             start_with(store, 99, "bare", actor="lea")
         judge(store, state.id)
-        mark(store, state.id, "bare", actor="lea")
+        mark_group(store, state.id, "bare", actor="lea")
         with pytest.raises(InputError) as refused:
             start_with(store, state.id, "half", actor="lea")
         assert refused.value.pointer == "/start"
@@ -108,7 +108,7 @@ class TestMixing:
         }
         assert len(shapes) == 1
         assert [copy.group.label for copy in copies] == ["Group 1", "Group 2", "Group 3"]
-        kinds_of = {tuple(e.kind for e in history(store, copy.id)) for copy in copies}
+        kinds_of = {tuple(e.kind for e in read_history(store, copy.id)) for copy in copies}
         assert kinds_of == {("import", "verdict", "take")}
 
     @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ class TestMixing:
     )
     def test_it_is_stripped_of_what_is_measured(self, store, terms, start, balls, lines) -> None:
         gold = read_report(store, terms.dataset_id).groups[0]
-        mark(store, gold.group, start, actor="lea")
+        mark_group(store, gold.group, start, actor="lea")
         chance = Random(1)
         takes = []
         while (take := begin_next(store, terms, person="ann", chance=chance)) is not None:

@@ -12,10 +12,10 @@ from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, get_batch, make_batch
 from app.features.datasets.service import get_dataset
 from app.features.groups.edit import SetBall
-from app.features.groups.history import history
+from app.features.groups.history import read_history
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
-from app.features.independent_annotations.gold import mark, read_report
+from app.features.independent_annotations.gold import mark_group, read_report
 from app.features.independent_annotations.service import get_annotation_of_copy
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -70,7 +70,7 @@ class TestGoldInAFilm:
     def test_it_is_mixed_in_looks_like_any_frame_and_its_error_is_shown(
         self, store: Store, film: dict[int, int]
     ) -> None:
-        mark(store, film[GOLD], "imported", actor="lea")
+        mark_group(store, film[GOLD], "imported", actor="lea")
         frames = ",".join(str(film[FIRST + n]) for n in range(3))
         new = NewBatch("film", f"id:{frames}", annotators=["ann"], gold_every=2)
         batch = make_batch(store, "film", new, actor="lea").id
@@ -84,7 +84,7 @@ class TestGoldInAFilm:
                     state.group.match,
                     tuple(view.key for view in state.group.views),
                     tuple(view.station.key for view in state.group.views),
-                    tuple(entry.kind for entry in history(store, copy)),
+                    tuple(entry.kind for entry in read_history(store, copy)),
                 )
             )
             assert state.solution is not None and state.solution.ball is not None
@@ -104,7 +104,7 @@ class TestGoldInAFilm:
     def test_its_annotator_begins_without_the_ball_and_has_the_cameras(
         self, store: Store, film: dict[int, int], start: str
     ) -> None:
-        mark(store, film[GOLD], start, actor="lea")
+        mark_group(store, film[GOLD], start, actor="lea")
         new = NewBatch("film", f"id:{film[FIRST]}", annotators=["ann"], gold_every=1)
         batch = make_batch(store, "film", new, actor="lea").id
         copy = Leases(store).next(batch, ANN).group

@@ -33,7 +33,7 @@ from app.features.people.service import invite
 from app.features.people.visibility_queries import EVERYTHING
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.finite import json_text
 from app.sample.scene import TRUTH, truth_to_json
 from app.soccer.annotation import BallAnnotation
@@ -153,7 +153,7 @@ class TestVersion:
             judge(store, copy, person)
         assert after_submission(store, copy) == "open"
         judge(store, 3, "cy")
-        freeze(store, "demo", FreezeRequest("v1"), actor="lea")
+        freeze_dataset(store, "demo", FreezeRequest("v1"), actor="lea")
         key = load(store, 2).group.views[0].key
         ball = BallAnnotation(box=Box(10.0, 10.0, 14.0, 14.0))
         frozen = load(store, 2)

@@ -11,13 +11,12 @@ from app.features.batches.own_annotations import own_left
 from app.features.batches.service import NewBatch, make_batch
 from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
 from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
-from app.features.groups.history import history
-from app.features.groups.replay import rebuild
+from app.features.groups.history import read_history, undo
+from app.features.groups.replay import rebuild_tables
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, solve_and_keep, submit
-from app.features.groups.undo import undo
-from app.features.independent_annotations.adopt import adopt_annotation
-from app.features.independent_annotations.gold import mark
+from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
+from app.features.independent_annotations.gold import mark_group
 from app.features.independent_annotations.known_truth import (
     Terms,
     begin_next,
@@ -25,18 +24,16 @@ from app.features.independent_annotations.known_truth import (
     is_gold_turn,
 )
 from app.features.independent_annotations.queries import GOLD, INDEPENDENT
-from app.features.independent_annotations.return_work import return_annotation
 from app.features.independent_annotations.service import (
     get_annotation,
     get_annotation_of_copy,
     list_annotations,
     submit_annotation,
 )
-from app.features.integrity.database import examine
+from app.features.integrity.database import examine_database
 from app.features.people.logins import read_roles
-from app.features.people.members import give_role
 from app.features.people.roles import Role
-from app.features.people.service import invite
+from app.features.people.service import give_role, invite
 from app.features.people.visibility_queries import COPIES, READER, RestrictedReader, Visibility
 from app.features.policies.service import change_policy
 from app.features.queue.changes import read_news
@@ -63,7 +60,7 @@ def judge(store, group_id, state="accepted", actor="ann", reason=None, note="as 
 
 
 def faults(store) -> list[str]:
-    return [str(check) for check in examine(store) if not check.ok]
+    return [str(check) for check in examine_database(store) if not check.ok]
 
 
 class TestBeginTake:
@@ -112,7 +109,7 @@ class TestBeginTake:
         change(store, take.copy_id, SetBall(state.group.views[0].key, BALL))
         before = load(store, take.copy_id)
         assert faults(store) == []
-        rebuild(store)
+        rebuild_tables(store)
         assert load(store, take.copy_id).etag == before.etag
         with store.read() as session:
             verify_chain(session)
@@ -209,7 +206,7 @@ class TestStart:
         groups = fill(*(make_group(number) for number in range(1, 6)))
         for group, start in zip(groups[3:], starts, strict=True):
             judge(store, group, actor="lea")
-            mark(store, group, start, actor="lea")
+            mark_group(store, group, start, actor="lea")
         terms = Terms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
         kinds = []
         while (take := begin_next(store, terms, person="ann", chance=Random(3))) is not None:
@@ -302,7 +299,7 @@ class TestHandIn:
         assert refused.value.pointer == "/reason"
         return_annotation(store, take.id, "the ball", actor="lea")
         submit_annotation(store, take.id, actor="ann")
-        said = [(one.actor, one.body["did"]) for one in history(store, take.copy_id)[1:]]
+        said = [(one.actor, one.body["did"]) for one in read_history(store, take.copy_id)[1:]]
         assert said == [("ann", "handed in"), ("lea", "handed back"), ("ann", "handed in")]
         assert faults(store) == []
 
@@ -319,7 +316,7 @@ class TestAdoptTake:
         copy = load(store, take.copy_id)
         assert after.group == copy.group
         assert (after.verdict.state, after.verdict.actor) == ("accepted", "ann")
-        said = [(entry.kind, entry.actor) for entry in history(store, state.id)][1:]
+        said = [(entry.kind, entry.actor) for entry in read_history(store, state.id)][1:]
         assert said == [("edit", "ann"), ("verdict", "ann"), ("take", "lea")]
         assert get_annotation(store, take.id).settled is not None
         with pytest.raises(ConflictError):

@@ -14,9 +14,9 @@ from app.db.check import Check
 from app.db.dialects.dialect import dialect_of
 from app.db.store import Store
 from app.features.findings.service import FindingName, set_dismissal
-from app.features.groups.replay import rebuild
+from app.features.groups.replay import rebuild_tables
 from app.features.groups.submit import load
-from app.features.integrity.database import REBUILD, examine
+from app.features.integrity.database import REBUILD, examine_database
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import make_lines
@@ -32,7 +32,7 @@ def ids(store: Store, fill, make_group) -> list[int]:
 
 
 def faults(store: Store) -> dict[str, Check]:
-    return {check.name: check for check in examine(store) if not check.ok}
+    return {check.name: check for check in examine_database(store) if not check.ok}
 
 
 def change(store: Store, *statements: str, body: bytes = b"garbage") -> None:
@@ -176,7 +176,7 @@ class TestQueue:
         assert found["queue"].sentence.startswith("1 not as")
         assert found["queue"].sentence.endswith(f": {ids[1]}")
         assert found["queue"].mend == REBUILD
-        rebuild(store)
+        rebuild_tables(store)
         assert faults(store) == {}
 
     def test_after_an_upgrade_with_another_solver_groups_wait_and_keep_their_numbers(
@@ -191,10 +191,10 @@ class TestQueue:
         number = first(store, row)
         assert number is not None
         assert faults(store) == {}
-        (found,) = (check for check in examine(store) if check.name == "solutions of demo")
+        (found,) = (check for check in examine_database(store) if check.name == "solutions of demo")
         assert found.sentence == "2 of 2 groups wait to be solved"
         assert found.mend == 'touchline solve --dataset "demo"'
-        rebuild(store)
+        rebuild_tables(store)
         assert first(store, row) == number
         assert faults(store) == {}
         solve_dataset(store, "demo")
@@ -204,7 +204,7 @@ class TestQueue:
 
 class TestExamine:
     def test_a_healthy_database_has_no_fault(self, store: Store, ids) -> None:
-        checks = {check.name: check for check in examine(store)}
+        checks = {check.name: check for check in examine_database(store)}
         assert all(check.ok for check in checks.values())
         assert checks["groups"].sentence == "2, as the log says"
         assert checks["solutions of demo"].sentence == "0 of 2 groups wait to be solved"
@@ -217,7 +217,7 @@ class TestExamine:
         assert found.keys() == {"groups"}
         assert found["groups"].sentence == f"1 not as the log says: {ids[1]}"
         assert found["groups"].mend == REBUILD
-        rebuild(store)
+        rebuild_tables(store)
         assert faults(store) == {}
 
     @pytest.mark.parametrize(
@@ -235,7 +235,7 @@ class TestExamine:
         found = faults(store)["digests"]
         assert f" not of what was said: {named} " in found.sentence
         assert found.mend == REBUILD
-        rebuild(store)
+        rebuild_tables(store)
         assert faults(store) == {}
 
     def test_a_verdict_that_was_changed_needs_a_backup(self, store: Store, ids) -> None:
@@ -277,12 +277,12 @@ class TestExamine:
     ) -> None:
         change(store, f"UPDATE station SET lines = '[' WHERE id IN ({stations_of(ids[0])})")
         assert faults(store)["tables"].mend == REBUILD
-        rebuild(store)
+        rebuild_tables(store)
         assert faults(store) == {}
 
     def test_groups_that_wait_are_told_and_are_no_fault(
         self, store: Store, fill, make_group
     ) -> None:
         fill(make_group(7), solved=False)
-        (told,) = (check for check in examine(store) if check.mend)
+        (told,) = (check for check in examine_database(store) if check.mend)
         assert (told.ok, told.mend) == (True, 'touchline solve --dataset "demo"')

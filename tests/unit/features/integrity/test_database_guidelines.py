@@ -9,7 +9,7 @@ from app.db.check import Check
 from app.db.store import Store
 from app.features.datasets.service import delete_dataset
 from app.features.guidelines.service import write_guidelines
-from app.features.integrity.database import examine
+from app.features.integrity.database import examine_database
 from tests.databases import said_for_sqlite
 
 
@@ -23,7 +23,7 @@ def told(store: Store, fill, make_group) -> Store:
 
 
 def found(store: Store) -> Check:
-    return next(check for check in examine(store) if check.name == "guidelines")
+    return next(check for check in examine_database(store) if check.name == "guidelines")
 
 
 class TestExamineGuidelines:

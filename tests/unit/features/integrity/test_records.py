@@ -9,14 +9,13 @@ from app.db.check import Check
 from app.db.log import Entry
 from app.db.session import Session
 from app.db.store import Store
-from app.features.audit.audit_events import adopt
+from app.features.audit.audit_events import assign_local_work
 from app.features.datasets import service as delete
 from app.features.datasets.service import dataset_id, delete_dataset
 from app.features.imports.ingest import ensure_dataset
-from app.features.integrity.database import examine
-from app.features.people.members import give_role
+from app.features.integrity.database import examine_database
 from app.features.people.roles import Role
-from app.features.people.service import change_person, find_person, invite
+from app.features.people.service import change_person, find_person, give_role, invite
 from app.soccer.policy import PAPER
 from tests.databases import said_for_sqlite
 
@@ -41,12 +40,12 @@ def team(store: Store, fill, make_group) -> Store:
     give_role(store, "demo", ids["bob"], Role.LEAD, actor="ann")
     give_role(store, "demo", ids["eve"], Role.LEAD, actor="ann")
     give_role(store, "demo", ids["eve"], None, actor="ann")
-    adopt(store, ids["ann"], actor="ann")
+    assign_local_work(store, ids["ann"], actor="ann")
     return store
 
 
 def found(store: Store) -> dict[str, Check]:
-    return {check.name: check for check in examine(store) if check.name in PARTS}
+    return {check.name: check for check in examine_database(store) if check.name in PARTS}
 
 
 def forge(store: Store, statement: str) -> None:

@@ -7,13 +7,13 @@ from sqlalchemy import text
 
 from app.db.check import Check
 from app.db.store import Store
-from app.features.integrity.database import examine
+from app.features.integrity.database import examine_database
 
 pytestmark = pytest.mark.file_of_sqlite("PostgreSQL has never kept U+0000")
 
 
 def texts_check(store: Store) -> Check:
-    (found,) = (check for check in examine(store) if check.name == "texts")
+    (found,) = (check for check in examine_database(store) if check.name == "texts")
     return found
 
 

@@ -12,7 +12,7 @@ from app.db.store import Store
 from app.errors import DamagedError, InputError, StorageError
 from app.features.groups.revision_queries import newest_change_id
 from app.features.integrity import transfer as module
-from app.features.integrity.transfer import transfer
+from app.features.integrity.transfer import transfer_database
 from tests.databases import POSTGRESQL
 from tests.unit.db.homes import say
 
@@ -27,7 +27,7 @@ def source(filled: Store, tmp_path: Path) -> Settings:
     say(filled, 3)
     filled.close()
     home = Settings(home=tmp_path / "file")
-    transfer(filled.settings, home)
+    transfer_database(filled.settings, home)
     return home
 
 
@@ -48,7 +48,7 @@ class TestTransfer:
         with closing(Store.open(source)) as store, store.write() as session:
             session.execute(text("UPDATE groups SET split = split"))
             assert newest_change_id(session) == 2
-        done = transfer(source, target)
+        done = transfer_database(source, target)
         assert done.entries == 3
         # Marks of changes are the target's own, and nothing remembers those of the source.
         assert not target.yields.exists()
@@ -69,11 +69,11 @@ class TestTransfer:
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            transfer(source, target, stop)
+            transfer_database(source, target, stop)
         with pytest.raises(StorageError, match="has not come to its end"):
             Store.open(target.model_copy(update={"home": source.home.parent / "else"}))
         seen: list[str] = []
-        done = transfer(source, target, lambda name, _: seen.append(name))
+        done = transfer_database(source, target, lambda name, _: seen.append(name))
         assert "view" in seen
         assert "groups" not in seen
         assert done.copied < sum(done.rows.values())
@@ -85,7 +85,7 @@ class TestTransfer:
         target = source.model_copy(update={"database_url": databases.new()})
         monkeypatch.setattr(module, "_digest_rows", lambda connection, _: (id(connection), ""))
         with pytest.raises(DamagedError, match="is not equal"):
-            transfer(source, target)
+            transfer_database(source, target)
         monkeypatch.undo()
         with pytest.raises(StorageError, match="has not come to its end"):
             Store.open(target.model_copy(update={"home": source.home.parent / "else"}))
@@ -93,7 +93,7 @@ class TestTransfer:
     def test_a_database_in_use_is_left_alone(self, source: Settings, filled: Store) -> None:
         before = contents(filled.settings)
         with pytest.raises(InputError, match="in use"):
-            transfer(source, filled.settings)
+            transfer_database(source, filled.settings)
         assert contents(filled.settings) == before
 
     def test_the_command_reads_an_address_from_a_private_file(
@@ -124,7 +124,7 @@ class TestNullCharacters:
     def test_they_are_named_before_anything_is_copied(self, older: Settings, databases) -> None:
         target = older.model_copy(update={"database_url": databases.new()})
         with pytest.raises(InputError, match="groups id=1 column label") as caught:
-            transfer(older, target)
+            transfer_database(older, target)
         assert "--replace-null" in (caught.value.hint or "")
 
     def test_they_are_replaced_when_that_is_asked_for(

@@ -8,11 +8,10 @@ import pytest
 
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import SetLines, SetPicture
-from app.features.groups.history import history
-from app.features.groups.replay import rebuild, replay
+from app.features.groups.history import read_history, undo
+from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.imports.ingest import ingest
 from app.features.match_estimates import positions as editing
 from app.features.match_estimates import queries as positions_in_store
@@ -24,7 +23,7 @@ from app.features.match_estimates.positions import (
 from app.features.pitches.service import change_pitches
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset, stale_groups
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.verify import verify
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
@@ -150,7 +149,7 @@ class TestSharePositions:
 
     def test_what_is_current_is_left_alone(self, shared):
         share_positions(shared, "demo", actor="ann")
-        assert [entry.kind for entry in history(shared, 1)] == ["import", "position"]
+        assert [entry.kind for entry in read_history(shared, 1)] == ["import", "position"]
 
     def test_another_size_of_the_pitch_makes_it_old(self, shared):
         with shared.write() as session:
@@ -170,9 +169,9 @@ class TestSharePositions:
 
     def test_the_log_tells_it_again(self, shared):
         with shared.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
         before = [load(shared, number).stored for number in (1, 4)]
-        rebuild(shared)
+        rebuild_tables(shared)
         assert [load(shared, number).stored for number in (1, 4)] == before
 
     def test_undo_of_a_group_takes_back_its_own_edits_alone(self, shared):
@@ -189,7 +188,7 @@ class TestSharePositions:
         assert load(shared, 1).group.label == changed.label
         assert len(load(shared, 1).group.positions) == 1
         with shared.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_off_it_is_kept_not_used_and_as_current_as_before(self, shared):
         change_policy(shared, "demo", PAPER, if_match=None, actor="ann")
@@ -257,7 +256,9 @@ class TestSharePositions:
         assert load(shared, 1).group.positions == {}
 
     def test_a_version_holds_it_and_is_verified_bit_for_bit(self, shared):
-        version = freeze(shared, "demo", FreezeRequest("one", groups="passing"), actor="ann")
+        version = freeze_dataset(
+            shared, "demo", FreezeRequest("one", groups="passing"), actor="ann"
+        )
         take_back(shared, MATCH)
         report = verify(shared, version.id)
         assert (report.ok, report.groups) == (True, 6)

@@ -8,7 +8,7 @@ import pytest
 
 from app.errors import ConflictError, InputError, StaleRevisionError
 from app.features.groups.edit import SetStationCalibration, SetStationCamera
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
 from app.features.match_estimates import rig
@@ -16,10 +16,10 @@ from app.features.match_estimates.rig import (
     CAMERAS,
     SIGMA,
     ProposedRig,
-    accept,
+    accept_rig,
     anchor_sentence,
     proposal_values,
-    propose,
+    propose_adjustment,
     take_back,
     time_sentence,
 )
@@ -69,7 +69,7 @@ def known() -> dict[str, ProposedRig]:
 def proposed(store, ids, known) -> ProposedRig:
     """Something for every camera."""
     if not known:
-        known["demo"] = propose(store, "demo")
+        known["demo"] = propose_adjustment(store, "demo")
     found = known["demo"]
     keys = [change.key for change in found.proposal.cameras]
     assert keys == sorted(found.stations) == sorted(GIVEN) != []
@@ -122,22 +122,22 @@ class TestPropose:
             solved=False,
         )
         with pytest.raises(InputError, match="show the ball together"):
-            propose(store, "demo")
+            propose_adjustment(store, "demo")
 
     def test_line_files_count_instead_of_the_lines_of_the_dataset(
         self, store, ids, proposed, tmp_path
     ) -> None:
         lines = {"Middle line": [{"x": 640.0, "y": y} for y in (100.0, 300.0, 500.0)]}
         (tmp_path / "cam1.json").write_text(json.dumps(lines))
-        assert propose(store, "demo", tmp_path).proposal.line_points == 3
+        assert propose_adjustment(store, "demo", tmp_path).proposal.line_points == 3
         (tmp_path / "cam1.json").rename(tmp_path / "left.json")
         with pytest.raises(InputError, match="no line file"):
-            propose(store, "demo", tmp_path)
+            propose_adjustment(store, "demo", tmp_path)
 
 
 class TestAccept:
     def test_gives_every_camera_its_place_and_its_covariance(self, store, ids, proposed) -> None:
-        accept(store, proposed, CAMERAS, actor="ann")
+        accept_rig(store, proposed, CAMERAS, actor="ann")
         for change in proposed.proposal.cameras:
             station = stations(store, proposed)[change.key]
             assert (station.given, station.given_covariance) == (change.after, change.covariance)
@@ -146,21 +146,21 @@ class TestAccept:
     def test_accepting_sigma_keeps_the_cameras_and_says_how_far_they_may_be_off(
         self, store, proposed
     ) -> None:
-        accept(store, proposed, SIGMA, actor="ann")
+        accept_rig(store, proposed, SIGMA, actor="ann")
         for change in proposed.proposal.cameras:
             station = stations(store, proposed)[change.key]
             assert station.given == GIVEN[change.key]
             assert station.given_covariance == change.covariance_before
 
     def test_importing_the_dataset_again_changes_nothing_of_it(self, store, proposed) -> None:
-        accept(store, proposed, CAMERAS, actor="ann")
+        accept_rig(store, proposed, CAMERAS, actor="ann")
         before = stations(store, proposed)
         report = ingest(store, "demo", groups(), source="test", actor="ann")
         assert (report.changed, report.findings) == (0, 0)
         assert stations(store, proposed) == before
 
     def test_a_frozen_group_has_the_covariance_of_its_cameras(self, store, ids, proposed) -> None:
-        accept(store, proposed, SIGMA, actor="ann")
+        accept_rig(store, proposed, SIGMA, actor="ann")
         group = load(store, ids[0]).group
         said = freeze_annotations(group)
         texts = {key: json.loads(text) for key, text in said.texts.items()}
@@ -168,9 +168,9 @@ class TestAccept:
         assert thaw_group(texts[said.key], texts) == group
 
     def test_the_log_alone_leads_to_the_same_cameras(self, store, proposed) -> None:
-        accept(store, proposed, CAMERAS, actor="ann")
+        accept_rig(store, proposed, CAMERAS, actor="ann")
         with store.read() as session:
-            ledger = replay(session)
+            ledger = replay_log(session)
         for key, state in proposed.stations.items():
             assert ledger.stations[state.id].station == stations(store, proposed)[key]
 
@@ -179,20 +179,20 @@ class TestAccept:
         other = SetStationCalibration("lines")
         submit_station(store, state.id, other, if_match=state.etag, actor="bob")
         with pytest.raises(StaleRevisionError):
-            accept(store, proposed, CAMERAS, actor="ann")
+            accept_rig(store, proposed, CAMERAS, actor="ann")
         # All of them or none.
         assert stations(store, proposed)["cam1"].given_covariance is None
 
     def test_balls_do_not_count_twice(self, store, proposed) -> None:
-        accept(store, proposed, SIGMA, actor="ann")
+        accept_rig(store, proposed, SIGMA, actor="ann")
         with pytest.raises(ConflictError, match="adjusted already"):
-            propose(store, "demo")
+            propose_adjustment(store, "demo")
 
     def test_what_can_be_accepted_is_the_cameras_or_sigma_and_nothing_else(
         self, store, proposed
     ) -> None:
         with pytest.raises(InputError, match='"sigma"'):
-            accept(store, proposed, "all", actor="ann")
+            accept_rig(store, proposed, "all", actor="ann")
 
     def test_a_pitch_that_has_changed_since_makes_another_proposal(self, store, proposed) -> None:
         etag = read_pitches(store, "demo").etag
@@ -200,17 +200,17 @@ class TestAccept:
             wanted = {"rig": Pitch(104.0, 67.0)}
             change_pitches(session, "demo", wanted, if_match=etag, actor="ann")
         with pytest.raises(ConflictError, match="size of the pitch has changed"):
-            accept(store, proposed, CAMERAS, actor="ann")
+            accept_rig(store, proposed, CAMERAS, actor="ann")
         assert stations(store, proposed)["cam1"].given_covariance is None
-        assert propose(store, "demo").inputs != proposed.inputs
+        assert propose_adjustment(store, "demo").inputs != proposed.inputs
 
     def test_a_solver_that_has_changed_since_makes_another_proposal(
         self, store, ids, proposed, monkeypatch
     ) -> None:
         monkeypatch.setattr(rig, "propose_rig", lambda *asked: proposed.proposal)
-        assert propose(store, "demo").inputs == proposed.inputs
+        assert propose_adjustment(store, "demo").inputs == proposed.inputs
         monkeypatch.setattr(rig, "SOLVER_VERSION", "another")
-        assert propose(store, "demo").inputs != proposed.inputs
+        assert propose_adjustment(store, "demo").inputs != proposed.inputs
 
     def test_importing_again_does_not_take_an_accepted_camera_for_the_datasets(
         self, store, fill
@@ -238,7 +238,7 @@ class TestAccept:
 
 class TestTakeBack:
     def test_every_camera_is_what_it_was(self, store, proposed) -> None:
-        accept(store, proposed, CAMERAS, actor="ann")
+        accept_rig(store, proposed, CAMERAS, actor="ann")
         assert take_back(store, "demo", actor="ann") == len(GIVEN)
         for key, state in proposed.stations.items():
             assert stations(store, proposed)[key] == state.station

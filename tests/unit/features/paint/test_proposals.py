@@ -17,12 +17,11 @@ from app.errors import InputError, JobCancelled, NotFoundError
 from app.features.groups import pictures as proposal_reading
 from app.features.groups.digest import station_digest
 from app.features.groups.edit import SetLines
-from app.features.groups.history import history
+from app.features.groups.history import read_history, undo
 from app.features.groups.pictures import MISSING
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import ingest
 from app.features.paint import proposals as editing
@@ -96,7 +95,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
             return ViewProposal("nothing", "No straight line is seen on the grass.", {})
         return ViewProposal("proposed", "", lines_of(CAMERA), 0.9, 0.8, 0.3, 0.25, 500)
 
-    monkeypatch.setattr(proposal_reading, "propose_lines_in_image", look)
+    monkeypatch.setattr(proposal_reading, "proposal_of", look)
     return seen
 
 
@@ -144,7 +143,7 @@ class TestProposeViews:
         assert told[0] == "Finding the frames of cam1.mp4."
 
     def test_lines_are_found_from_the_picture_and_the_match_and_nothing_is_said(self, filled):
-        before, kinds = load(filled, 2).etag, [entry.kind for entry in history(filled, 2)]
+        before, kinds = load(filled, 2).etag, [entry.kind for entry in read_history(filled, 2)]
         assert counts(filled) == (1, 0, 0, 0, 0, 0)
         run = propose_views(filled, "demo")
         assert run == ProposalRun(views=1, proposed=1)
@@ -156,7 +155,7 @@ class TestProposeViews:
         for point in item.lines["Side line right"]:
             assert np.hypot(*(curve - point).T).min() < 1.5
         assert load(filled, 2).etag == before
-        assert [entry.kind for entry in history(filled, 2)] == kinds
+        assert [entry.kind for entry in read_history(filled, 2)] == kinds
 
     def test_what_the_match_knows_is_handed_on(self, filled, asked):
         propose_views(filled, "demo")
@@ -263,7 +262,7 @@ class TestAccepting:
         state = load(filled, 2)
         station = state.group.view(key).station
         assert station.proposed == tuple(station.lines)
-        edit = history(filled, 2)[-1].body["edit"]
+        edit = read_history(filled, 2)[-1].body["edit"]
         assert set(edit["source"].values()) == {"proposed"} and edit["edit"] == "set_lines"
         said = freeze_annotations(state.group)
         assert '"proposed":["' in said.texts[said.key]
@@ -294,7 +293,7 @@ class TestAccepting:
         accept(filled)
         with filled.read() as session:
             verify_chain(session)
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_a_marking_that_is_moved_is_a_person_s_again(self, filled, asked):
         propose_views(filled, "demo")

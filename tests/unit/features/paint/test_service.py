@@ -15,12 +15,11 @@ from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups import pictures as paint_reading
 from app.features.groups.edit import SetBall, SetLines
-from app.features.groups.history import history
+from app.features.groups.history import read_history, undo
 from app.features.groups.queries import read_groups
-from app.features.groups.replay import rebuild, replay
+from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import ingest
 from app.features.paint import service as editing
@@ -28,7 +27,7 @@ from app.features.paint.service import get_paint, read_paint, take_back_paint
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset, stale_groups
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.verify import verify
 from app.features.what_if.funnel import get_yield
 from app.features.what_if.service import YieldStore
@@ -219,7 +218,7 @@ class TestReadPaint:
         monkeypatch.setattr(media, "_decode_pixels", lambda *_: pytest.fail("it was decoded again"))
         read_paint(painted, "demo", actor="ann")
         assert (here.read, looked, stale_groups(painted, "demo")) == (4, [], [])
-        assert [entry.kind for entry in history(painted, 1)] == ["import", "paint"]
+        assert [entry.kind for entry in read_history(painted, 1)] == ["import", "paint"]
 
     def test_an_edit_of_a_ball_leaves_cameras_and_paint(self, painted, here, looked):
         at = load(painted, 1)
@@ -286,7 +285,7 @@ class TestReadPaint:
         assert [view.calibration.source for view in again.solution.views] == ["paint", "paint"]
         assert again.group.paint[key].people not in ("", before.group.paint[key].people)
         with painted.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_what_was_read_while_an_import_brought_other_people_is_old(
         self, painted, pictures, looked
@@ -312,7 +311,7 @@ class TestReadPaint:
             solve_dataset(painted, "demo")
             assert [item.source for item in calibrations(painted)] == ["lines", "lines"]
         with painted.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_a_picture_that_changed_is_read_again(self, painted, pictures, tmp_path, looked):
         changed = groups(pictures)[0]
@@ -402,9 +401,9 @@ class TestReadPaint:
 class TestKept:
     def test_the_log_tells_it_again(self, painted):
         with painted.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
         before = load(painted, 1).stored
-        rebuild(painted)
+        rebuild_tables(painted)
         assert load(painted, 1).stored == before
 
     def test_without_paint_reading_groups_costs_no_statement_more(self, store, pictures, counted):
@@ -414,7 +413,9 @@ class TestKept:
         assert cost.statements == 1
 
     def test_a_version_holds_it_and_is_verified_without_pictures(self, painted, pictures):
-        version = freeze(painted, "demo", FreezeRequest("one", groups="passing"), actor="ann")
+        version = freeze_dataset(
+            painted, "demo", FreezeRequest("one", groups="passing"), actor="ann"
+        )
         take_back(painted)
         report = verify(painted, version.id)
         assert (report.ok, report.groups) == (True, int(version.counts["groups"]))
@@ -435,7 +436,7 @@ class TestKept:
         ingest(painted, "demo", [changed], source="files", actor="ann")
         assert len(load(painted, 1).group.paint) == 2
         with painted.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
 
 def take_back(store):

@@ -5,7 +5,7 @@ from sqlalchemy import select, text
 from sqlalchemy.dialects import sqlite
 
 from app.db.store import Store
-from app.features.people.queries import with_rights
+from app.features.people.queries import select_with_rights
 from app.features.people.tables import PersonModel
 
 
@@ -15,7 +15,7 @@ class TestWithRights:
     ) -> None:
         if own_store.settings.database_url:
             pytest.skip("the plan of SQLite")
-        statement = with_rights(select(PersonModel.id).where(PersonModel.id == 1), ["lead"])
+        statement = select_with_rights(select(PersonModel.id).where(PersonModel.id == 1), ["lead"])
         plain = statement.compile(dialect=sqlite.dialect(), compile_kwargs={"literal_binds": True})
         with own_store.read() as session:
             explained = text("EXPLAIN QUERY PLAN " + str(plain).replace(":", "\\:"))

@@ -20,12 +20,19 @@ from app.errors import (
     NotFoundError,
     NotLoggedInError,
 )
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.people import links
 from app.features.people import links as passwords
 from app.features.people.logins import IDLE, LASTS, Login, Logins
 from app.features.people.queries import update_person
-from app.features.people.roles import Action, DatasetRoles, Role, checked_name, lets, require
+from app.features.people.roles import (
+    Action,
+    DatasetRoles,
+    Role,
+    checked_name,
+    require_permission,
+    role_allows,
+)
 from app.features.people.service import change_person, find_person, invite, list_people, renew_link
 from tests.databases import all_that_is_kept
 
@@ -79,13 +86,13 @@ def found(logins: Logins, token: str) -> Login:
 class TestRoles:
     def test_each_role_may_what_those_before_it_may(self) -> None:
         for action in Action:
-            allowed = [lets(role, action) for role in Role]
+            allowed = [role_allows(role, action) for role in Role]
             assert allowed == sorted(allowed)
             assert allowed[-1]
 
     def test_a_refusal_says_what_is_missing(self) -> None:
         with pytest.raises(ForbiddenError, match="needs the role lead; yours is viewer"):
-            require(Role.VIEWER, Action.LEAD)
+            require_permission(Role.VIEWER, Action.LEAD)
 
 
 class TestNames:
@@ -303,7 +310,7 @@ class TestChangePerson:
         change_person(home, find_person(home, "bob").id, actor="anna", role=Role.LEAD)
         with home.read() as session:
             entries = [(item.kind, item.actor, item.body) for item in read_log(session)]
-            replay(session)
+            replay_log(session)
         assert entries[-1] == ("person", "anna", {"person": "bob", "did": "role", "role": "lead"})
         assert SECRET not in str(entries)
 

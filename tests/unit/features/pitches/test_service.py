@@ -10,11 +10,10 @@ from app.errors import InputError, NotFoundError, StaleRevisionError
 from app.features.datasets.service import dataset_id
 from app.features.findings.service import finding_values
 from app.features.groups.edit import SetLines
-from app.features.groups.history import history
-from app.features.groups.replay import rebuild, replay
+from app.features.groups.history import read_history, undo
+from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.imports.ingest import ingest
 from app.features.pitches.service import (
     change_pitches,
@@ -212,9 +211,9 @@ class TestChangePitches:
     def test_the_log_tells_it_again(self, solved):
         accept(solved)
         with solved.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
         before = [load(solved, number).stored for number in (1, 7)]
-        rebuild(solved)
+        rebuild_tables(solved)
         assert [load(solved, number).stored for number in (1, 7)] == before
 
     def test_undo_of_a_group_takes_back_its_own_edits_and_not_the_pitch(self, solved):
@@ -260,7 +259,7 @@ class TestChangePitches:
         assert [load(store, number).group.pitch for number in (1, 2, 3)] == [TRUE] * 3
         assert load(store, 2).group.label == changed.label
         with store.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_an_import_keeps_it_for_groups_that_came_later(self, store):
         first, second, third, *_ = season()
@@ -270,7 +269,7 @@ class TestChangePitches:
         changed = Group(third.key, third.views, match=SMALL, label="the source says more now")
         ingest(store, "demo", (changed,), source="files", actor="ann")
         assert load(store, 3).group == replace(changed, pitch=TRUE)
-        assert [entry.kind for entry in history(store, 3)] == ["import", "pitch", "import"]
+        assert [entry.kind for entry in read_history(store, 3)] == ["import", "pitch", "import"]
         assert_replays(store)
 
     def test_a_group_that_comes_later_gets_the_newest_size(self, store):
@@ -347,7 +346,7 @@ def questions(store):
 
 def assert_replays(store):
     with store.read() as session:
-        assert replay(session) == read_state_snapshot(session)
+        assert replay_log(session) == read_state_snapshot(session)
 
 
 class TestParsePitch:

@@ -18,8 +18,7 @@ from app.features.groups.submit import submit
 from app.features.imports.ingest import ensure_dataset, ingest
 from app.features.policies import noise
 from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, take_noise_back
-from app.features.policies.service import change_policy, read_policy
-from app.features.policies.text import policy_with
+from app.features.policies.service import change_policy, policy_with, read_policy
 from app.features.solutions import service as recompute
 from app.features.solutions.queries import present_solutions
 from app.features.solutions.service import solve_dataset, stale_groups

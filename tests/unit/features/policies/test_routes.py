@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from app.features.policies.text import policy_to_yaml
+from app.features.policies.service import policy_to_yaml
 from app.soccer.policy import PAPER, STRICT
 from tests.waiting import SECONDS
 

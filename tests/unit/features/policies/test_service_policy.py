@@ -10,12 +10,11 @@ from app.db.store import Store
 from app.errors import NotFoundError, StaleRevisionError
 from app.features.datasets.service import get_dataset, insert_dataset
 from app.features.imports.ingest import ensure_dataset
-from app.features.policies.service import change_policy, read_policy
-from app.features.policies.text import policy_with
+from app.features.policies.service import change_policy, policy_with, read_policy
 from app.features.queue.service import list_groups
 from app.features.solutions import service as recompute
+from app.features.solutions.queries import CalibrationModel, SolutionModel
 from app.features.solutions.service import solve_dataset, stale_groups
-from app.features.solutions.tables import CalibrationModel, SolutionModel
 from app.soccer.policy import PAPER, STRICT
 from app.solving import calibrate
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.features.groups.state import VerdictState
-from app.features.practice.lessons import WORDS, Feedback, judge
+from app.features.practice.lessons import WORDS, Feedback, judge_lesson
 from app.sample.faults import FaultPlan
 from app.sample.practice import CLEAN, LESSONS, make_practice, practice_stage
 from app.sample.scene import PRACTICE_KINDS, Scene
@@ -52,7 +52,7 @@ def swapped(group: Group, key: str) -> Group:
 
 
 def told(scene: Scene, group: Group, verdict: VerdictState) -> Feedback:
-    return judge(scene.truth, group, verdict)
+    return judge_lesson(scene.truth, group, verdict)
 
 
 class TestWords:

@@ -7,13 +7,17 @@ import pytest
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.frame import Detection
 from app.features.groups.edit import SetBall
-from app.features.groups.history import history
-from app.features.groups.replay import replay
+from app.features.groups.history import read_history, undo
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
-from app.features.predictions.accept import AcceptRequest, accept, accept_box, plan_accept
-from app.features.predictions.group_predictions import group_predictions
+from app.features.predictions.accept import (
+    AcceptRequest,
+    accept_box,
+    accept_predicted_balls,
+    group_predictions,
+    plan_accept,
+)
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, frame_names, save_predictions
 from app.soccer.frames import Box
@@ -56,9 +60,9 @@ class TestPlanAccept:
     def test_a_box_that_can_be_no_ball_is_refused_as_such(self, store, absurd) -> None:
         plan = plan_accept(store, "demo", AcceptRequest(absurd.id))
         assert (plan.changes, plan.refused) == ((), {"not_a_ball": 1})
-        assert accept(store, "demo", AcceptRequest(absurd.id), actor="bob").refused == {
-            "not_a_ball": 1
-        }
+        assert accept_predicted_balls(
+            store, "demo", AcceptRequest(absurd.id), actor="bob"
+        ).refused == {"not_a_ball": 1}
 
     def test_takes_the_surest_of_views_without_a_ball(self, store, cleared, predictions) -> None:
         plan = plan_accept(store, "demo", AcceptRequest(predictions.id))
@@ -92,13 +96,13 @@ class TestAccept:
     def test_makes_an_edit_whose_ball_says_where_it_is_from(
         self, store, cleared, predictions
     ) -> None:
-        report = accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        report = accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         assert (report.views, report.groups, report.refused) == (1, 1, {"annotated": 2})
         after = load(store, cleared.id)
         ball = after.group.view("7.png").ball
         assert ball.box == Box(600, 300, 14, 14)
         assert ball.predicted_by == "yolo"
-        entry = history(store, cleared.id)[-1]
+        entry = read_history(store, cleared.id)[-1]
         assert (entry.kind, entry.actor) == ("edit", "bob")
         assert entry.body["edit"]["balls"][0]["predicted_by"] == "yolo"
         # Only now a solve has seen it.
@@ -106,22 +110,22 @@ class TestAccept:
         assert after.solution is not None
 
     def test_can_be_undone(self, store, cleared, predictions) -> None:
-        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         after = load(store, cleared.id)
         assert undo(store, cleared.id, if_match=after.etag, actor="bob").group == cleared.group
 
     def test_done_again_it_changes_nothing(self, store, cleared, predictions) -> None:
         request = AcceptRequest(predictions.id, replace=True)
-        accept(store, "demo", request, actor="bob")
+        accept_predicted_balls(store, "demo", request, actor="bob")
         before = load(store, cleared.id)
-        report = accept(store, "demo", request, actor="bob")
+        report = accept_predicted_balls(store, "demo", request, actor="bob")
         assert (report.views, report.refused) == (0, {"the_same": 3})
         assert load(store, cleared.id) == before
 
     def test_changes_only_the_views_that_are_named(self, store, cleared, predictions) -> None:
         view = cleared.view_ids["7_1.png"]
         request = AcceptRequest(predictions.id, views=(view,), replace=True)
-        assert accept(store, "demo", request, actor="bob").views == 1
+        assert accept_predicted_balls(store, "demo", request, actor="bob").views == 1
         assert load(store, cleared.id).group.view("7.png").balls == ()
 
     def test_a_person_who_moves_it_is_the_source_from_then_on(
@@ -129,26 +133,26 @@ class TestAccept:
     ) -> None:
         from app.soccer.annotation import BallAnnotation
 
-        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         state = load(store, cleared.id)
         edit = SetBall("7.png", BallAnnotation(box=Box(601, 300, 14, 14)))
         after = submit(store, cleared.id, edit, if_match=state.etag, actor="bob")
         assert after.group.view("7.png").ball.predicted_by == ""
 
     def test_the_log_alone_rebuilds_it(self, store, cleared, predictions) -> None:
-        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         with store.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_a_group_that_changed_meanwhile_is_left_alone(
         self, store, cleared, predictions, monkeypatch
     ) -> None:
         plan = plan_accept(store, "demo", AcceptRequest(predictions.id))
-        accept(store, "demo", AcceptRequest(predictions.id), actor="bob")
+        accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         monkeypatch.setattr("app.features.predictions.accept.plan_accept", lambda *_: plan)
-        report = accept(store, "demo", AcceptRequest(predictions.id), actor="eve")
+        report = accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="eve")
         assert report.refused["changed_meanwhile"] == 1
-        assert history(store, cleared.id)[-1].actor == "bob"
+        assert read_history(store, cleared.id)[-1].actor == "bob"
 
     def test_progress_can_end_it_and_what_was_accepted_stays(
         self, store, cleared, predictions
@@ -159,9 +163,9 @@ class TestAccept:
 
         request = AcceptRequest(predictions.id, replace=True)
         with pytest.raises(KeyboardInterrupt):
-            accept(store, "demo", request, actor="bob", progress=stop)
+            accept_predicted_balls(store, "demo", request, actor="bob", progress=stop)
         assert load(store, cleared.id).group.view("7_1.png").ball.predicted_by == "yolo"
-        assert accept(store, "demo", request, actor="bob").views == 1
+        assert accept_predicted_balls(store, "demo", request, actor="bob").views == 1
 
 
 class TestAcceptBox:

@@ -9,16 +9,16 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
-from app.features.predictions.accept import AcceptRequest, accept
+from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
 from app.features.predictions.evaluation import (
     FrameQuery,
-    compare,
+    compare_runs,
     get_evaluation,
     get_figure,
     list_evaluations,
     list_frames,
     remove_evaluation,
-    tables_of,
+    run_tables,
 )
 from app.features.predictions.evaluation_run import (
     EvaluationRequest,
@@ -34,7 +34,7 @@ from app.features.predictions.tables import (
     PredictionSetModel,
 )
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from tests.unit.stores import MATCH
 
 
@@ -71,7 +71,7 @@ def loose(store, states, tmp_path):
 
 
 def cell(found, table: str, row: str, column: str):
-    return next(item for item in tables_of(found) if item.name == table).cell(row, column)
+    return next(item for item in run_tables(found) if item.name == table).cell(row, column)
 
 
 class TestRunEvaluation:
@@ -98,7 +98,7 @@ class TestRunEvaluation:
         )
 
     def test_a_frozen_version_does_not_change_under_it(self, store, states, exact) -> None:
-        version = freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+        version = freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         request = EvaluationRequest(predictions=exact.id, version=version.id)
         first = run_evaluation(store, "demo", request, actor="ann")
         edit = SetBall("7.png", None)
@@ -110,7 +110,7 @@ class TestRunEvaluation:
         assert live.counts["groups"] == 2
 
     def test_a_version_and_the_same_live_state_give_the_same_numbers(self, store, exact) -> None:
-        version = freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+        version = freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         frozen, live = (
             run_evaluation(
                 store, "demo", EvaluationRequest(predictions=exact.id, version=number), actor="a"
@@ -168,16 +168,18 @@ class TestRunEvaluation:
     ) -> None:
         clean = run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
         assert clean.counts["accepted_predictions"] == 0
-        assert not any("Warning" in table.note for table in tables_of(clean))
+        assert not any("Warning" in table.note for table in run_tables(clean))
         view = states[0].view_ids["7.png"]
-        accept(store, "demo", AcceptRequest(exact.id, views=(view,), replace=True), actor="ann")
+        accept_predicted_balls(
+            store, "demo", AcceptRequest(exact.id, views=(view,), replace=True), actor="ann"
+        )
         own, other = (
             run_evaluation(store, "demo", EvaluationRequest(predictions=item.id), actor="ann")
             for item in (exact, loose)
         )
         assert own.counts["accepted_predictions"] == other.counts["accepted_predictions"] == 1
         notes = [
-            next(item.note for item in tables_of(run) if item.name == "detection")
+            next(item.note for item in run_tables(run) if item.name == "detection")
             for run in (own, other)
         ]
         assert all("Warning: the ball of 1 of 6 frames is an accepted" in note for note in notes)
@@ -216,7 +218,7 @@ class TestListFrames:
         return run_evaluation(store, "demo", EvaluationRequest(predictions=loose.id), actor="ann")
 
     def test_a_row_opens_the_frames_that_it_counts(self, store, run) -> None:
-        table = next(item for item in tables_of(run) if item.name == "detection_by_distance")
+        table = next(item for item in run_tables(run) if item.name == "detection_by_distance")
         for row in table.rows:
             query = FrameQuery(row.frames.field, row.frames.low, row.frames.high)
             page = list_frames(store, run.id, query)
@@ -260,7 +262,7 @@ class TestCompare:
             run_evaluation(store, "demo", EvaluationRequest(predictions=item.id), actor="ann")
             for item in (loose, exact)
         ]
-        found = compare(store, runs[0].id, runs[1].id)
+        found = compare_runs(store, runs[0].id, runs[1].id)
         assert (found.same_truth, found.differs) == (True, ())
         assert (found.frames.better, found.frames.worse, found.frames.shared) == (6, 0, 6)
         change = next(item for item in found.numbers if item.column == "mae_m")
@@ -273,10 +275,10 @@ class TestCompare:
             )
             for split in (None, "test")
         ]
-        found = compare(store, runs[0].id, runs[1].id)
+        found = compare_runs(store, runs[0].id, runs[1].id)
         assert (found.same_truth, found.differs) == (False, ("split",))
         with pytest.raises(InputError, match="compared by"):
-            compare(store, runs[0].id, runs[1].id, "group")
+            compare_runs(store, runs[0].id, runs[1].id, "group")
 
     def test_other_careful_boxes_are_another_truth(self, store, exact, loose) -> None:
         runs = [
@@ -285,16 +287,16 @@ class TestCompare:
             )
             for careful in (exact.id, loose.id, None)
         ]
-        other = compare(store, runs[0].id, runs[1].id)
+        other = compare_runs(store, runs[0].id, runs[1].id)
         assert (other.same_truth, other.differs) == (False, ("careful",))
-        assert compare(store, runs[0].id, runs[2].id).same_truth
+        assert compare_runs(store, runs[0].id, runs[2].id).same_truth
 
     def test_says_when_the_software_is_another(self, store, exact, monkeypatch) -> None:
         request = EvaluationRequest(predictions=exact.id)
         first = run_evaluation(store, "demo", request, actor="ann")
         monkeypatch.setattr("app.features.predictions.frames.software_version", lambda: "99.0")
         second = run_evaluation(store, "demo", request, actor="ann")
-        found = compare(store, first.id, second.id)
+        found = compare_runs(store, first.id, second.id)
         assert (found.same_truth, found.differs) == (True, ("software_version",))
 
 

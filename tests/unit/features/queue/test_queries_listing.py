@@ -16,7 +16,7 @@ from app.features.datasets.tables import GroupModel
 from app.features.queue.queries import (
     Listing,
     Order,
-    compares,
+    compare_condition,
     count_states,
     find_place,
     read_columns,
@@ -49,14 +49,14 @@ def session(listed: Store):
         yield session
 
 
-OPEN = [compares("status", "=", "unreviewed")]
+OPEN = [compare_condition("status", "=", "unreviewed")]
 BY_SIGMA = Order("sigma_m", descending=True)
 
 
 class TestCounts:
     def test_groups_of_the_dataset_that_fulfil_all_conditions(self, session: Session) -> None:
         assert [Listing(session, 1).count(), Listing(session, 2).count()] == [4, 0]
-        assert Listing(session, 1, [*OPEN, compares("sigma_m", ">", 0.2)]).count() == 1
+        assert Listing(session, 1, [*OPEN, compare_condition("sigma_m", ">", 0.2)]).count() == 1
 
     def test_states_with_the_groups_that_are_solved(self, session: Session) -> None:
         rows = {row.status: (row.groups, row.solved) for row in count_states(session, [1, 2])}
@@ -115,10 +115,13 @@ class TestWhatIsRead:
         ("conditions", "index"),
         [
             (
-                [compares("views", ">", 2), compares("error_px", ">", 5)],
+                [compare_condition("views", ">", 2), compare_condition("error_px", ">", 5)],
                 "COVERING INDEX queue_scanned",
             ),
-            ([compares("views", ">", 2), compares("key", "=", "x")], "INDEX queue_number"),
+            (
+                [compare_condition("views", ">", 2), compare_condition("key", "=", "x")],
+                "INDEX queue_number",
+            ),
         ],
     )
     @pytest.mark.file_of_sqlite("SQLite's plan of a question")

@@ -11,10 +11,10 @@ from app.features.queue.service import (
     COLUMNS,
     ERROR_PERCENT,
     SIGMA_M,
+    bin_indices,
     list_groups,
     logarithmic_bins,
-    places,
-    summary,
+    summarize_groups,
 )
 from app.features.queue.statistics import MEASURES
 from app.features.queue.tables import QueueModel
@@ -36,12 +36,14 @@ class TestDecades:
 
 class TestPlaces:
     def test_zero_is_in_the_first_bin_and_an_edge_in_the_bin_that_it_begins(self):
-        found = places((0.0, 0.1, 1.0), np.array([0.0, 0.1, 1.0, 9.0, np.nan]),
+        found = bin_indices((0.0, 0.1, 1.0), np.array([0.0, 0.1, 1.0, 9.0, np.nan]),
                        open_low=False, open_high=True)  # fmt: skip
         assert found.tolist() == [0, 1, 1, 1, -1]
 
     def test_beyond_a_closed_end_there_is_no_bin(self):
-        found = places((0.0, 0.5, 1.0), np.array([-1.0, 1.0, 1.1]), open_low=False, open_high=False)
+        found = bin_indices(
+            (0.0, 0.5, 1.0), np.array([-1.0, 1.0, 1.1]), open_low=False, open_high=False
+        )
         assert found.tolist() == [-1, 1, -1]
 
 
@@ -80,7 +82,7 @@ def test_the_range_of_each_bar_of_the_queue_finds_exactly_its_groups(
         for group, value in zip(ids, values, strict=True):
             statement = update(QueueModel).where(QueueModel.group_id == group)
             session.execute(statement.values({NUMBERS[name]: value}))
-    found = summary(store, 1).histograms[name]
+    found = summarize_groups(store, 1).histograms[name]
     edges = found.column.edges
     assert sum(found.counts) == len(values) - 1
     assert found.unknown == 1

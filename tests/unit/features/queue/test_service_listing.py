@@ -13,7 +13,13 @@ from app.features.datasets.tables import GroupModel
 from app.features.groups.submit import load
 from app.features.imports.ingest import ensure_dataset
 from app.features.queue.query import SORTS
-from app.features.queue.service import GroupRow, list_groups, list_ids, neighbours, summary
+from app.features.queue.service import (
+    GroupRow,
+    find_neighbours,
+    list_groups,
+    list_ids,
+    summarize_groups,
+)
 from app.features.queue.tables import QueueModel
 from app.features.verdicts.service import set_verdict
 from app.soccer.solution import GATES
@@ -283,7 +289,7 @@ class TestNeighbours:
     def test_neighbours_are_those_of_the_list(self, store, dataset, query: str) -> None:
         ids = walk(store, dataset, query, 500)
         for place in (0, 3, len(ids) // 2, len(ids) - 1):
-            found = neighbours(store, ids[place], query)
+            found = find_neighbours(store, ids[place], query)
             assert (found.index, found.total) == (place, len(ids))
             assert list(found.next) == ids[place + 1 : place + 6]
             assert list(found.previous) == ids[max(place - 5, 0) : place][::-1]
@@ -292,19 +298,19 @@ class TestNeighbours:
         ids = fill(make_group(7), make_group(8), make_group(9))
         state = load(store, ids[1])
         set_verdict(store, ids[1], "deferred", if_match=state.etag, actor="ann")
-        found = neighbours(store, ids[1], "status:unreviewed")
+        found = find_neighbours(store, ids[1], "status:unreviewed")
         assert (found.index, found.total) == (None, 2)
         assert (found.previous, found.next) == ((ids[0],), (ids[2],))
 
     def test_an_unknown_group_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
-            neighbours(store, 99)
+            find_neighbours(store, 99)
 
 
 class TestSummary:
     def test_counts_and_histograms_are_of_what_matches(self, store, dataset) -> None:
         rows = list_groups(store, dataset, "split:train", 500).items
-        found = summary(store, dataset, "split:train")
+        found = summarize_groups(store, dataset, "split:train")
         assert found.groups == found.solved == len(rows)
         assert found.accepted == sum(row.status == "accepted" for row in rows)
         assert found.unreviewed + found.accepted + found.rejected == found.groups
@@ -314,11 +320,11 @@ class TestSummary:
         assert sum(jac.counts) == sum(row.min_jac is not None for row in rows)
 
     def test_what_lies_beyond_counts_in_the_end_bins(self, store, dataset) -> None:
-        found = summary(store, dataset).histograms["sigma"]
+        found = summarize_groups(store, dataset).histograms["sigma"]
         rows = list_groups(store, dataset, "sigma>=100", 500).items
         assert found.counts[-1] == len(rows) > 0
 
     def test_an_empty_dataset_has_zeros(self, store) -> None:
-        found = summary(store, ensure_dataset(store, "empty", "ann"))
+        found = summarize_groups(store, ensure_dataset(store, "empty", "ann"))
         assert (found.groups, found.solved, found.unreviewed) == (0, 0, 0)
         assert set(found.histograms["jac"].counts) == {0}

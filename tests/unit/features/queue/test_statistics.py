@@ -8,7 +8,7 @@ from app.errors import InputError
 from app.features.imports.ingest import ensure_dataset
 from app.features.queue.query import NUMBERS
 from app.features.queue.service import list_groups
-from app.features.queue.statistics import MEASURES, X_EDGES, Y_EDGES, statistics
+from app.features.queue.statistics import MEASURES, X_EDGES, Y_EDGES, read_statistics
 from app.features.queue.tables import QueueModel
 
 
@@ -28,7 +28,7 @@ def spread(store: Store, fill, make_group) -> Store:
 
 class TestStatistics:
     def test_each_bar_opens_the_groups_that_it_counts(self, spread: Store) -> None:
-        found = statistics(spread, 1)
+        found = read_statistics(spread, 1)
         assert found.groups == 12
         assert len(found.histograms) == len(MEASURES) == 9
         assert len({NUMBERS[measure.field] for measure in MEASURES}) == 9
@@ -40,7 +40,7 @@ class TestStatistics:
                     assert series.counts[place] == matching, query
 
     def test_every_group_is_counted_where_ends_are_open(self, spread: Store) -> None:
-        for histogram in statistics(spread, 1).histograms:
+        for histogram in read_statistics(spread, 1).histograms:
             counted = sum(sum(series.counts) for series in histogram.series)
             unknown = sum(series.unknown for series in histogram.series)
             assert unknown == 1
@@ -54,7 +54,7 @@ class TestStatistics:
             assert counted == 11 - below - above, measure.name
 
     def test_positions_are_in_their_cells(self, spread: Store) -> None:
-        places = statistics(spread, 1).positions
+        places = read_statistics(spread, 1).positions
         assert len(places.counts) == len(Y_EDGES) - 1
         assert {len(row) for row in places.counts} == {len(X_EDGES) - 1}
         assert sum(map(sum, places.counts)) + places.outside == 11
@@ -68,23 +68,23 @@ class TestStatistics:
         everywhere = {"x_m": X_EDGES[-2], "y_m": Y_EDGES[0]}
         with spread.write() as session:
             session.execute(update(QueueModel).values(everywhere))
-        counts = statistics(spread, 1).positions.counts
+        counts = read_statistics(spread, 1).positions.counts
         assert (counts[0][-1], sum(map(sum, counts))) == (12, 12)
 
     def test_matches_and_splits_add_up(self, spread: Store) -> None:
-        found = statistics(spread, 1)
+        found = read_statistics(spread, 1)
         assert [(item.split, item.groups) for item in found.splits] == [("test", 6), ("train", 6)]
         assert [item.groups for item in found.matches] == [6, 6]
         assert sum(item.passing for item in found.splits) == 12
 
     def test_counts_only_groups_that_match(self, spread: Store) -> None:
-        found = statistics(spread, 1, "split:train distance>=0")
+        found = read_statistics(spread, 1, "split:train distance>=0")
         assert found.groups == list_groups(spread, 1, "split:train distance>=0").total
         assert [item.split for item in found.splits] == ["train"]
         with pytest.raises(InputError):
-            statistics(spread, 1, "colour:red")
+            read_statistics(spread, 1, "colour:red")
 
     def test_an_empty_dataset_has_empty_bars(self, store) -> None:
-        found = statistics(store, ensure_dataset(store, "empty", "ann"))
+        found = read_statistics(store, ensure_dataset(store, "empty", "ann"))
         assert found.groups == 0
         assert all(histogram.series == () for histogram in found.histograms)

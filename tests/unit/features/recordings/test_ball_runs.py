@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.db.store import Store
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.recordings.ball_runs import get_run
 from app.features.recordings.follow_hints import follow_hints
@@ -137,7 +137,7 @@ class TestAccept:
         assert back["accepted_by"] is None and back["placed"] is None
         assert balls(api) == {3: [], 13: [], 20: []}
         with store.read() as session:
-            assert replay(session).groups == read_state_snapshot(session).groups
+            assert replay_log(session).groups == read_state_snapshot(session).groups
 
     def test_uncertain_frames_take_part_once_they_are_confirmed(
         self, api: Any, recording: str, finished: Finished

@@ -16,9 +16,9 @@ import pytest
 from app.db.idempotency import without_response
 from app.db.store import Store
 from app.errors import ConflictError, InputError, JobCancelled
-from app.features.datasets.orphan_queries import unused_frames
+from app.features.datasets.queries import unused_frames
 from app.features.groups.queries import read_groups
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.imports.cameras import ingest_cameras
 from app.features.recordings import camera_tracking as module
@@ -247,7 +247,7 @@ def test_a_person_mends_a_frame_and_shot_and_groups_follow(
     given = {number: stored[group].group.views[0].station.given for number, group in groups.items()}
     assert given == {5: tracker.truth[1], 7: None, 8: tracker.truth[4], 11: None}
     with store.read() as session:
-        assert replay(session) == read_state_snapshot(session)
+        assert replay_log(session) == read_state_snapshot(session)
     (one,) = api.get(f"{recording}/cameras").json()["items"]
     assert one["revision"] == 2 and one["summary"]["annotated"] == [7]
     assert (one["before"]["lost"], one["summary"]["lost"]) == (2, 1)
@@ -334,7 +334,7 @@ def test_cameras_are_turned_by_half_and_back_and_groups_follow(
     views = given()
     assert views[5] == turned_camera(tracker.truth[1]) and views[7] == own
     with store.read() as session:
-        assert replay(session) == read_state_snapshot(session)
+        assert replay_log(session) == read_state_snapshot(session)
     (one,) = api.get(f"{recording}/cameras").json()["items"]
     assert (one["summary"]["turned"], one["before"]["turned"], one["revision"]) == (True, False, 2)
     assert turn(True)["groups"] == 0
@@ -389,7 +389,7 @@ def test_linked_views_leave_a_camera_that_was_given_or_lines_that_were_drawn(
     assert finished(api.post(f"{recording}/groups", json=body)).result["changed"] == 3
     with store.read() as session:
         stored = read_groups(session, list(groups.values()))
-        assert replay(session) == read_state_snapshot(session)
+        assert replay_log(session) == read_state_snapshot(session)
     stations = {
         number: [view.station for view in stored[group].group.views]
         for number, group in groups.items()

@@ -11,7 +11,7 @@ import pytest
 from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, ImageError, InputError, JobCancelled, NotFoundError
-from app.features.datasets.orphan_queries import unread_uploads, unused_frames
+from app.features.datasets.queries import unread_uploads, unused_frames
 from app.features.imports.upload_queries import UploadWriter, keep_upload, upload_path
 from app.features.jobs.service import Jobs
 from app.features.recordings import index

@@ -5,8 +5,8 @@ from sqlalchemy import update
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.saved_views import service as saved_views
+from app.features.saved_views.queries import SavedViewModel
 from app.features.saved_views.service import delete_view, get_view, list_saved_views, save_view
-from app.features.saved_views.tables import SavedViewModel
 
 
 @pytest.fixture

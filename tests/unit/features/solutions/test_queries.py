@@ -9,6 +9,7 @@ from sqlalchemy import insert, text
 
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.solutions import codec as value_codec
+from app.features.solutions.codec import summarize
 from app.features.solutions.queries import (
     SolutionKey,
     _is_undetermined,
@@ -21,7 +22,6 @@ from app.features.solutions.queries import (
     read_solutions,
     read_summary,
 )
-from app.features.solutions.summary import summarize
 from app.soccer.finding import Finding, Fix
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.solution import (

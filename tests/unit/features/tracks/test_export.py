@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.features.exports.service import export, require_possible
+from app.features.exports.service import export_dataset, require_possible
 from app.features.groups.submit import load
 from app.features.verdicts.service import set_verdict
 from tests.flights import FIRST, flight_groups, places
@@ -30,7 +30,7 @@ class TestExport:
         self, store, flight, tmp_path: Path
     ) -> None:
         require_possible(store, "demo", "tracks")
-        report = export(store, "demo", "tracks", tmp_path / "out")
+        report = export_dataset(store, "demo", "tracks", tmp_path / "out")
         assert (report.counts["tracks"], report.counts["frames"]) == (1, 60)
         found = rows(tmp_path / "out/ball.csv")
         assert [int(row["frame"]) for row in found] == list(range(FIRST, FIRST + 60))
@@ -41,7 +41,7 @@ class TestExport:
     def test_the_manifest_says_how_well_the_ball_is_known(
         self, store, flight, tmp_path: Path
     ) -> None:
-        export(store, "demo", "tracks", tmp_path / "out")
+        export_dataset(store, "demo", "tracks", tmp_path / "out")
         said = manifest(tmp_path / "out")
         assert said["settings"]["groups"] == "not rejected"
         (track,) = said["tracks"]
@@ -56,8 +56,8 @@ class TestExport:
     ) -> None:
         etag = load(store, flight[0]).etag
         set_verdict(store, flight[0], "rejected", "other", note="no ball", if_match=etag, actor="a")
-        export(store, "demo", "tracks", tmp_path / "out")
-        export(store, "demo", "tracks", tmp_path / "all", everything=True)
+        export_dataset(store, "demo", "tracks", tmp_path / "out")
+        export_dataset(store, "demo", "tracks", tmp_path / "all", everything=True)
         first = [rows(tmp_path / name / "ball.csv")[0]["frame"] for name in ("out", "all")]
         assert first == [str(FIRST + 1), str(FIRST)]
 
@@ -72,7 +72,7 @@ class TestExport:
     def test_other_formats_of_the_ball(
         self, store, flight, tmp_path: Path, form: str, names: set[str]
     ) -> None:
-        export(store, "demo", form, tmp_path / "out")
+        export_dataset(store, "demo", form, tmp_path / "out")
         assert {path.name for path in (tmp_path / "out").iterdir()} == names | {"manifest.json"}
 
     def test_groups_of_different_instants_are_refused_before_anything_is_written(

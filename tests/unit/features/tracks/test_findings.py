@@ -12,9 +12,9 @@ from app.features.datasets.service import dataset_id
 from app.features.datasets.tables import ImportFindingModel
 from app.features.findings.service import FindingName, finding_values, set_dismissal
 from app.features.groups.edit import SetBall
+from app.features.groups.history import undo
 from app.features.groups.submit import load, submit
 from app.features.groups.suggested_edits import offers_of_finding
-from app.features.groups.undo import undo
 from app.features.queue.refresh_queries import differing_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset

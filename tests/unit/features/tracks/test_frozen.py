@@ -11,11 +11,11 @@ from app.canonical import canonical
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
-from app.features.exports.service import export
+from app.features.exports.service import export_dataset
 from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
 from app.features.versions.check import examine_versions
-from app.features.versions.freeze import FreezeRequest, freeze
-from app.features.versions.frozen_queries import body_of, json_of, read_frozen
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
+from app.features.versions.frozen_queries import compress_text, read_frozen, read_json
 from app.features.versions.service import Version
 from app.features.versions.verify import verify
 from app.tracking.ball_track import Correction
@@ -36,7 +36,7 @@ def accepted(store: Store, flight: list[int]) -> list[int]:
 
 
 def frozen(store: Store, name: str = "v1") -> Version:
-    return freeze(store, "demo", FreezeRequest(name, groups="passing"), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest(name, groups="passing"), actor="ann")
 
 
 def unseal(session: Session) -> None:
@@ -71,12 +71,12 @@ class TestVerify:
         version = frozen(store)
         key = version.tracks["rig"]
         with store.write() as session, said_for_sqlite(session):
-            value = json_of(read_frozen(session, version.dataset_id, [key])[key])
+            value = read_json(read_frozen(session, version.dataset_id, [key])[key])
             value["track"]["times"][3] += 1e-12
             unseal(session)
             session.execute(
                 text("UPDATE frozen SET body = :body WHERE key = :key"),
-                {"body": body_of(canonical(value)), "key": key},
+                {"body": compress_text(canonical(value)), "key": key},
             )
         report = verify(store, version.id)
         assert (report.ok, report.different) == (False, 1)
@@ -90,24 +90,27 @@ class TestExport:
     ) -> None:
         frozen(store)
         for name in ("a", "b"):
-            report = export(store, "demo", "tracks", tmp_path / f"{name}.zip", version="v1")
+            report = export_dataset(store, "demo", "tracks", tmp_path / f"{name}.zip", version="v1")
             assert report.counts["tracks"] == 1
             move(store, accepted[7], 4.0)
         assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
-        export(store, "demo", "tracks", tmp_path / "out", version="v1")
+        export_dataset(store, "demo", "tracks", tmp_path / "out", version="v1")
         assert f"\n{FIRST + 40},5.6,out," in (tmp_path / "out/events.csv").read_text()
 
     def test_an_accepted_track_goes_out_with_its_corrections_and_a_rejected_one_does_not(
         self, store, accepted, tmp_path: Path
     ) -> None:
-        export(store, "demo", "tracks", tmp_path / "out")
+        export_dataset(store, "demo", "tracks", tmp_path / "out")
         assert f"\n{FIRST + 40},5.6,out," in (tmp_path / "out/events.csv").read_text()
         (track,) = list_tracks(store, "demo")
         change_track(store, track.id, TrackChange("rejected"), track.etag, actor="ben")
         with pytest.raises(InputError, match="rig: its track was rejected"):
-            export(store, "demo", "tracks", tmp_path / "none")
+            export_dataset(store, "demo", "tracks", tmp_path / "none")
         assert (
-            export(store, "demo", "tracks", tmp_path / "all", everything=True).counts["tracks"] == 1
+            export_dataset(store, "demo", "tracks", tmp_path / "all", everything=True).counts[
+                "tracks"
+            ]
+            == 1
         )
 
 

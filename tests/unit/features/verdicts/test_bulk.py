@@ -14,13 +14,13 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.tables import GroupModel
 from app.features.groups.edit import SetBall
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state import VerdictState
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
 from app.features.queue.refresh_queries import refresh_queue
-from app.features.queue.service import list_groups, summary
+from app.features.queue.service import list_groups, summarize_groups
 from app.features.queue.tables import QueueModel
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts import bulk, bulk_undo
@@ -149,7 +149,7 @@ class TestGiveVerdicts:
         assert (report.changed, report.refused) == (3, ())
         assert statuses(store) == ["accepted", "accepted", "unreviewed", "accepted"]
         with store.read() as session:
-            replayed, present = replay(session), read_state_snapshot(session)
+            replayed, present = replay_log(session), read_state_snapshot(session)
             kinds = session.execute(text("SELECT kind FROM log ORDER BY id DESC LIMIT 4")).all()
         assert replayed == present
         assert [kind for (kind,) in kinds] == ["verdict_batch", *["verdict"] * 3]
@@ -196,7 +196,7 @@ class TestGiveVerdicts:
         assert batch.query == f"id:{named}"
         assert undo_batch(store, report.batch, actor="ben").restored == 3
         with store.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_an_etag_of_before_is_stale(self, store, ids) -> None:
         etag = load(store, ids[0]).etag
@@ -216,7 +216,7 @@ class TestGiveVerdicts:
         for number in range(5):
             asked = "submissions<9" if number in (1, 2, 3) else ""
             give_verdicts(store, 1, asked, "deferred", note=f"round {number}", actor="ben")
-        monkeypatch.setattr(bulk, "judges_in", lambda _: False)
+        monkeypatch.setattr(bulk, "sees_all_work", lambda _: False)
         shown = list_batches(store, 1, 2)
         assert [one.id for one in shown] == [5, 1]
         assert [one.id for one in list_batches(store, 1, 2, before=5)] == [1]
@@ -231,9 +231,12 @@ class TestGiveVerdicts:
         give_verdicts(store, 1, "", "deferred", actor="ben")
         etag = load(store, ids[0]).etag
         submit(store, ids[0], SetBall("7.png", None), if_match=etag, actor="ann")
-        assert (summary(store, 1).stale, summary(store, 1, "stale:no").stale) == (1, 0)
+        assert (summarize_groups(store, 1).stale, summarize_groups(store, 1, "stale:no").stale) == (
+            1,
+            0,
+        )
         assert give_verdicts(store, 1, "", "deferred", actor="ben").changed == 1
-        assert summary(store, 1).stale == 0
+        assert summarize_groups(store, 1).stale == 0
 
     def test_a_request_that_is_being_carried_out_is_not_carried_out_twice(self, store, ids) -> None:
         verdict = check_verdict("deferred", None, None)
@@ -306,7 +309,7 @@ class TestUndoBatch:
             "ben": "accepted",
         }
         with store.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_a_group_that_was_judged_since_keeps_its_verdict(self, store, ids) -> None:
         report = give_verdicts(store, 1, "", "deferred", actor="ben")

@@ -7,7 +7,7 @@ from sqlalchemy import text, update
 
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import SetBall
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.queue.service import list_groups
@@ -73,7 +73,7 @@ class TestRedoBatch:
         assert undo_batch(store, done.batch, actor="ben").restored == 4
         assert redo_batch(store, done.batch, actor="eve").changed == 4
         with store.read() as session:
-            assert replay(session) == read_state_snapshot(session)
+            assert replay_log(session) == read_state_snapshot(session)
 
     def test_a_group_that_it_is_refused_for_is_told_with_the_reason(
         self, store, ids, monkeypatch

@@ -9,10 +9,9 @@ import pytest
 from app.db.store import Store
 from app.errors import InputError, StaleRevisionError
 from app.features.groups.edit import SetBall
-from app.features.groups.history import history
+from app.features.groups.history import read_history, undo
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.verdicts import service as module
@@ -113,7 +112,7 @@ class TestSetVerdict:
             ("ann", "rejected"),
             ("ben", "deferred"),
         ]
-        assert [item.kind for item in history(store, state.id)] == ["import", *["verdict"] * 3]
+        assert [item.kind for item in read_history(store, state.id)] == ["import", *["verdict"] * 3]
 
     def test_can_be_taken_back(self, store, state) -> None:
         after = judge(store, judge(store, state, "accepted"), "unreviewed")
@@ -161,4 +160,4 @@ class TestSetVerdict:
         monkeypatch.setattr(module, "read_solved", slow)
         with pytest.raises(InputError, match="fails a gate"):
             judge(store, state, "accepted")
-        assert len(history(store, state.id)) == 1
+        assert len(read_history(store, state.id)) == 1

@@ -10,15 +10,15 @@ from app.db.dialects.dialect import dialect_of
 from app.db.store import Store
 from app.features.datasets.service import delete_dataset
 from app.features.versions.check import examine_versions
-from app.features.versions.freeze import FreezeRequest, freeze
-from app.features.versions.frozen_queries import body_of
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
+from app.features.versions.frozen_queries import compress_text
 from tests.databases import said_for_sqlite
 
 
 @pytest.fixture(autouse=True)
 def version(store, fill, make_group, make_static):
     fill(make_group(7), make_group(8, shift=60.0), make_static(10))
-    return freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
 
 
 def faults(store: Store) -> dict[str, Check]:
@@ -107,7 +107,7 @@ class TestFrozenContent:
     @pytest.mark.parametrize("prefix", ["said:", "station:", "solution:"])
     def test_content_has_the_digest_by_which_it_is_named(self, store: Store, prefix: str) -> None:
         key = keys(store, prefix)[0]
-        forge(store, key, body_of('{"views":[]}'))
+        forge(store, key, compress_text('{"views":[]}'))
         found = faults(store)
         assert found.keys() == {"frozen content"}
         assert found["frozen content"].sentence == f"1 not as it was frozen: {key}"

@@ -10,8 +10,8 @@ from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset, ingest
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.features.versions.diff import Setting, changelog, changelog_lines, diff_versions
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.diff import Setting, changelog_lines, diff_versions, version_changelog
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.split import Split
@@ -23,7 +23,7 @@ def judge(store, group_id, state, reason=None, note=None):
 
 
 def frozen(store, name, **options):
-    return freeze(store, "demo", FreezeRequest(name, **options), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest(name, **options), actor="ann")
 
 
 @pytest.fixture
@@ -115,7 +115,7 @@ class TestDiffVersions:
         ensure_dataset(store, "other", "ann")
         ingest(store, "other", [make_group(7)], source="test", actor="ann")
         solve_dataset(store, "other")
-        other = freeze(store, "other", FreezeRequest("v1", groups="passing"), actor="ann")
+        other = freeze_dataset(store, "other", FreezeRequest("v1", groups="passing"), actor="ann")
         with pytest.raises(InputError, match="two datasets"):
             diff_versions(store, two[0].id, other.id)
 
@@ -155,17 +155,17 @@ class TestOfWhateverPasses:
         metres = [item.metres for item in diff_versions(store, first.id, second.id).moved]
         assert metres == sorted(metres, reverse=True)
         assert metres[0] > 2 * metres[1]
-        lines = changelog(store, second.id)
+        lines = version_changelog(store, second.id)
         assert "1 group with another verdict." in lines
         assert any(line.endswith(f"{max(metres):.3f} m at most.") for line in lines)
 
 
 class TestChangelog:
     def test_the_first_version_says_so(self, store, two) -> None:
-        assert changelog(store, two[0].id) == ["First version: 3 groups, 6 balls in views."]
+        assert version_changelog(store, two[0].id) == ["First version: 3 groups, 6 balls in views."]
 
     def test_the_next_one_says_what_changed(self, store, two) -> None:
-        lines = changelog(store, two[1].id)
+        lines = version_changelog(store, two[1].id)
         assert lines[0] == "Since v1:"
         assert "2 groups added (before: 1 not in the dataset, 1 unreviewed)." in lines
         assert "1 group dropped (now: 1 rejected: sides_confused)." in lines
@@ -174,4 +174,4 @@ class TestChangelog:
 
     def test_no_change_is_one_sentence(self, store, two) -> None:
         again = frozen(store, "v3", split=two[1].split)
-        assert changelog(store, again.id) == ["Nothing changed since v2."]
+        assert version_changelog(store, again.id) == ["Nothing changed since v2."]

@@ -8,18 +8,18 @@ from sqlalchemy import delete, func, select, text
 from app.db.log import LogModel
 from app.errors import ConflictError, InputError
 from app.features.groups.edit import SetBall
-from app.features.groups.replay import replay
+from app.features.groups.replay import replay_log
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
+from app.features.solutions.queries import SolutionModel
 from app.features.solutions.service import solve_dataset
-from app.features.solutions.tables import SolutionModel
 from app.features.verdicts.service import set_verdict
-from app.features.versions.freeze import FreezeRequest, freeze, plan_freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset, plan_freeze
 from app.features.versions.membership import version_manifest
 from app.features.versions.queries import read_rows
-from app.features.versions.service import list_versions, thaw
+from app.features.versions.service import list_versions, read_frozen_groups
 from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -37,7 +37,7 @@ def judge(store, group_id, state, reason=None, note=None, actor="ann"):
 
 
 def frozen(store, name="v1", **options):
-    return freeze(store, "demo", FreezeRequest(name, **options), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest(name, **options), actor="ann")
 
 
 def rows_of(store, version):
@@ -145,7 +145,7 @@ class TestFreeze:
 
     def test_two_homes_freeze_the_same_hash(self, store, judged, elsewhere) -> None:
         here = frozen(store, note="here")
-        there = freeze(elsewhere, "other", FreezeRequest("w", licence="mine"), actor="zoe")
+        there = freeze_dataset(elsewhere, "other", FreezeRequest("w", licence="mine"), actor="zoe")
         assert here.hash == there.hash
         assert len(here.hash) == 64
 
@@ -190,7 +190,7 @@ class TestFreeze:
             session.execute(text("DELETE FROM calibration"))
         with store.read() as session:
             (row, _) = read_rows(session, version.id, members=True)
-            (item,) = thaw(session, version, [row])
+            (item,) = read_frozen_groups(session, version, [row])
         assert item.group == before.group
         assert item.solution == without_markings(before.solution)
 
@@ -200,7 +200,7 @@ class TestFreeze:
         with store.read() as session:
             keys = list(session.scalars(select(FrozenModel.key)))
             rows = list(read_rows(session, version.id))
-            groups = [item.group for item in thaw(session, version, rows)]
+            groups = [item.group for item in read_frozen_groups(session, version, rows)]
         assert sum(key.startswith("station:") for key in keys) == 3
         assert groups == [make_static(frame) for frame in (10, 11, 12)]
 
@@ -260,7 +260,7 @@ class TestFreeze:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            freeze(store, "demo", FreezeRequest("v1"), actor="ann", progress=stop)
+            freeze_dataset(store, "demo", FreezeRequest("v1"), actor="ann", progress=stop)
         assert list_versions(store, "demo") == []
         frozen(store)
 
@@ -285,7 +285,7 @@ class TestFreeze:
         version = frozen(store)
         with store.read() as session:
             entry = session.execute(select(LogModel.kind).order_by(LogModel.id.desc())).first()
-            replay(session)
+            replay_log(session)
         assert entry.kind == "freeze"
         assert version.licence.startswith("SoccerNet annotations")
 
@@ -309,7 +309,7 @@ class TestPlanFreeze:
             split = replace(split, test_cameras=("1.png", "2.png"))
         request = FreezeRequest("v1", split=split, groups="passing")
         plan = plan_freeze(store, "demo", request)
-        version = freeze(store, "demo", request, actor="ann")
+        version = freeze_dataset(store, "demo", request, actor="ann")
         counts = {side: of["groups"] for side, of in version.counts["splits"].items()}
         assert plan.splits == {side: n for side, n in counts.items() if n}
         assert sum(plan.splits.values()) == plan.groups > 0

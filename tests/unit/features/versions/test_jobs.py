@@ -13,7 +13,7 @@ from app.errors import JobCancelled, OverloadedError
 from app.features.jobs import runner as job_run
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.jobs import verify_work
 from app.features.versions.service import Version, get_version
 from app.worker_process import WorkerProcess
@@ -23,7 +23,7 @@ from tests.unit.features.jobs.steps import a_job
 @pytest.fixture
 def version(store: Store, fill: Any, make_group: Any) -> Version:
     fill(make_group(7), make_group(8))
-    return freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
 
 
 def asked(version: Version, actor: str) -> Job:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.features.jobs.service import Jobs
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.jobs import request_freeze, resume_versions
 from app.http.services import Services
 
@@ -23,7 +23,7 @@ def services(app) -> Services:
 @pytest.fixture
 def version(services: Services):
     request = FreezeRequest("v1", note="first", groups="passing")
-    return freeze(services.store, "broadcast", request, actor="local")
+    return freeze_dataset(services.store, "broadcast", request, actor="local")
 
 
 def ended(services: Services, answer) -> dict[str, Any]:
@@ -94,7 +94,7 @@ class TestFreezeVersion:
             request_freeze(earlier, store, "broadcast", request, actor=actor)
             for actor in ("ann", "bob")
         )
-        version = freeze(store, "broadcast", request, actor="ann")
+        version = freeze_dataset(store, "broadcast", request, actor="ann")
         later = Jobs(store)
         resume_versions(later, store)
         later.start()
@@ -111,13 +111,15 @@ class TestFreezeVersion:
         waiting.close()
         asked = FreezeRequest("v1", groups="passing")
         request_freeze(waiting, store, "broadcast", asked, actor="ann")
-        there = freeze(store, "broadcast", FreezeRequest(groups="passing"), actor="bob")
+        there = freeze_dataset(store, "broadcast", FreezeRequest(groups="passing"), actor="bob")
         assert there.name == "v2"
 
 
 class TestVersions:
     def test_are_listed_newest_first(self, api, services, version) -> None:
-        freeze(services.store, "broadcast", FreezeRequest("v2", groups="passing"), actor="local")
+        freeze_dataset(
+            services.store, "broadcast", FreezeRequest("v2", groups="passing"), actor="local"
+        )
         items = api.get(f"{API}/datasets/broadcast/versions").json()["items"]
         assert [item["name"] for item in items] == ["v2", "v1"]
         assert api.get(f"{API}/datasets/static/versions").json()["items"] == []
@@ -129,7 +131,7 @@ class TestVersions:
         assert manifest["settings"]["policy"]["tau_percent"] == 1.0
 
     def test_changelog_and_diff_compare(self, api, services, version) -> None:
-        second = freeze(
+        second = freeze_dataset(
             services.store, "broadcast", FreezeRequest("v2", groups="passing"), actor="local"
         )
         lines = api.get(f"{API}/versions/{second.id}/changelog").json()["lines"]
@@ -140,7 +142,7 @@ class TestVersions:
     def test_is_found_by_id_name_and_hash_wherever_one_is_asked_for(
         self, api, services, version
     ) -> None:
-        second = freeze(
+        second = freeze_dataset(
             services.store, "broadcast", FreezeRequest("v2", groups="passing"), actor="a"
         )
         by_id = api.get(f"{API}/versions/{second.id}").json()
@@ -155,7 +157,7 @@ class TestVersions:
         assert ended(services, api.post(f"{API}/versions/v2/verify"))["state"] == "done"
 
     def test_a_name_of_several_datasets_asks_for_the_dataset(self, api, services, version) -> None:
-        other = freeze(
+        other = freeze_dataset(
             services.store, "static", FreezeRequest(version.name, groups="passing"), actor="a"
         )
         address = f"{API}/versions/{version.name}"

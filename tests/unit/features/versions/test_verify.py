@@ -12,8 +12,8 @@ from app.errors import NotFoundError
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
 from app.features.versions import verify as verify_module
-from app.features.versions.freeze import FreezeRequest, freeze
-from app.features.versions.frozen_queries import body_of, text_of
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
+from app.features.versions.frozen_queries import compress_text, read_text
 from app.features.versions.verify import verify
 from app.soccer.solution import Solution
 from app.solving.solve import NO_CALIBRATIONS, solve
@@ -38,7 +38,7 @@ def broken(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solution:
 @pytest.fixture
 def version(store, fill, make_group, make_static):
     fill(make_group(7), make_group(8), make_static(10), make_static(11))
-    return freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
 
 
 def tamper(store, prefix: str, change) -> None:
@@ -88,7 +88,7 @@ class TestVerify:
     @pytest.mark.parametrize("prefix", ["said:", "station:", "solution:", "calibration:"])
     def test_content_that_was_changed_is_found(self, store, version, prefix: str) -> None:
         def change(body: bytes) -> bytes:
-            return body_of(text_of(body).replace(".5", ".6"))
+            return compress_text(read_text(body).replace(".5", ".6"))
 
         tamper(store, prefix, change)
         report = verify(store, version.id)

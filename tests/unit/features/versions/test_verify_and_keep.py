@@ -10,7 +10,7 @@ from app.db.store import Store
 from app.errors import DamagedError, JobCancelled, NotFoundError, StorageError
 from app.features.datasets.service import delete_dataset
 from app.features.versions import verify as verify_module
-from app.features.versions.freeze import FreezeRequest, freeze
+from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import get_version, list_versions
 from app.features.versions.verify import verify_and_keep
 from app.soccer.solution import SOLVER_VERSION, Solution
@@ -27,7 +27,7 @@ def beside(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solution:
 @pytest.fixture
 def version(store, fill, make_group):
     fill(make_group(7), make_group(8))
-    return freeze(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
+    return freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
 
 
 class TestVerifyAndKeep:

@@ -9,7 +9,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.agreement.adjudicate import decide, get_case, return_for_correction
+from app.features.agreement.adjudicate import decide_case, get_case, return_for_correction
 from app.features.agreement.service import after_submission, compare_submitted
 from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, change_batch, make_batch
@@ -128,7 +128,7 @@ def test_what_differs_is_told_of_once_and_so_is_the_end_of_the_batch(allowed, to
 
     judge(allowed, copy, "accepted", "bo")
     assert after_submission(allowed, copy) == "open"
-    decide(allowed, groups[0], bo.id, actor="cy")
+    decide_case(allowed, groups[0], bo.id, actor="cy")
     assert [kind for kind, _ in told.new()] == [Kind.DISPUTED, Kind.DONE]
 
 

@@ -9,7 +9,7 @@ from sqlalchemy import text
 from standardwebhooks import Webhook
 
 from app.features.imports.ingest import ingest
-from app.features.webhooks.messages import sign
+from app.features.webhooks.messages import sign_message
 
 API = "/api/v1"
 URL = "https://hooks.example.org/touchline"
@@ -30,7 +30,7 @@ def test_one_is_made_changed_tried_and_deleted(api, hooks: str) -> None:
     assert made.status_code == 201, made.text
     webhook, secret = made.json()["webhook"], made.json()["secret"]
     at, body = datetime.now(UTC), '{"a": 1}'
-    assert Webhook(secret).verify(body, sign(secret, "msg_1", at, body)) == {"a": 1}
+    assert Webhook(secret).verify(body, sign_message(secret, "msg_1", at, body)) == {"a": 1}
     listed = api.get(hooks).json()
     assert listed["items"] == [webhook]
     assert listed["allowed"] == [URL]

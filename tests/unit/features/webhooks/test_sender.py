@@ -14,13 +14,13 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
 from app.features.groups.edit import SetBall
+from app.features.groups.history import undo
 from app.features.groups.submit import submit
-from app.features.groups.undo import undo
 from app.features.jobs.queries import NewJob, insert_job, update_job
-from app.features.upkeep.service import forget_old_deliveries
+from app.features.maintenance.upkeep import forget_old_deliveries
 from app.features.verdicts.service import set_verdict
 from app.features.webhooks import sender as module
-from app.features.webhooks.messages import CHOSEN, Kind, sign
+from app.features.webhooks.messages import CHOSEN, Kind, sign_message
 from app.features.webhooks.sender import AGAIN, WebhookSender
 from app.features.webhooks.service import (
     change_webhook,
@@ -285,9 +285,9 @@ class TestTogether:
         def spoilt(secret: str, message: str, *rest: object) -> dict[str, str]:
             if "ping" in message:
                 raise UnicodeError("label empty or too long")
-            return sign(secret, message, *rest)  # type: ignore[arg-type]
+            return sign_message(secret, message, *rest)  # type: ignore[arg-type]
 
-        monkeypatch.setattr(module, "sign", spoilt)
+        monkeypatch.setattr(module, "sign_message", spoilt)
         send_ping(allowed, "demo", hook, actor="ann")
         judge(allowed, state)
         sender.look()

@@ -10,7 +10,7 @@ from sqlalchemy import text, update
 from app.db.store import Store
 from app.features.groups.revision_queries import groups_after
 from app.features.groups.submit import load
-from app.features.solutions.tables import SolutionModel
+from app.features.solutions.queries import SolutionModel
 from app.features.what_if.blocks import read_tables
 from app.features.what_if.table import YieldTable
 from app.solving.facts import COLUMNS, group_facts, join_facts

@@ -15,8 +15,8 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, OverloadedError
 from app.features.groups.edit import IncludeView, SetBall
+from app.features.groups.history import undo
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset
 from app.features.what_if import blocks as gathered

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from app.features.what_if.funnel import UNSOLVED
-from app.features.what_if.schemas import LABELS, WhatIf
+from app.features.what_if.routes import LABELS, WhatIf
 from app.soccer.policy import THRESHOLDS
 from app.soccer.solution import GATES
 

@@ -13,10 +13,10 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import SetBall
+from app.features.groups.history import undo
 from app.features.groups.submit import load, submit
-from app.features.groups.undo import undo
 from app.features.policies.service import change_policy
-from app.features.queue.statistics import statistics
+from app.features.queue.statistics import read_statistics
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.bulk import give_verdicts, list_batches
 from app.features.verdicts.bulk_undo import undo_batch
@@ -88,7 +88,7 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
         step()
         if rng.random() < 0.3:
             held = StatisticsStore(store)
-        assert held.statistics(1) == statistics(store, 1), step.__name__
+        assert held.statistics(1) == read_statistics(store, 1), step.__name__
     # Another policy, and a group that came: nothing else is worth reading all.
     assert 1 <= len(looked) <= 1 + sum(step is move for step in steps) + 6
 
@@ -100,7 +100,7 @@ def test_one_change_reads_one_group_also_after_a_restart(store, fill, make_group
     etag = load(store, group).etag
     submit(store, group, SetBall("7.png", None), if_match=etag, actor="ann")
     give_verdicts(store, 1, "passes:no", "rejected", "other", "no ball", actor="ben")
-    assert StatisticsStore(store).statistics(1) == statistics(store, 1)
+    assert StatisticsStore(store).statistics(1) == read_statistics(store, 1)
     assert len(looked) == 1
 
 
