@@ -84,9 +84,9 @@ def flight_groups(count: int = 90, noise_px: float = 0.3, match: str = "rig") ->
     return tuple(groups)
 
 
-def add_flight(store: Store, name: str = "flight") -> int:
-    """A dataset of the flight, solved and tracked; returns the id of its track."""
-    ingest(store, name, flight_groups(40), source="test", actor="local")
+def add_flight(store: Store, name: str = "flight", count: int = 40) -> int:
+    """A dataset of frames of the flight, solved and tracked; returns the id of its track."""
+    ingest(store, name, flight_groups(count), source="test", actor="local")
     solve_dataset(store, name)
     make_tracks(store, name, None, "local", lambda *_: None)
     (track,) = list_tracks(store, name)

@@ -33,7 +33,7 @@ class ExportRecord:
 
     group: Group
     solution: Solution | None
-    verdict: str
+    verdict: str = "unreviewed"
     reason: str | None = None
     override: str | None = None
     splits: Mapping[str, str] = field(default_factory=dict)

@@ -53,6 +53,20 @@ class TrackedEvent(Protocol):
     def sigma_s(self) -> float: ...
 
 
+class TrackedJump(Protocol):
+    """Where views that take over put the ball elsewhere.
+
+    Attributes:
+        frame: Of the stretch, the nearest.
+        metres: How far.
+    """
+
+    @property
+    def frame(self) -> int: ...
+    @property
+    def metres(self) -> float: ...
+
+
 class TrackValues(Protocol):
     """A track as the solver makes it: everything in the pitch frame, metres, seconds, z down.
 
@@ -66,6 +80,7 @@ class TrackValues(Protocol):
         mode: ``roll``, ``flight`` and so on, of each frame.
         views: Names of the cameras that measured the ball, of each frame.
         events: In the order of time.
+        jumps: In the order of time.
     """
 
     @property
@@ -86,6 +101,8 @@ class TrackValues(Protocol):
     def views(self) -> Sequence[Sequence[str]]: ...
     @property
     def events(self) -> Sequence[TrackedEvent]: ...
+    @property
+    def jumps(self) -> Sequence[TrackedJump]: ...
 
 
 @dataclass(frozen=True)
@@ -270,6 +287,9 @@ def _frames_table(record: TrackRecord) -> Any:
     """A row a frame, as an Arrow table."""
     pyarrow, _ = import_pyarrow()
     track = record.track
+    jumps = np.full(len(track.frames), np.nan)
+    for jump in track.jumps:
+        jumps[jump.frame - track.frames[0]] = jump.metres
     numbers, whole, text = pyarrow.float64(), pyarrow.int32(), pyarrow.string()
 
     def nullable_numbers(values: FloatArray) -> Any:
@@ -299,6 +319,7 @@ def _frames_table(record: TrackRecord) -> Any:
             "covariance": nullable_lists(track.covariance, 36),
             "state": pyarrow.array(list(track.state), text),
             "mode": pyarrow.array([mode or None for mode in track.mode], text),
+            "jump_m": nullable_numbers(jumps),
             "cameras": pyarrow.array([list(names) for names in track.views], pyarrow.list_(text)),
         }
     )

@@ -158,7 +158,23 @@ def ball_observations(
         views: Of a group.
         calibrations: Of each view.
     """
-    observations = [
+    return [
+        observation
+        for observation in clicked_balls(views, calibrations)
+        if np.isfinite(observation.ideal_center).all()
+    ]
+
+
+def clicked_balls(
+    views: Sequence[View], calibrations: Sequence[Calibration]
+) -> list[BallObservation]:
+    """``ball_observations`` with those through which no ray goes.
+
+    Args:
+        views: Of a group.
+        calibrations: Of each view.
+    """
+    return [
         BallObservation(
             view.key,
             calibration,
@@ -171,9 +187,6 @@ def ball_observations(
         if view.included and calibration.camera is not None
         if (ball := view.ball) is not None and not ball.inferred
         if (center := ball.center) is not None
-    ]
-    return [
-        observation for observation in observations if np.isfinite(observation.ideal_center).all()
     ]
 
 

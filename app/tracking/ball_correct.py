@@ -234,6 +234,7 @@ def _solved(
         ),
         None,
         summed(px, near.frames[inner], part.frames[rows]),
+        jumps=tuple(jump for jump in part.jumps if frames[first] <= jump.frame <= frames[last]),
     )
     return TrackPatch(corrections, numbers[inner], cut)
 
@@ -328,6 +329,7 @@ def _spliced(track: BallTrack, measurements: BallMeasurements, patch: TrackPatch
     whole = _placed(track, rows + first - int(track.frames[0]), part, rows)
     taken = set(patch.rows.tolist())
     beside = [event for event in track.events if not first <= event.frame <= last]
+    jumps = [jump for jump in track.jumps if not first <= jump.frame <= last]
     against = [item for item in track.contradicted if item.measurement not in taken]
     left = track.left_out
     if left is not None and part.left_out is not None:
@@ -341,6 +343,7 @@ def _spliced(track: BallTrack, measurements: BallMeasurements, patch: TrackPatch
             sorted([*against, *part.contradicted], key=lambda item: item.measurement)
         ),
         left_out=left,
+        jumps=tuple(sorted([*jumps, *part.jumps], key=lambda jump: jump.time_s)),
     )
 
 

@@ -14,6 +14,7 @@ from app.tracking.ball_models import (
     GRASS_S,
     GRASS_SIGMA,
     GRAVITY,
+    HELD,
     HELD_S,
     HELD_SIGMA,
     HOLDS_A_SECOND,
@@ -174,6 +175,14 @@ def touch(m, P, before, mode, dt):
         P[i, i] += spread
     move(m, P, mode, dt / 2)
     return cost
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def most_of_touch(mode, dt):
+    """The largest logarithm of probability that ``touch`` gives."""
+    if mode == HELD:
+        return np.log(HOLDS_A_SECOND * max(dt, 1e-3))
+    return np.log(KICKS_A_SECOND * max(dt, 1e-3)) + np.log(0.5)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -12,29 +12,47 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.tracking.ball_fit_kernels import factor, inverse_blocks, solve_factored
-from app.tracking.ball_intervals import GRAVITY_VECTOR, SIZE, Hit, P, V, hit_of, quiet_noise, spin
+from app.tracking.ball_fit_kernels import (
+    FREEDOM,
+    NEAR_M,
+    SIZE,
+    equations,
+    factor,
+    hit,
+    inverse_blocks,
+    solve_factored,
+)
 from app.tracking.ball_models import (
     BOUNCE,
     DRAG,
     FLIGHT,
     GRASS_S,
     GRASS_SIGMA,
+    HELD,
+    HELD_S,
+    HELD_SIGMA,
     JUMP,
+    JUMP_SIGMA,
     KICK,
     REST,
     ROLL,
-    ROLLING,
+    ROLL_S,
+    ROLL_SIGMA,
+    SPIN_LEAST,
+    SPIN_S,
+    SPIN_SHARE,
 )
 from app.tracking.ball_search import Knots
 
-_FREEDOM = 6.0
-"""Of the t distribution of rays: gross errors pull little."""
+P, V = slice(0, 3), slice(3, 6)
+"""Where position and velocity stand in a state."""
 _ROUNDS, _MOST_M = 30, 8.0
 """Steps of the fit, and how far one may move a ball."""
 _SETTLED_M = 1e-4
-_NEAR_M = 1.0
-"""No ball is nearer to a camera."""
+_LOOSE = {FLIGHT: 0.5, ROLL: 1.0, HELD: 1.0}
+"""White noise of the acceleration beside its slow part, by mode, (m/s2)2 s."""
+_ROUGH = 0.0016
+"""How a ball leaves the smooth way of any model, a random walk, m2/s: 8 mm in a frame of 40 ms."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +98,13 @@ def fit(
         mode: At each knot, by number, shape (K,).
         event: Before each knot, by number, shape (K,).
         used: Rays that are of the ball, shape (R,).
-        start: Position and velocity at each knot to begin with, shape (K, 6).
+        start: State at each knot to begin with, shape (K, 9).
         noise: Of each ray, radians, shape (R,).
         unseen: What touches that nobody saw add to the noise of the acceleration before each
             knot, (m/s2)2 s, shape (K,).
     """
     problem = _Problem(knots, mode, event, used, noise, unseen, start)
-    state = np.concatenate([start, np.zeros((len(start), 3))], axis=1)
+    state = start
     for _ in range(_ROUNDS):
         diagonal, beside, pull = problem.equations(state)
         rows = factor(diagonal, beside)
@@ -120,49 +138,40 @@ class _Problem:
         self.knots, self.mode, self.event = knots, mode, event
         self.used, self.noise = used, noise
         self.dt = np.diff(knots.times)
-        loud = (event[1:] == KICK) | (event[1:] == BOUNCE)
-        self.quiet, self.loud = np.flatnonzero(~loud), np.flatnonzero(loud)
-        after = mode[1:][self.quiet]
-        dt = self.dt[self.quiet]
-        turned = spin(np.linalg.norm(start[self.quiet, V], axis=1))
-        jumps = event[1:][self.quiet] == JUMP
-        self.way, self.inverse = quiet_noise(after, dt, unseen[1:][self.quiet], turned, jumps)
+        self.loud = np.flatnonzero((event[1:] == KICK) | (event[1:] == BOUNCE))
+        turned = spin(np.linalg.norm(start[:-1, V], axis=1))
+        jumps = event[1:] == JUMP
+        self.way, self.inverse = quiet_noise(mode[1:], self.dt, unseen[1:], turned, jumps)
 
     def misses(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Misses of the rays by their noise, (R, 2); their slopes, (R, 2, 3); and weights, (R,)."""
         knots = self.knots
         off = state[knots.at, P] - knots.centres
-        reach = np.maximum((off * knots.along).sum(axis=1), _NEAR_M)
+        reach = np.maximum((off * knots.along).sum(axis=1), NEAR_M)
         aside = np.einsum("rij,rj->ri", knots.across, off)
         miss = aside / (reach * self.noise)[:, None]
         slope = (
             knots.across / reach[:, None, None]
             - aside[:, :, None] * knots.along[:, None, :] / (reach**2)[:, None, None]
         ) / self.noise[:, None, None]
-        weight = (_FREEDOM + 2) / (_FREEDOM + (miss**2).sum(axis=1))
+        weight = (FREEDOM + 2) / (FREEDOM + (miss**2).sum(axis=1))
         return miss, slope, np.where(self.used, np.minimum(weight, 1.0), 0.0)
 
     def equations(self, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Diagonal blocks, (K, 9, 9); those beside them, (K - 1, 9, 9); and the pull, (K, 9)."""
-        count = len(state)
-        diagonal = np.zeros((count, SIZE, SIZE))
-        beside = np.zeros((max(count - 1, 0), SIZE, SIZE))
-        pull = np.zeros((count, SIZE))
-        self._see(state, diagonal, pull)
-        self._begin(state, diagonal, pull)
-        self._stay_above(state, diagonal, pull)
-        if len(self.quiet):
-            self._move(state, diagonal, beside, pull)
-        for at in self.loud.tolist():
-            one = self._hit(state, at)
-            pushed = one.slopes.T @ one.weight
-            normal, force = pushed @ one.slopes, pushed @ one.miss
-            diagonal[at] += normal[:SIZE, :SIZE]
-            diagonal[at + 1] += normal[SIZE:, SIZE:]
-            beside[at] += normal[:SIZE, SIZE:]
-            pull[at] += force[:SIZE]
-            pull[at + 1] += force[SIZE:]
-        return diagonal, beside, pull
+        knots, asked = self.knots, self.knots.asked
+        # What is known before anything is seen.
+        roll = self.mode[0] == ROLL
+        begin = np.array([0, 0, -REST if roll else -2.0, 0, 0, 0, 0, 0, 0])
+        lift = (GRASS_SIGMA, 0.1, 0.5) if roll else (4.0, 5.0, 2.0)
+        sigma = np.array([40, 30, lift[0], 10, 10, lift[1], 2.0, 2.0, lift[2]])
+        found: tuple[FloatArray, FloatArray, FloatArray] = equations(
+            state, self.mode, self.event, self.dt, self.way, self.inverse,
+            knots.at, self.used, self.noise, knots.centres, knots.along, knots.across,
+            knots.far, knots.far_sigma, asked.at, asked.normal, asked.value, asked.sigma,
+            begin, sigma,
+        )  # fmt: skip
+        return found
 
     def events(
         self, state: FloatArray, covariance: FloatArray, after: FloatArray
@@ -170,12 +179,16 @@ class _Problem:
         """Times of the events before each knot, and their sigmas, both (K,)."""
         when, spread = np.full(len(state), np.nan), np.full(len(state), np.nan)
         for at in self.loud.tolist():
-            one = self._hit(state, at)
-            when[at + 1] = self.knots.times[at] + one.time
+            _, slopes, own, way, time, slack = hit(
+                state[at], state[at + 1], self.dt[at], self.mode[at], self.mode[at + 1],
+                self.event[at + 1] == BOUNCE,
+            )  # fmt: skip
+            when[at + 1] = self.knots.times[at] + time
+            rows = np.flatnonzero(np.isfinite(own))
             both = np.block([[covariance[at], after[at]], [after[at].T, covariance[at + 1]]])
-            noise = one.noise + one.slopes @ both @ one.slopes.T
-            gain = one.way @ np.linalg.pinv(noise, hermitian=True) @ one.way
-            spread[at + 1] = np.sqrt(1 / (12 / self.dt[at] ** 2 + gain))
+            noise = np.diag(own[rows]) + slopes[rows] @ both @ slopes[rows].T
+            gain = way[rows] @ np.linalg.pinv(noise, hermitian=True) @ way[rows]
+            spread[at + 1] = np.sqrt(1 / (1 / slack + gain))
         return when, spread
 
     def lateness(self, state: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -197,90 +210,53 @@ class _Problem:
             known[view] -= flat @ solve_factored(rows, SIZE, flat[view])
         return (known + known.T) / 2, pull
 
-    def _see(self, state: FloatArray, diagonal: FloatArray, pull: FloatArray) -> None:
-        knots = self.knots
-        miss, slope, weight = self.misses(state)
-        pushed = slope * weight[:, None, None]
-        normal = np.einsum("rki,rkj->rij", pushed, slope)
-        force = np.einsum("rki,rk->ri", pushed, miss)
-        far = np.flatnonzero((knots.far_sigma > 0) & self.used)
-        if len(far):
-            along = knots.along[far]
-            off = ((state[knots.at[far], P] - knots.centres[far]) * along).sum(axis=1)
-            off = (off - knots.far[far]) / knots.far_sigma[far]
-            doubt = np.minimum(1.0, 2.0 / np.maximum(np.abs(off), 1e-9)) / knots.far_sigma[far]
-            normal[far] += (doubt / knots.far_sigma[far])[:, None, None] * (
-                along[:, :, None] * along[:, None, :]
-            )
-            force[far] += (doubt * off)[:, None] * along
-        np.add.at(diagonal[:, P, P], knots.at, normal)
-        np.add.at(pull[:, P], knots.at, force)
-        asked = knots.asked
-        if len(asked.at):
-            off = (state[asked.at, P] * asked.normal).sum(axis=1) - asked.value
-            sure = asked.normal / asked.sigma[:, None] ** 2
-            np.add.at(diagonal[:, P, P], asked.at, sure[:, :, None] * asked.normal[:, None, :])
-            np.add.at(pull[:, P], asked.at, off[:, None] * sure)
 
-    def _begin(self, state: FloatArray, diagonal: FloatArray, pull: FloatArray) -> None:
-        """What is known before anything is seen."""
-        roll = self.mode[0] == ROLL
-        mean = np.array([0, 0, -REST if roll else -2.0, 0, 0, 0, 0, 0, 0])
-        lift = (GRASS_SIGMA, 0.1, 0.5) if roll else (4.0, 5.0, 2.0)
-        sigma = np.array([40, 30, lift[0], 10, 10, lift[1], 2.0, 2.0, lift[2]])
-        diagonal[0] += np.diag(sigma**-2)
-        pull[0] += (state[0] - mean) / sigma**2
+def spin(speed: FloatArray) -> FloatArray:
+    """Standard deviation of the acceleration by spin and wind at a speed, m/s2."""
+    return SPIN_SHARE * DRAG * np.minimum(speed, 30.0) ** 2 + SPIN_LEAST
 
-    def _stay_above(self, state: FloatArray, diagonal: FloatArray, pull: FloatArray) -> None:
-        low = state[:, 2] + REST
-        under = (low > 0) & (self.mode != ROLL)
-        diagonal[under, 2, 2] += GRASS_SIGMA**-2
-        pull[under, 2] += low[under] * GRASS_SIGMA**-2
 
-    def _move(
-        self, state: FloatArray, diagonal: FloatArray, beside: FloatArray, pull: FloatArray
-    ) -> None:
-        """Intervals without events."""
-        at = self.quiet
-        mode, dt = self.mode[1:][at], self.dt[at]
-        velocity = state[at, V]
-        speed = np.linalg.norm(velocity, axis=1)
-        way = self.way.copy()
-        flies, rolls = mode == FLIGHT, mode == ROLL
-        pushed = np.zeros_like(velocity)
-        bent = np.zeros((len(at), 3, 3))
-        pushed[flies] = GRAVITY_VECTOR - DRAG * speed[flies, None] * velocity[flies]
-        safe = np.maximum(speed, 1e-3)
-        bent[flies] = -DRAG * (
-            safe[flies, None, None] * np.eye(3)
-            + velocity[flies, :, None] * velocity[flies, None, :] / safe[flies, None, None]
-        )
-        pace = np.sqrt((velocity[:, :2] ** 2).sum(axis=1) + 0.25)
-        pushed[rolls, :2] = -ROLLING * velocity[rolls, :2] / pace[rolls, None]
-        grass = np.diag([1.0, 1.0, 0.0])
-        flat = velocity * (1.0, 1.0, 0.0)
-        bent[rolls] = -ROLLING * (
-            grass / pace[rolls, None, None]
-            - flat[rolls, :, None] * flat[rolls, None, :] / pace[rolls, None, None] ** 3
-        )
-        step, half = dt[:, None], dt[:, None] ** 2 / 2
-        way[:, P, V] += bent * half[:, :, None]
-        way[:, V, V] += bent * step[:, :, None]
-        moved = np.einsum("nij,nj->ni", self.way, state[at])
-        moved[:, P] += pushed * half
-        moved[:, V] += pushed * step
-        moved[rolls, 2] -= REST * (1 - np.exp(-dt[rolls] / GRASS_S))
-        miss = state[at + 1] - moved
-        held = self.inverse @ way
-        diagonal[at] += way.transpose(0, 2, 1) @ held
-        diagonal[at + 1] += self.inverse
-        beside[at] -= held.transpose(0, 2, 1)
-        force = np.einsum("nij,nj->ni", self.inverse, miss)
-        pull[at + 1] += force
-        pull[at] -= np.einsum("nji,nj->ni", way, force)
+def quiet_noise(
+    mode: IntArray, dt: FloatArray, unseen: FloatArray, strong_spin: FloatArray, jumps: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """How states move without events and without drag, and the inverse of the noise, (N, 9, 9) each.
 
-    def _hit(self, state: FloatArray, at: int) -> Hit:
-        """An interval with a kick or a bounce at an unknown time."""
-        before, after = self.mode[at], self.mode[at + 1]
-        bounce = self.event[at + 1] == BOUNCE
-        return hit_of(state[at], state[at + 1], self.dt[at], before, after, bounce)
+    Args:
+        mode: Of each interval, shape (N,).
+        dt: Seconds, shape (N,).
+        unseen: What touches that nobody saw add to the acceleration's noise, (m/s2)2 s, shape (N,).
+        strong_spin: From ``spin``, shape (N,).
+        jumps: Whether other cameras, which are not exact, see the ball from there on, shape (N,).
+    """
+    count = len(mode)
+    rolls, flies = mode == ROLL, mode == FLIGHT
+    way = np.tile(np.eye(SIZE), (count, 1, 1))
+    noise = np.zeros((count, SIZE, SIZE))
+    lasts = np.where(flies, SPIN_S, np.where(rolls, ROLL_S, HELD_S))
+    strong = np.where(flies, strong_spin, np.where(rolls, ROLL_SIGMA, HELD_SIGMA))
+    stay = np.exp(-dt / lasts)
+    # A ball in somebody's keeping slows down: its velocity would grow without end.
+    slow = np.where(rolls | flies, 1.0, np.exp(-dt))
+    loose = np.array([_LOOSE[each] for each in mode.tolist()]) + unseen
+    for axis in range(3):
+        p, v, a = axis, 3 + axis, 6 + axis
+        way[:, p, v], way[:, p, a], way[:, v, a] = dt, dt**2 / 2, dt
+        way[:, v, v], way[:, a, a] = slow, stay
+        noise[:, p, p] = loose * dt**3 / 3 + _ROUGH * dt
+        noise[:, p, v] = noise[:, v, p] = loose * dt**2 / 2
+        noise[:, v, v] = loose * dt + 1e-6
+        noise[:, a, a] = strong**2 * (1 - stay**2) + 1e-6
+    flat = np.flatnonzero(rolls)
+    if len(flat):
+        for row in (2, 5, 8):
+            way[flat, row] = 0.0
+            noise[flat, row] = 0.0
+            noise[flat, :, row] = 0.0
+        stay = np.exp(-dt[flat] / GRASS_S)
+        way[flat, 2, 2] = stay
+        noise[flat, 2, 2] = GRASS_SIGMA**2 * (1 - stay**2) + _ROUGH * dt[flat]
+        noise[flat, 5, 5] = 0.2**2
+        noise[flat, 8, 8] = 1.0
+    for row in range(3):
+        noise[jumps, row, row] += JUMP_SIGMA**2
+    return way, np.asarray(np.linalg.inv(noise), dtype=float)

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
 from app.tracking.ball_fit import Fitted
-from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, KICK, LEAST_CHANGE, REST, ROLL
+from app.tracking.ball_models import BOUNCE, FLIGHT, HELD, JUMP, KICK, LEAST_CHANGE, REST, ROLL
 from app.tracking.ball_prediction import left_out, summed
 from app.tracking.ball_search import History, Knots
 from app.tracking.ball_solve_run import Run, TrackOptions
@@ -24,6 +24,7 @@ from app.tracking.ball_track import (
     Contradiction,
     EventKind,
     Untracked,
+    ViewJump,
 )
 
 _MODES: dict[int, BallMode] = {FLIGHT: "flight", ROLL: "roll", HELD: "held"}
@@ -32,6 +33,8 @@ OPEN = (
     "alone."
 )
 """Why a ball that is seen has no place."""
+_JUMP_S = 1.0
+"""How long a jump says how wrong the cameras are that see the ball: of that much, by this time less."""
 LEAST_TOLD_S = 0.0015
 """Of an offset in time that is told."""
 
@@ -65,6 +68,7 @@ def joined(
     events: list[BallEvent] = []
     against: list[Contradiction] = []
     untracked: list[Untracked] = []
+    jumps: list[ViewJump] = []
     px = np.full(len(measurements), np.nan)
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.04
     half = np.array([-step / 2 - 1e-9, step / 2 + 1e-9])
@@ -96,6 +100,7 @@ def joined(
             else:
                 state[row] = "bridged" if seen[0] < knot < seen[-1] else "predicted"
         events += _events(knots, history, fitted, known, frames, times)
+        jumps += _jumps(run, knots, history, fitted, known, frames, times)
         off = np.linalg.norm(fitted.miss, axis=1)
         for ray in np.flatnonzero(~run.used & known[knots.at]):
             reason = (
@@ -105,6 +110,8 @@ def joined(
             against.append(Contradiction(int(knots.rows[ray]), miss, reason))
         if options.leave_out:
             px[knots.rows] = left_out(knots, fitted, run.noise, known)
+    contradicting = _between_views(times, jumps)
+    covariance[:, :3, :3] += contradicting[:, None, None] * np.eye(3)
     mode, out = _outside(position, mode, pitch, frames, times)
     return replace(
         blank,
@@ -124,6 +131,7 @@ def joined(
             if abs(late) > LEAST_TOLD_S
         ),
         untracked=tuple(sorted(untracked, key=lambda one: one.first)),
+        jumps=tuple(sorted(jumps, key=lambda one: one.time_s)),
     )
 
 
@@ -195,6 +203,42 @@ def _events(
         place = before[:3] + before[3:6] * (when[at] - knots.times[at - 1])
         frame = int(frames[np.abs(times - when[at]).argmin()])
         yield BallEvent(frame, float(when[at]), kind, place, float(fitted.event_sigma[at]))
+
+
+def _jumps(
+    run: Run,
+    knots: Knots,
+    history: History,
+    fitted: Fitted,
+    known: BoolArray,
+    frames: IntArray,
+    times: FloatArray,
+) -> Iterator[ViewJump]:
+    """Jumps where other views take over, beyond what both sides leave uncertain."""
+    for at in np.flatnonzero((history.event == JUMP) & known & np.roll(known, 1)).tolist():
+        before, after = fitted.state[at - 1], fitted.state[at]
+        span = knots.times[at] - knots.times[at - 1]
+        moved = after[:3] - before[:3] - span * (before[3:6] + after[3:6]) / 2
+        unsure = np.trace(fitted.covariance[at - 1, :3, :3] + fitted.covariance[at, :3, :3])
+        beyond = float(moved @ moved - unsure)
+        if beyond > 0:
+            rays = range(int(knots.starts[at]), int(knots.starts[at + 1]))
+            views = sorted({run.names[knots.view[ray]] for ray in rays})
+            time = float(knots.times[at])
+            frame = int(frames[np.abs(times - time).argmin()])
+            yield ViewJump(frame, time, float(np.sqrt(beyond)), tuple(views))
+
+
+def _between_views(times: FloatArray, jumps: Sequence[ViewJump]) -> FloatArray:
+    """What jumps add to the variance of each coordinate, square metres, shape (N,).
+
+    Either side may be the one that is wrong, and in any direction: a jump is one sample of it.
+    """
+    most = np.zeros(len(times))
+    for jump in jumps:
+        near = jump.metres**2 * np.exp(-np.abs(times - jump.time_s) / _JUMP_S)
+        most = np.maximum(most, near)
+    return most
 
 
 def _outside(

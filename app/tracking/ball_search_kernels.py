@@ -10,7 +10,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from app.tracking.ball_filter_kernels import bounce, copy, jump, move, pin, see, touch
+from app.tracking.ball_filter_kernels import (
+    OUTLIER,
+    bounce,
+    copy,
+    jump,
+    most_of_touch,
+    move,
+    pin,
+    see,
+    touch,
+)
 from app.tracking.ball_models import (
     BOUNCE,
     FLIGHT,
@@ -31,6 +41,43 @@ _UNLIKELY = 30.0
 _ALIKE = 2
 """Hypotheses that are kept of those whose mode and last event are the same."""
 _PER_KNOT = 6
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def begin_with(m, P, mode):
+    """What is known of a ball before anything is seen, in place; its logarithm of probability."""
+    m[:], P[:] = 0.0, 0.0
+    m[2] = -REST if mode == ROLL else -2.0
+    P[0, 0], P[1, 1] = 40.0**2, 30.0**2
+    P[2, 2] = GRASS_SIGMA**2 if mode == ROLL else 4.0**2
+    P[3, 3] = P[4, 4] = 10.0**2
+    P[5, 5] = 0.01 if mode == ROLL else 5.0**2
+    return -0.7 if mode < 2 else -4.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def at_most(first, last, noise, scale):
+    """More than ``see`` finds for no state."""
+    total = 0.0
+    for row in range(first, last):
+        total += max(2 * (-np.log(noise[row] * scale[row]) - 0.919), OUTLIER)
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def misplaced(m, P, mode, room):
+    """What a place outside of the room costs, or one out of reach of who holds the ball."""
+    cost = 0.0
+    for i in range(3):
+        slack = 2 * np.sqrt(max(P[i, i], 0.0)) + 0.1
+        off = max(room[i, 0] - m[i], m[i] - room[i, 1]) - slack
+        if off > 0:
+            cost += min(off / 0.2, 8.0) ** 2 / 2
+    if mode == HELD:
+        off = -m[2] - REACH - 2 * np.sqrt(max(P[2, 2], 0.0))
+        if off > 0:
+            cost += min(off / 0.2, 8.0) ** 2 / 2
+    return cost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -80,99 +127,91 @@ def likeliest(
     csince, cleft = np.zeros(size, np.int64), np.zeros(size, np.int64)
     clatest, cjump = np.zeros(size, np.int64), np.zeros(size, np.int64)
     order = np.zeros(size, np.int64)
+    second = np.zeros((3, 4, 2))
+    jump_of = np.zeros((3, 4), np.int64)
     for k in range(K):
-        made = 0
-        if k == 0:
-            for mode in range(3):
-                m, P = np.zeros(6), np.zeros((6, 6))
-                m[2] = -REST if mode == ROLL else -2.0
-                P[0, 0], P[1, 1] = 40.0**2, 30.0**2
-                P[2, 2] = GRASS_SIGMA**2 if mode == ROLL else 4.0**2
-                P[3, 3] = P[4, 4] = 10.0**2
-                P[5, 5] = 0.01 if mode == ROLL else 5.0**2
-                copy(cm[made], cC[made], m, P)
-                cs[made] = -0.7 if mode < 2 else -4.0
-                cmode[made], cevent[made], cp[made], csince[made] = mode, NOTHING, 0, 0
-                clatest[made], cjump[made] = NOTHING, 0
-                made += 1
-        else:
-            dt = times[k] - times[k - 1]
-            for strict in range(2):
-                # Where no history can do what has to happen, it is as if nobody had said it.
-                if strict == 1 and made > 0:
-                    break
-                for h in range(count):
-                    mode = modes[k - 1, h]
-                    missing = wanted[k]
-                    if latest[h] == missing and since[h] >= begin[k]:
-                        missing = NOTHING
-                    now = missing != NOTHING and due[k] and strict == 0
-                    for way in range(_PER_KNOT):
-                        event = NOTHING if way == 0 else BOUNCE if way == 4 else KICK
-                        if way == 5:
-                            if not changed[k]:
-                                continue
-                            event = JUMP
-                        may = event == NOTHING or not (may_not[k] >> event) & 1
-                        if (now or not may) and (event != missing or event == NOTHING):
+        made, best = 0, -np.inf
+        most = at_most(starts[k], starts[k + 1], noise, scale)
+        for row in range(places[k], places[k + 1]):
+            most -= np.log(sigma[row])
+        second[:] = -np.inf
+        jump_of[:] = -1
+        dt = times[k] - times[k - 1] if k else 0.0
+        for strict in range(2):
+            # Where no history can do what has to happen, it is as if nobody had said it.
+            if strict == 1 and (k == 0 or made > 0):
+                break
+            for h in range(count):
+                mode = modes[k - 1, h] if k else h
+                missing = wanted[k]
+                if latest[h] == missing and since[h] >= begin[k]:
+                    missing = NOTHING
+                now = missing != NOTHING and due[k] and strict == 0
+                for way in range(_PER_KNOT if k else 1):
+                    event = NOTHING if way == 0 else BOUNCE if way == 4 else KICK
+                    if way == 5:
+                        if not changed[k]:
                             continue
-                        m, P = cm[made], cC[made]
+                        event = JUMP
+                    may = event == NOTHING or not (may_not[k] >> event) & 1
+                    if k and (now or not may) and (event != missing or event == NOTHING):
+                        continue
+                    m, P = cm[made], cC[made]
+                    after, cost = mode, 0.0
+                    if k == 0:
+                        cost = begin_with(m, P, mode)
+                    elif way == 0:
                         copy(m, P, M[h], C[h])
-                        after, cost = mode, 0.0
-                        if way == 0:
-                            move(m, P, mode, dt)
-                        elif way == 1:
-                            after = FLIGHT
-                            cost = touch(m, P, mode, FLIGHT, dt)
-                        elif way == 2:
-                            after = ROLL
-                            cost = touch(m, P, mode, ROLL, dt)
-                        elif way == 3:
-                            if mode == HELD:
-                                continue
-                            after = HELD
-                            cost = touch(m, P, mode, HELD, dt)
-                        elif way == 5:
-                            cost = jump(m, P, mode, dt)
-                        else:
-                            if mode != FLIGHT:
-                                continue
-                            cost = bounce(m, P, FLIGHT, dt)
-                            if cost > -np.inf and m[5] > -1.2:
-                                # Too low a hop to be seen as one.
-                                copy(m, P, M[h], C[h])
-                                after = ROLL
-                                cost = bounce(m, P, ROLL, dt)
-                        if cost == -np.inf:
+                        move(m, P, mode, dt)
+                    elif way == 5:
+                        copy(m, P, M[h], C[h])
+                        cost = jump(m, P, mode, dt)
+                    elif way == 4:
+                        if mode != FLIGHT:
                             continue
-                        cmode[made], cevent[made], cp[made] = after, event, h
-                        happened = event in (KICK, BOUNCE)
-                        csince[made] = k if happened else since[h]
-                        clatest[made] = event if happened else latest[h]
-                        cjump[made] = k if event == JUMP else jumped[h]
-                        cs[made] = score[h] + cost
-                        made += 1
-        best = -np.inf
-        for c in range(made):
-            m, P = cm[c], cC[c]
-            likely, left = see(
-                m, P, starts[k], starts[k + 1], centres, across, along, noise, scale, far, far_sigma
-            )
-            cs[c] += likely
-            cleft[c] = left
-            for row in range(places[k], places[k + 1]):
-                square, total = pin(m, P, normal[row], value[row], sigma[row] ** 2)
-                cs[c] -= min(square / 2, _UNLIKELY) + np.log(total) / 2
-            for i in range(3):
-                slack = 2 * np.sqrt(max(P[i, i], 0.0)) + 0.1
-                off = max(room[i, 0] - m[i], m[i] - room[i, 1]) - slack
-                if off > 0:
-                    cs[c] -= min(off / 0.2, 8.0) ** 2 / 2
-            if cmode[c] == HELD:
-                off = -m[2] - REACH - 2 * np.sqrt(max(P[2, 2], 0.0))
-                if off > 0:
-                    cs[c] -= min(off / 0.2, 8.0) ** 2 / 2
-            best = max(best, cs[c])
+                        copy(m, P, M[h], C[h])
+                        cost = bounce(m, P, FLIGHT, dt)
+                        if cost > -np.inf and m[5] > -1.2:
+                            # Too low a hop to be seen as one.
+                            copy(m, P, M[h], C[h])
+                            after = ROLL
+                            cost = bounce(m, P, ROLL, dt)
+                    else:
+                        after = FLIGHT if way == 1 else ROLL if way == 2 else HELD
+                        if after == HELD and mode == HELD:
+                            continue
+                        # Of those that are touched now two stay: one that cannot be among them is not tried.
+                        least = (
+                            second[after, KICK, 1] if jump_of[after, KICK] == jumped[h] else -np.inf
+                        )
+                        if score[h] + most_of_touch(after, dt) + most < least:
+                            continue
+                        copy(m, P, M[h], C[h])
+                        cost = touch(m, P, mode, after, dt)
+                    if cost == -np.inf:
+                        continue
+                    likely, cleft[made] = see(
+                        m, P, starts[k], starts[k + 1],
+                        centres, across, along, noise, scale, far, far_sigma,
+                    )  # fmt: skip
+                    likely += cost + score[h] if k else cost
+                    for row in range(places[k], places[k + 1]):
+                        square, total = pin(m, P, normal[row], value[row], sigma[row] ** 2)
+                        likely -= min(square / 2, _UNLIKELY) + np.log(total) / 2
+                    likely -= misplaced(m, P, after, room)
+                    happened = event in (KICK, BOUNCE)
+                    cs[made], cmode[made], cevent[made], cp[made] = likely, after, event, h
+                    csince[made] = k if happened else since[h]
+                    clatest[made] = event if happened else latest[h]
+                    cjump[made] = k if event == JUMP else jumped[h]
+                    best = max(best, likely)
+                    if event == KICK:
+                        if jump_of[after, event] == -1:
+                            jump_of[after, event] = jumped[h]
+                        if jump_of[after, event] == jumped[h] and likely > second[after, event, 1]:
+                            second[after, event, 1] = min(likely, second[after, event, 0])
+                            second[after, event, 0] = max(likely, second[after, event, 0])
+                    made += 1
         # numba takes seconds to compile a sort of its own.
         for c in range(made):
             at = c

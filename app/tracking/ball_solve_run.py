@@ -131,10 +131,10 @@ def solve_run(
     event = history.event.copy()
     used, noise = history.used.copy(), knots.noise
     unseen = _unseen(knots)
-    state = history.state
+    state = np.pad(history.state, ((0, 0), (0, 3)))
     for turn in range(4):
         fitted = fit(knots, history.mode, event, used, state, noise, unseen)
-        state = fitted.state[:, :6]
+        state = fitted.state
         scale = _scale(knots, fitted, used)
         if turn == 0 and np.median(scale) > _LOUD:
             times_said = float(np.median(scale))

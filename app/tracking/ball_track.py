@@ -97,6 +97,24 @@ class BallEvent:
 
 
 @dataclass(frozen=True)
+class ViewJump:
+    """Where other views take over, and put the ball elsewhere than those before did: their cameras contradict each
+    other. It is no event of the ball.
+
+    Attributes:
+        frame: The nearest one.
+        time_s: Seconds: from then on.
+        metres: How far the ball jumps beside its motion.
+        views: Names of those that see it from then on.
+    """
+
+    frame: int
+    time_s: float
+    metres: float
+    views: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Correction:
     """An event that a person added to a track, or removed from it.
 
@@ -187,6 +205,7 @@ class BallTrack:
         offsets: Seconds to add to a view's times, as the ball shows them, by name; only where that
             is observable and not nought.
         untracked: Runs of measurements that are in no track, though others are.
+        jumps: Where views that take over put the ball elsewhere, by time.
     """
 
     frames: IntArray
@@ -203,6 +222,7 @@ class BallTrack:
     left_out: LeftOut | None = None
     offsets: tuple[tuple[str, float], ...] = ()
     untracked: tuple[Untracked, ...] = ()
+    jumps: tuple[ViewJump, ...] = ()
 
     @cached_property
     def sigma(self) -> FloatArray:

@@ -42,6 +42,7 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  */
 /** @typedef {{frame: number, time_s: number, kind: EventKind, position: number[], sigma_s: number, added: boolean}} TrackEvent */
 /** @typedef {{frame: number, view: string, group: number | null, x: number, y: number, track_x: number | null, track_y: number | null, px: number, sentence: string, fix: string}} Contradiction */
+/** @typedef {{frame: number, time_s: number, metres: number, views: string[]}} TrackJump where other views take over and put the ball elsewhere */
 /**
  * @typedef {object} TrackFrames
  * @property {number[]} frame
@@ -58,6 +59,7 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  * @property {(number | null)[]} left_out_px
  * @property {(number[] | null)[]} raw where the views of a frame alone put the ball
  * @property {(number | null)[]} group
+ * @property {TrackJump[]} jumps
  * @property {TrackEvent[]} events
  * @property {Contradiction[]} contradicted
  */

@@ -34,14 +34,15 @@ export const trackAround = computed(() => {
 
 /** @param {number} group @param {string} etag @param {string} match @param {AbortSignal} signal */
 async function read(group, etag, match, signal) {
-	// After an edit its track is known: nobody waits for one answer to ask for the other.
 	const before = found.peek();
-	const known = before?.group === group && before.etag !== etag ? around(before.track, before.frame, group, etag, signal) : null;
-	const [{ items }] = await Promise.all([getTracksOfGroup(group, signal), known]);
+	const edited = before !== null && before.group === group && before.etag !== etag;
+	// After an edit its track is known, and what comes of it is waited for: the server does nothing else meanwhile.
+	if (edited) await around(before.track, before.frame, group, etag, signal);
+	const { items } = await getTracksOfGroup(group, signal);
 	const one = items.find(({ track }) => !track.summary.reason);
 	if (!one) without.set(match, performance.now());
 	found.value = one ? { group, etag, ...one } : null;
-	if (one?.track.stale && !known) await around(one.track, one.frame, group, etag, signal);
+	if (one?.track.stale && !edited) await around(one.track, one.frame, group, etag, signal);
 }
 
 /** @param {TrackJson} track @param {number} frame @param {number} group @param {string} etag @param {AbortSignal} signal */

@@ -1,7 +1,7 @@
 // @ts-check
 /** What a track is drawn from: runs of modes, curves with their bands, and corrections of its events. */
 
-/** @import {BallMode, BallState, Correction, EventKind, TrackEvent, TrackFrames} from '../api/tracks.js' */
+/** @import {BallMode, BallState, Correction, EventKind, TrackEvent, TrackFrames, TrackJump} from '../api/tracks.js' */
 
 /** Frames between an event and the frame that somebody means by it; as the server takes it. */
 export const NEAR = 3;
@@ -68,6 +68,11 @@ export function partOf(frames, from, to) {
 	if (from <= 0 && to >= frames.frame.length - 1) return frames;
 	const part = Object.fromEntries(Object.entries(frames).map(([name, list]) => [name, Array.isArray(list) && list.length === frames.frame.length ? list.slice(from, to + 1) : list]));
 	return /** @type {TrackFrames} */ (part);
+}
+
+/** A jump where other views take over, in words. @param {TrackJump} jump */
+export function jumpText({ frame, metres, views }) {
+	return `jump of ${metres.toFixed(1)} m in frame ${frame}, where ${views.join(', ')} take over`;
 }
 
 /** The next event from a frame on, or the one before. @param {TrackEvent[]} events @param {number} frame @param {1 | -1} way @returns {TrackEvent | undefined} */

@@ -37,7 +37,7 @@ PLAIN_WORDS = """
     fields figure figures files film filter finder finite first fit fixture folders follow
     form format formats frozen gestures give glossary gold grass grid guess guide guideline
     guidelines header headers heat help hints histograms history hit home hooks hosts idempotency
-    identity if image images import imports index indexing info init insert insight intervals
+    identity if image images import imports index indexing info init insert insight
     invitation invitations invite items jaccard join json kept kernels key keys kinds known konva
     last latest lazy lease leases least legend lens lesson lessons letter limits links list listing
     live local locks login logins lone loupe mail main maintenance making many map markdown marks

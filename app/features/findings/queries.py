@@ -204,7 +204,7 @@ def replace_track_findings(
         dataset_id: The dataset.
         matches: Of the groups.
         groups: Ids of those that are asked about; None: all of the matches.
-        found: All of them; what is there already is not written again.
+        found: All of them; what is there already is not written again, nor of groups that are no more.
 
     Returns:
         Ids of the groups concerned.
@@ -222,12 +222,21 @@ def replace_track_findings(
         for row in session.execute(statement)
         if groups is None or row.group_id in groups
     }
+    # One that was read before this write may be gone.
+    there = set(
+        session.scalars(
+            select(GroupModel.id).where(
+                GroupModel.dataset_id == dataset_id, GroupModel.match.in_(list(matches))
+            )
+        )
+    )
     wanted: set[tuple[Any, ...]] = {
         (
             *(item.group_id, item.view, item.sentence, item.number),
             *(None if item.place is None else canonical(item.place), item.of_inputs),
         )
         for item in found
+        if item.group_id in there
     }
     gone = [number for key, number in present.items() if key not in wanted]
     if gone:

@@ -12,10 +12,22 @@ from app.features.datasets.service import read_dataset_head
 from app.features.tracks.codec import TrackInputs, make_track
 from app.features.tracks.findings import groups_by_frame
 from app.features.tracks.making import read_records
-from app.features.tracks.queries import find_row, list_rows, match_groups, place_of_group
+from app.features.tracks.queries import (
+    find_row,
+    keys_of_match,
+    list_rows,
+    match_groups,
+    place_of_group,
+)
 from app.features.tracks.run_measurements import followed_observations, followed_runs
-from app.features.tracks.service import TrackDetail
-from app.features.tracks.stored import Track, stored_track
+from app.features.tracks.service import TrackedFrames
+from app.features.tracks.stored import (
+    Track,
+    corrections_of,
+    stored_track,
+    summary_of_row,
+    track_etag,
+)
 from app.features.tracks.stretches import frame_of, gather_stretches
 from app.soccer.pitch import Pitch
 from app.tracking.ball_track import BallMeasurements, BallTrack
@@ -59,17 +71,15 @@ def tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
 
 
 @dataclass(frozen=True)
-class Around:
-    """What was tracked around a frame.
+class Around(TrackedFrames):
+    """What was tracked around a frame: ``ball`` and ``inputs`` have the frames around it alone, and a reason
+    where no track comes of them.
 
     Attributes:
         frame: In the middle.
-        detail: ``ball`` and ``inputs`` have the frames around it alone, and a reason where no track
-            comes of them.
     """
 
     frame: int
-    detail: TrackDetail
 
 
 def track_around(store: Store, track_id: int, frame: int | None = None) -> Around:
@@ -88,21 +98,24 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
         row = find_row(session, track_id)
         if row is None:
             raise NotFoundError(f"there is no track {track_id}")
-        head = read_dataset_head(session, int(row.dataset_id))
-        groups = match_groups(session, head.id, [row.match]).get(row.match, [])
-        runs = followed_runs(session, head.id).get(row.match, [])
-        track = stored_track(row, head.policy, groups, runs)
+        head, summary = read_dataset_head(session, int(row.dataset_id)), summary_of_row(row)
         if frame is None:
-            worst = track.summary.worst
-            frame = track.first if worst is None else worst
-        if not track.first <= frame <= track.last:
+            frame = int(row.first) if summary.worst is None else summary.worst
+        if not row.first <= frame <= row.last:
             raise InputError(
-                f'frame {frame} is not of the track "{track.key}", {track.first} to {track.last}'
+                f'frame {frame} is not of the track "{row.key}", {row.first} to {row.last}'
             )
-        first = max(track.first, frame - AROUND - _MARGIN)
-        last = min(track.last, frame + AROUND + _MARGIN)
+        first = max(int(row.first), frame - AROUND - _MARGIN)
+        last = min(int(row.last), frame + AROUND + _MARGIN)
+        ids = [
+            group.id
+            for group in keys_of_match(session, head.id, row.match)
+            if (number := frame_of(group.key)) is not None and first <= number <= last
+        ]
+        groups = match_groups(session, head.id, [row.match], ids).get(row.match, [])
         near = groups_by_frame(groups, first, last)
         records = list(read_records(session, list(near.values())))
+        runs = followed_runs(session, head.id).get(row.match, [])
         close = {row.match: [run for run in runs if run.first <= last and first <= run.last]}
         followed = {
             match: [one for one in items if first <= one.frame <= last]
@@ -111,19 +124,21 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
             ).items()
         }
     # One stretch, however far apart its groups are.
-    shots = {track.match: [(track.first, track.last)]}
+    shots = {row.match: [(int(row.first), int(row.last))]}
     stretches = gather_stretches(records, head.policy, shots, followed)
     if not stretches:
-        return Around(frame, TrackDetail(track, *_nothing(track, first, last), near))
-    corrections = (item for item in track.corrections if first <= item.frame <= last)
-    inputs = TrackInputs.of(stretches[0], corrections)
-    return Around(frame, TrackDetail(track, make_track(inputs), inputs, near))
+        ball, inputs = _nothing(summary.rate, first, last)
+    else:
+        corrections = (item for item in corrections_of(row) if first <= item.frame <= last)
+        inputs = TrackInputs.of(stretches[0], corrections)
+        ball = make_track(inputs)
+    return Around(track_etag(row), ball, inputs, near, frame)
 
 
-def _nothing(track: Track, first: int, last: int) -> tuple[BallTrack, TrackInputs]:
+def _nothing(rate: float, first: int, last: int) -> tuple[BallTrack, TrackInputs]:
     """No ball in some frames, whose groups are all rejected."""
     frames = np.arange(first, last + 1)
-    times, empty = frames / track.summary.rate, np.zeros(0)
+    times, empty = frames / rate, np.zeros(0)
     measured = BallMeasurements(np.zeros(0, dtype=np.int64), empty, (), np.zeros((0, 2)), empty, ())
     reason = "No group around this frame takes part."
     return BallTrack.none(frames, times, reason), TrackInputs(frames, times, Pitch(), measured)

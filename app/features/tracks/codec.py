@@ -29,9 +29,10 @@ from app.tracking.ball_track import (
     EventKind,
     LeftOut,
     Untracked,
+    ViewJump,
 )
 
-TRACK_VERSION = "3"
+TRACK_VERSION = "4"
 """Of the solver: tracks of another one are stale."""
 EVENT_KINDS: tuple[str, ...] = get_args(EventKind)
 _UPPER = np.triu_indices(6)
@@ -218,6 +219,7 @@ def track_to_json(track: BallTrack) -> Json:
         ],
         "contradicted": [[item.measurement, item.px, item.reason] for item in track.contradicted],
         "untracked": [list(astuple(item)) for item in track.untracked],
+        "jumps": [list(astuple(item)) for item in track.jumps],
         "reason": track.reason,
         "left_out": left
         and {
@@ -299,6 +301,10 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
             tuple((name, offset) for name, offset in value["offsets"]),
             # Tracks of earlier versions do not say it.
             tuple(Untracked(*item) for item in value.get("untracked", ())),
+            tuple(
+                ViewJump(frame, time, metres, tuple(views))
+                for frame, time, metres, views in value.get("jumps", ())
+            ),
         )
 
 

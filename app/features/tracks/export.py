@@ -178,6 +178,7 @@ def _facts(stretch: Stretch, track: BallTrack, verdict: str) -> dict[str, Any]:
         "measurements": len(measured),
         "contradicted": len(track.contradicted),
         "untracked": [asdict(item) for item in track.untracked],
+        "jumps": [asdict(item) for item in track.jumps],
         "not_measured": dict(stretch.unused),
         "left_out_median_px": left and left.median_px,
         "left_out_p95_px": left and left.p95_px,

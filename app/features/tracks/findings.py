@@ -27,6 +27,8 @@ from app.features.tracks.stretches import frame_of, view_name
 from app.tracking.ball_track import BallTrack
 
 BATCH = 200
+TRIES = 3
+"""How often something is computed beside the write that others change meanwhile, before it is in it."""
 
 
 @dataclass(frozen=True)
@@ -67,48 +69,62 @@ def contradicting_balls(ball: BallTrack, inputs: TrackInputs) -> list[Contradict
     return found
 
 
-def refresh_all_findings(store: Store, dataset_id: int, matches: Collection[str]) -> None:
-    """``refresh_findings`` of matches; tracks are read before the write, and again where they changed meanwhile."""
-    saved = False
-    while not saved:
-        with store.read() as session:
-            before = _states(session, dataset_id, matches)
-            found = _read_notices(session, dataset_id, matches, None)
-        with store.write() as session:
-            saved = _states(session, dataset_id, matches) == before
-            if saved:
-                _save_notices(session, dataset_id, found)
-
-
-def refresh_findings(
-    session: Session, dataset_id: int, matches: Collection[str], only: int | None = None
-) -> None:
-    """Bring what tracks say of groups in step with the tracks; rejected ones say nothing.
-
-    A ball that was changed since the track was made is passed over: the track does not know it.
-
-    Args:
-        session: Of a write.
-        dataset_id: The dataset.
-        matches: Of the tracks.
-        only: Id of the track whose groups alone are asked about; None: all of the matches.
-    """
-    _save_notices(session, dataset_id, _read_notices(session, dataset_id, matches, only))
-
-
 @dataclass(frozen=True)
-class _Notices:
+class Notices:
     """What tracks say of groups.
 
     Attributes:
         matches: Of the tracks.
         scope: Ids of the groups that are asked about; None: all of the matches.
-        items: What they say.
+        items: What they say; each holds for its group as it was read.
     """
 
     matches: Collection[str]
     scope: set[int] | None
     items: list[BallNotice]
+
+
+def refresh_all_findings(store: Store, dataset_id: int, matches: Collection[str]) -> None:
+    """Bring what tracks say of groups in step with the tracks of matches; rejected ones say nothing.
+
+    Tracks are read before the write, and again where they changed meanwhile; after a few times during it.
+    A ball that was changed since the track was made is passed over: the track does not know it.
+    """
+    for _ in range(TRIES):
+        with store.read() as session:
+            before = _states(session, dataset_id, matches)
+            found = _read_notices(session, dataset_id, matches)
+        with store.write() as session:
+            if _states(session, dataset_id, matches) == before:
+                save_notices(session, dataset_id, found)
+                return
+    with store.write() as session:
+        save_notices(session, dataset_id, _read_notices(session, dataset_id, matches))
+
+
+def track_notices(
+    session: Session,
+    match: str,
+    groups: Mapping[int, TrackGroup],
+    track: tuple[BallTrack, TrackInputs] | None,
+) -> Notices:
+    """What one track says of its groups.
+
+    Args:
+        session: Any session.
+        match: Of the track.
+        groups: Of its frames.
+        track: Itself, and what it was computed from; None where it was rejected.
+    """
+    scope = {group.id for group in groups.values()}
+    beside = [] if track is None else contradicting_balls(*track)
+    return Notices([match], scope, _notices(session, beside, groups))
+
+
+def save_notices(session: Session, dataset_id: int, found: Notices) -> None:
+    """Store what tracks say of groups, in a write; groups that are no more are passed over."""
+    changed = replace_track_findings(session, dataset_id, found.matches, found.scope, found.items)
+    refresh_queue(session, changed)
 
 
 def _states(session: Session, dataset_id: int, matches: Collection[str]) -> list[tuple[Any, ...]]:
@@ -117,32 +133,19 @@ def _states(session: Session, dataset_id: int, matches: Collection[str]) -> list
     return [(row.id, row.digest, row.revision, row.verdict) for row in rows]
 
 
-def _read_notices(
-    session: Session, dataset_id: int, matches: Collection[str], only: int | None
-) -> _Notices:
+def _read_notices(session: Session, dataset_id: int, matches: Collection[str]) -> Notices:
     groups = match_groups(session, dataset_id, matches)
-    rows = list_rows(session, dataset_id, groups.keys())
-    if only is not None:
-        rows = [row for row in rows if row.id == only]
-    mine = {row.id: groups_by_frame(groups[row.match], row.first, row.last) for row in rows}
-    scope = None if only is None else {one.id for one in mine.get(only, {}).values()}
     found: list[BallNotice] = []
-    for row in rows:
+    for row in list_rows(session, dataset_id, groups.keys()):
         if row.verdict == "rejected" or not _contradicted(row):
             continue
         body = read_bodies(session, [row.id])[row.id]
         inputs = replace(inputs_from_json(unpack(body.inputs)), corrections=corrections_of(row))
         patches = () if body.patches is None else patches_from_json(unpack(body.patches))
-        beside = contradicting_balls(
-            corrected(inputs, track_from_json(unpack(body.body)), patches), inputs
-        )
-        found += _notices(session, beside, mine[row.id])
-    return _Notices(groups.keys(), scope, found)
-
-
-def _save_notices(session: Session, dataset_id: int, found: _Notices) -> None:
-    changed = replace_track_findings(session, dataset_id, found.matches, found.scope, found.items)
-    refresh_queue(session, changed)
+        ball = corrected(inputs, track_from_json(unpack(body.body)), patches)
+        near = groups_by_frame(groups[row.match], row.first, row.last)
+        found += _notices(session, contradicting_balls(ball, inputs), near)
+    return Notices(groups.keys(), None, found)
 
 
 def groups_by_frame(groups: Iterable[TrackGroup], first: int, last: int) -> dict[int, TrackGroup]:

@@ -17,7 +17,7 @@ from app.config import Settings
 from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
-from app.errors import ConflictError, InputError, TooLargeError
+from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
 from app.features.file_tools.link import read_ball
 from app.features.groups.queries import read_groups
 from app.features.imports.upload_queries import get_upload, upload_path
@@ -264,7 +264,11 @@ def ball_places(
         overlaps = track.first <= shot.last and shot.first <= track.last
         if track.match != recording.name or not overlaps or track.stale or track.summary.reason:
             continue
-        detail = read_track(store, track.id)
+        try:
+            detail = read_track(store, track.id)
+        except NotFoundError:
+            # Deleted since it was listed.
+            continue
         if any(view.endswith(f" link {link_id}") for view in detail.inputs.measurements.names):
             continue
         known = np.isfinite(detail.ball.position).all(axis=1)

@@ -11,7 +11,8 @@ from app.db.json_columns import pack, parse, unpack
 from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import DatasetHead, read_dataset_head
-from app.features.groups.state import read_states
+from app.features.groups.queries import read_groups
+from app.features.solutions.queries import SolutionKey, read_solutions
 from app.features.tracks.codec import (
     TrackInputs,
     correct,
@@ -25,7 +26,7 @@ from app.features.tracks.codec import (
     track_from_json,
     track_to_json,
 )
-from app.features.tracks.findings import refresh_all_findings
+from app.features.tracks.findings import TRIES, refresh_all_findings
 from app.features.tracks.queries import (
     TrackGroup,
     delete_tracks,
@@ -55,7 +56,7 @@ from app.features.tracks.stretches import (
 from app.formats.export_record import ExportRecord
 from app.plural import plural
 from app.progress import ReportProgress
-from app.tracking.ball_track import BallTrack
+from app.tracking.ball_track import BallTrack, ViewJump
 
 BATCH = 200
 
@@ -134,8 +135,11 @@ def read_records(session: Session, groups: Sequence[TrackGroup]) -> Iterator[Exp
     """Groups with their solutions; those that people rejected measure nothing."""
     ids = [group.id for group in groups if not group.rejected]
     for start in range(0, len(ids), BATCH):
-        for state in read_states(session, ids[start : start + BATCH], markings=False):
-            yield ExportRecord(state.group, state.solution, state.verdict.state)
+        stored = read_groups(session, ids[start : start + BATCH]).values()
+        keys = [SolutionKey(one.id, one.inputs_hash, one.policy.hash) for one in stored]
+        solutions = read_solutions(session, keys, markings=False)
+        for one in stored:
+            yield ExportRecord(one.group, solutions.get(one.id))
 
 
 def _says_time(session: Session, groups: Sequence[TrackGroup]) -> bool:
@@ -150,37 +154,45 @@ def _make(
     """Track a stretch, if its measurements are others than those of its row; whether they are, and why
     there is no track."""
     inputs = TrackInputs.of(stretch)
-    key = inputs_digest(inputs)
-    is_new = row is None or row.digest != key
+    known: dict[str, Any] = {"key": stretch.key, "stamp": stamp, "digest": inputs_digest(inputs)}
+    is_new = row is None or row.digest != known["digest"]
     base = make_track(inputs) if is_new else None
-    saved, reason = False, None
-    while not saved:
-        with store.read() as session:
-            said = _said(session, dataset, stretch, row)
-            if base is None and row is not None and said != row.corrections:
-                base = track_from_json(unpack(read_bodies(session, [row.id])[row.id].body))
-        values: dict[str, Any] = {"key": stretch.key, "stamp": stamp, "digest": key}
+    if is_new:
+        known |= UNJUDGED | {"actor": actor, "created": now()}
+
+    def columns(session: Session) -> dict[str, Any]:
+        """All that is stored, with what is said of its events as a session sees it."""
+        nonlocal base
+        said = _said(session, dataset, stretch, row)
+        own = None if row is None else find_row(session, row.id)
+        if base is None and own is None:
+            # Somebody deleted it meanwhile.
+            base = make_track(inputs)
+            known.update(UNJUDGED | {"actor": actor, "created": now()})
+        elif base is None and own is not None and said != own.corrections:
+            base = track_from_json(unpack(read_bodies(session, [own.id])[own.id].body))
         if base is not None:
-            track, columns = _computed(stretch, inputs, base, said)
-            values |= columns
-            reason = track.reason
-        elif row is not None:
-            reason = parse(row.summary)["reason"]
-        if is_new:
-            values |= UNJUDGED | {"actor": actor, "created": now()}
-        saved = _save(store, dataset, stretch, row, values | {"corrections": said})
-    return is_new, reason
+            return known | _computed(stretch, inputs, base, said) | {"corrections": said}
+        return known | {"corrections": said} | ({} if own is None else {"summary": own.summary})
+
+    for turn in range(TRIES):
+        with store.read() as session:
+            values = columns(session)
+        with store.write() as session:
+            if turn == TRIES - 1:
+                values = columns(session)
+            if _save(session, dataset, stretch, row, values):
+                break
+    return is_new, parse(values["summary"])["reason"]
 
 
-def _computed(
-    stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str
-) -> tuple[BallTrack, dict[str, Any]]:
-    """A track with what was said of its events, and the columns of what was computed."""
+def _computed(stretch: Stretch, inputs: TrackInputs, base: BallTrack, said: str) -> dict[str, Any]:
+    """The columns of a track with what was said of its events."""
     whole = replace(inputs, corrections=corrections_from_json(parse(said)))
     patches = correct(whole, base)
     track = corrected(whole, base, patches)
-    unused = unused_sentence(stretch.unused)
-    warnings = [*([unused] if unused else []), *(item.sentence for item in track.untracked)]
+    told = unused_sentence(stretch.unused), jumps_sentence(track.jumps)
+    warnings = [*filter(None, told), *(item.sentence for item in track.untracked)]
     summary = summary_of(
         track,
         TrackSummary(
@@ -190,7 +202,7 @@ def _computed(
             warnings=warnings,
         ),
     )
-    return track, {
+    return {
         "inputs": pack(inputs_to_json(inputs)),
         "body": pack(track_to_json(base)),
         "patches": pack(patches_to_json(patches)) if patches else None,
@@ -207,6 +219,17 @@ def unused_sentence(unused: Mapping[str, int]) -> str | None:
     return f"Not measured: {', '.join(parts)}." if parts else None
 
 
+def jumps_sentence(jumps: Sequence[ViewJump]) -> str | None:
+    """Where views that take over put the ball elsewhere, a sentence; None: nowhere."""
+    if not jumps:
+        return None
+    metres = sorted(jump.metres for jump in jumps)
+    return (
+        f"The ball jumps where other views take over, {plural(len(jumps), 'time')}, by {metres[len(metres) // 2]:.1f} m "
+        f"in the median and {metres[-1]:.1f} m at most: their cameras contradict each other there."
+    )
+
+
 def _said(session: Session, dataset: DatasetHead, stretch: Stretch, own: Any | None) -> str:
     """What was said of the events of a stretch, wherever it was stored."""
     return corrections_text(
@@ -218,20 +241,23 @@ def _said(session: Session, dataset: DatasetHead, stretch: Stretch, own: Any | N
 
 
 def _save(
-    store: Store, dataset: DatasetHead, stretch: Stretch, row: Any | None, values: Mapping[str, Any]
+    session: Session,
+    dataset: DatasetHead,
+    stretch: Stretch,
+    row: Any | None,
+    values: Mapping[str, Any],
 ) -> bool:
-    """Store a track; not if somebody has said more of its events meanwhile."""
-    with store.write() as session:
-        if _said(session, dataset, stretch, row) != values["corrections"]:
-            return False
-        own = None if row is None else find_row(session, row.id)
-        if own is None:
-            insert_track(session, {**values, "dataset_id": dataset.id, "revision": 0})
-        else:
-            told = any(
-                values[name] != getattr(own, name) for name in ("key", "digest", "corrections")
-            )
-            update_track(session, own.id, **values, revision=own.revision + told)
+    """Store a track; not if somebody has said more of its events meanwhile, or deleted it."""
+    if _said(session, dataset, stretch, row) != values["corrections"]:
+        return False
+    own = None if row is None else find_row(session, row.id)
+    if own is None and "body" not in values:
+        return False
+    if own is None:
+        insert_track(session, {**values, "dataset_id": dataset.id, "revision": 0})
+    else:
+        told = any(values[name] != getattr(own, name) for name in ("key", "digest", "corrections"))
+        update_track(session, own.id, **values, revision=own.revision + told)
     return True
 
 

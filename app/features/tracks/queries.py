@@ -142,10 +142,23 @@ def delete_tracks(session: Session, track_ids: Collection[int]) -> None:
     session.execute(delete(TrackModel).where(TrackModel.id.in_(list(track_ids))))
 
 
+def keys_of_match(session: Session, dataset_id: int, match: str) -> Sequence[Any]:
+    """Ids and keys of the groups of a match, in the order of the dataset."""
+    statement = (
+        select(GroupModel.id, GroupModel.key)
+        .where(GroupModel.dataset_id == dataset_id, GroupModel.match == match)
+        .order_by(GroupModel.number)
+    )
+    return session.execute(statement).all()
+
+
 def match_groups(
-    session: Session, dataset_id: int, matches: Collection[str] | None = None
+    session: Session,
+    dataset_id: int,
+    matches: Collection[str] | None = None,
+    ids: Collection[int] | None = None,
 ) -> dict[str, list[TrackGroup]]:
-    """The groups of matches, or of all, by match, in the order of the dataset."""
+    """The groups of matches, or of all, by match, in the order of the dataset; of those with some ids alone."""
     queue = QueueModel
     statement = (
         select(
@@ -158,6 +171,8 @@ def match_groups(
     )  # fmt: skip
     if matches is not None:
         statement = statement.where(GroupModel.match.in_(list(matches)))
+    if ids is not None:
+        statement = statement.where(GroupModel.id.in_(list(ids)))
     found: dict[str, list[TrackGroup]] = {}
     for row in session.execute(statement):
         place = None

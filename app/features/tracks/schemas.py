@@ -15,7 +15,7 @@ from app.features.tracks.listing import ListedTrack
 from app.features.tracks.service import (
     MOST_CORRECTIONS,
     TrackChange,
-    TrackDetail,
+    TrackedFrames,
     TrackSummary,
 )
 from app.finite import MAX_ID, finite
@@ -60,7 +60,8 @@ class TrackSummaryDocument(Document, shows=TrackSummary):
     rate: float = Field(description="Frames a second.")
     unused: dict[str, int] = Field(description="Balls that were not used, by reason.")
     warnings: list[str] = Field(
-        description="Sentences: balls that were not used, and runs of them that fit no track."
+        description="Sentences: balls that were not used, jumps where other views take over, and runs of balls "
+        "that fit no track."
     )
 
 
@@ -119,6 +120,15 @@ class TrackEventDocument(Document):
     added: bool = Field(description="Whether a person added it.")
 
 
+class JumpDocument(Document):
+    """Where views that take over put the ball elsewhere: their cameras contradict each other."""
+
+    frame: int = Field(description="The nearest frame.")
+    time_s: float = Field(description="From then on, seconds.")
+    metres: float = Field(description="How far the ball jumps beside its motion.")
+    views: list[str] = Field(description="Those that see it from then on.")
+
+
 class ContradictionDocument(Document):
     """A ball that the track does not explain, and what would mend it."""
 
@@ -162,12 +172,15 @@ class TrackFrames(Document):
     )
     group: list[int | None] = Field(description="Ids of groups.")
     events: list[TrackEventDocument] = Field(description="Those of these frames, by time.")
+    jumps: list[JumpDocument] = Field(
+        description="Where the ball jumps in these frames because other views take over; no event of the ball."
+    )
     contradicted: list[ContradictionDocument] = Field(
         description="Balls of these frames that the track does not explain."
     )
 
     @staticmethod
-    def of(detail: TrackDetail, first: int, last: int) -> TrackFrames:
+    def of(detail: TrackedFrames, first: int, last: int) -> TrackFrames:
         """The document of the frames from one number to another."""
         ball, groups = detail.ball, detail.groups
         rows = np.flatnonzero((ball.frames >= first) & (ball.frames <= last))
@@ -179,7 +192,7 @@ class TrackFrames(Document):
         )
         inside = set(numbers)
         return TrackFrames(
-            etag=detail.track.etag,
+            etag=detail.etag,
             frame=numbers,
             time_s=ball.times[rows].tolist(),
             x=finite(position[:, 0].tolist()),
@@ -201,10 +214,13 @@ class TrackFrames(Document):
                     kind=event.kind,
                     position=[float(value) for value in event.position],
                     sigma_s=event.sigma_s,
-                    added=near_correction(event, detail.track.corrections, added=True),
+                    added=near_correction(event, detail.inputs.corrections, added=True),
                 )
                 for event in ball.events
                 if event.frame in inside
+            ],
+            jumps=[
+                JumpDocument.model_validate(jump) for jump in ball.jumps if jump.frame in inside
             ],
             contradicted=[item for item in _contradictions(detail) if item.frame in inside],
         )
@@ -218,8 +234,8 @@ class TrackAround(TrackFrames):
     @staticmethod
     def around(found: Around) -> TrackAround:
         """The document of what was tracked around a frame."""
-        frames = TrackFrames.of(found.detail, found.frame - AROUND, found.frame + AROUND)
-        return TrackAround(**vars(frames), reason=found.detail.ball.reason)
+        frames = TrackFrames.of(found, found.frame - AROUND, found.frame + AROUND)
+        return TrackAround(**vars(frames), reason=found.ball.reason)
 
 
 class GroupTrackDocument(Document):
@@ -255,7 +271,7 @@ class TrackEdit(BaseModel):
         return TrackChange(self.verdict, self.note, corrections)
 
 
-def _contradictions(detail: TrackDetail) -> list[ContradictionDocument]:
+def _contradictions(detail: TrackedFrames) -> list[ContradictionDocument]:
     found = []
     for item in contradicting_balls(detail.ball, detail.inputs):
         group = detail.groups.get(item.frame)

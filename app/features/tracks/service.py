@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
@@ -28,7 +28,7 @@ from app.features.tracks.codec import (
     track_from_json,
 )
 from app.features.tracks.export import KnownTrack, TrackSource, frozen_known
-from app.features.tracks.findings import refresh_findings
+from app.features.tracks.findings import Notices, groups_by_frame, save_notices, track_notices
 from app.features.tracks.making import MadeTracks as MadeTracks
 from app.features.tracks.making import make_tracks as make_tracks
 from app.features.tracks.queries import (
@@ -45,7 +45,6 @@ from app.features.tracks.run_measurements import followed_observations, followed
 from app.features.tracks.stored import UNJUDGED, corrections_of, stored_track, summary_of
 from app.features.tracks.stored import Track as Track
 from app.features.tracks.stored import TrackSummary as TrackSummary
-from app.features.tracks.stretches import frame_of
 from app.soccer.group import checked_note
 from app.soccer.policy import Policy
 from app.tracking.ball_correct import TrackPatch
@@ -55,20 +54,27 @@ MOST_CORRECTIONS = 2000
 
 
 @dataclass(frozen=True)
-class TrackDetail:
-    """A track with all that its page shows.
+class TrackedFrames:
+    """Frames of a track with all that is shown of them.
 
     Attributes:
-        track: The track.
+        etag: Of the track.
         ball: Its values, with corrections.
         inputs: What it was computed from.
         groups: The group of each frame that has one.
     """
 
-    track: Track
+    etag: str
     ball: BallTrack
     inputs: TrackInputs
     groups: Mapping[int, TrackGroup]
+
+
+@dataclass(frozen=True)
+class TrackDetail(TrackedFrames):
+    """All frames of a track, with what a list says of it."""
+
+    track: Track
 
 
 @dataclass(frozen=True)
@@ -119,7 +125,8 @@ def read_track(store: Store, track_id: int) -> TrackDetail:
         track, groups = _read(session, track_id)
         body = read_bodies(session, [track_id])[track_id]
     inputs, ball = _ball(body, track.corrections)
-    return TrackDetail(track, ball, inputs, _by_frame(track, groups))
+    near = groups_by_frame(groups, track.first, track.last)
+    return TrackDetail(track.etag, ball, inputs, near, track)
 
 
 def change_track(
@@ -145,13 +152,7 @@ def change_track(
             "this changes nothing of the track",
             hint="Send a verdict, with a note where there is something to say, or corrections.",
         )
-    solved: dict[str, Any] = {}
-    if change.corrections is not None:
-        with store.read() as session:
-            track, _ = _read(session, track_id)
-            require_etag(track.etag, if_match, f'the track "{track.key}"')
-            body = read_bodies(session, [track_id])[track_id]
-        solved = _corrected_columns(body, track, change.corrections)
+    solved, notices = _solved_change(store, track_id, change, if_match)
     with store.write() as session:
         track, _ = _read(session, track_id)
         require_etag(track.etag, if_match, f'the track "{track.key}"')
@@ -166,13 +167,34 @@ def change_track(
                 values |= {"verdict": change.verdict, "note": note, "judged_by": actor}
                 values["judged_at"] = now()
         update_track(session, track_id, **values)
-        if "rejected" in (track.verdict, change.verdict) or change.corrections is not None:
-            refresh_findings(session, track.dataset_id, [track.match], track_id)
+        if notices is not None:
+            save_notices(session, track.dataset_id, notices)
         did = f"track {change.verdict}" if change.verdict else "track corrected"
         add_audit_event(session, actor, did, track.dataset_id, track=track_id, name=track.key)
         found, _ = _read(session, track_id)
         session.respond(found)
     return found
+
+
+def _solved_change(
+    store: Store, track_id: int, change: TrackChange, if_match: str
+) -> tuple[dict[str, Any], Notices | None]:
+    """Columns that come of corrections, and what the track says of its groups then where that may differ; all
+    that takes time is done before the write."""
+    with store.read() as session:
+        track, groups = _read(session, track_id)
+        require_etag(track.etag, if_match, f'the track "{track.key}"')
+        if change.corrections is None and "rejected" not in (track.verdict, change.verdict):
+            return {}, None
+        body = read_bodies(session, [track_id])[track_id]
+        solved: dict[str, Any] = {}
+        if change.corrections is None:
+            inputs, ball = _ball(body, track.corrections)
+        else:
+            solved, inputs, ball = _corrected(body, track, change.corrections)
+        near = groups_by_frame(groups, track.first, track.last)
+        told = None if change.verdict == "rejected" else (ball, inputs)
+        return solved, track_notices(session, track.match, near, told)
 
 
 def accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
@@ -249,33 +271,26 @@ def _patches(body: TrackBody) -> tuple[TrackPatch, ...]:
     return () if body.patches is None else patches_from_json(unpack(body.patches))
 
 
-def _corrected_columns(
+def _corrected(
     body: TrackBody, track: Track, corrections: Sequence[Correction]
-) -> dict[str, Any]:
-    """The columns of a track whose events are corrected; it is solved anew around what is new."""
+) -> tuple[dict[str, Any], TrackInputs, BallTrack]:
+    """The columns of a track whose events are corrected, and itself; it is solved anew around what is new."""
     text = _checked(track, corrections)
     inputs = replace(
         inputs_from_json(unpack(body.inputs)), corrections=corrections_from_json(parse(text))
     )
     base = track_from_json(unpack(body.body))
     patches = correct(inputs, base, _patches(body))
-    summary = summary_of(corrected(inputs, base, patches), track.summary)
-    return {
+    ball = corrected(inputs, base, patches)
+    summary = summary_of(ball, track.summary)
+    columns = {
         "corrections": text,
         "patches": pack(patches_to_json(patches)) if patches else None,
         "summary": canonical(asdict(summary)),
         # What was accepted is not what it is now.
         **UNJUDGED,
     }
-
-
-def _by_frame(track: Track, groups: Iterable[TrackGroup]) -> dict[int, TrackGroup]:
-    found = {frame_of(group.key): group for group in groups}
-    return {
-        frame: group
-        for frame, group in found.items()
-        if frame is not None and track.first <= frame <= track.last
-    }
+    return columns, inputs, ball
 
 
 def _require_acceptable(track: Track) -> None:

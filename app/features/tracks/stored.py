@@ -118,8 +118,6 @@ def stored_track(
     row: Any, policy: Policy, groups: Iterable[TrackGroup], runs: Sequence[FollowedRun] = ()
 ) -> Track:
     """A row of the table without what is large, with the groups and accepted ball runs of its match."""
-    with as_written():
-        summary = TrackSummary(**parse(row.summary))
     return Track(
         id=row.id,
         dataset_id=row.dataset_id,
@@ -134,12 +132,23 @@ def stored_track(
         judged_by=row.judged_by,
         judged_at=row.judged_at,
         corrections=corrections_of(row),
-        summary=summary,
+        summary=summary_of_row(row),
         actor=row.actor,
         created=row.created,
         revision=row.revision,
-        etag=f'"{digest([row.digest, row.revision])[:16]}"',
+        etag=track_etag(row),
     )
+
+
+def summary_of_row(row: Any) -> TrackSummary:
+    """What a list says of a row's track."""
+    with as_written():
+        return TrackSummary(**parse(row.summary))
+
+
+def track_etag(row: Any) -> str:
+    """The ETag of a row's track, quoted."""
+    return f'"{digest([row.digest, row.revision])[:16]}"'
 
 
 def corrections_of(row: Any) -> tuple[Correction, ...]:

@@ -23,7 +23,7 @@ from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_covariance import ray_covariances
-from app.solving.triangulate import BallObservation, ball_observations
+from app.solving.triangulate import BallObservation, clicked_balls
 from app.tracking.ball_track import BallMeasurements
 
 RATE = 25.0
@@ -35,7 +35,7 @@ MOST_FRAMES = 200_000
 _NUMBER = re.compile(r"(?:.*/)?(\d{1,9})(?:\.\w+)?", re.ASCII)
 _UNSURE = ("calibratable", "jac", "agreement")
 """Gates on cameras; a view that fails one measures nothing."""
-_ROUGH_HEIGHT_M, _ROUGH_DEPTH_M = 1.0, 60.0
+_ROUGH_HEIGHT_M, _ROUGH_DEPTH_M, _ROUGH_FARTHEST_M = 1.0, 60.0, 300.0
 """Where a ball that no two views placed is taken to be, to carry its camera's covariance there."""
 
 Shots = Mapping[str, Sequence[tuple[int, int]]]
@@ -256,7 +256,7 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
     by_key = {view.key: view for view in views}
     observations = [
         (view_name(by_key[item.view]), instant.time + _later(by_key[item.view]), item)
-        for item in ball_observations(views, calibrations)
+        for item in clicked_balls(views, calibrations)
     ]
     return _Row(instant, group.pitch, observations, record.point, cameras, unused)
 
@@ -368,8 +368,12 @@ def _measurements(
         for name, time, item in row.observations
     ]
     found += [(one.frame, one.view, one.time, one.ball, None) for one in beside]
+    rays = _rays([item for *_, item, _ in found])
+    # Beyond the radius where a lens folds the picture there is no ray.
+    good = np.flatnonzero(np.isfinite(rays).all(axis=1)).tolist()
+    found, rays = [found[row] for row in good], rays[good]
     observations = [item for *_, item, _ in found]
-    points = np.array([_rough(item, place) for *_, item, place in found]).reshape(-1, 3)
+    points = _rough(observations, rays, [place for *_, place in found])
     spread = ray_covariances(observations, points, policy) if found else np.zeros((0, 2, 2))
     sizes = np.array([item.diameter_px or np.nan for item in observations])
     share = np.hypot(policy.box_sigma_share * sizes, policy.click_sigma_px)
@@ -385,13 +389,31 @@ def _measurements(
     )
 
 
-def _rough(item: BallObservation, place: tuple[float, float, float] | None) -> FloatArray:
-    """About where a ball is: where the group puts it, else a metre above the grass, or some way off."""
-    if place is not None:
-        return np.array(place)
-    position = item.camera.position
-    ray = item.camera.rays(np.array([item.center]))[0]
-    ray = ray / np.linalg.norm(ray)
-    down = ray[2]
-    depth = (-_ROUGH_HEIGHT_M - position[2]) / down if down > 1e-3 else np.inf
-    return np.asarray(position + ray * (depth if 0 < depth < 300 else _ROUGH_DEPTH_M))
+def _rays(observations: Sequence[BallObservation]) -> FloatArray:
+    """Unit directions in the pitch frame, NaN where a pixel has none, shape (N, 3)."""
+    by_camera: dict[int, list[int]] = {}
+    for row, item in enumerate(observations):
+        by_camera.setdefault(id(item.camera), []).append(row)
+    rays = np.full((len(observations), 3), np.nan)
+    for rows in by_camera.values():
+        pixels = np.array([observations[row].center for row in rows], dtype=float)
+        rays[rows] = observations[rows[0]].camera.rays(pixels)
+    unit: FloatArray = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    return unit
+
+
+def _rough(
+    observations: Sequence[BallObservation],
+    rays: FloatArray,
+    places: Sequence[tuple[float, float, float] | None],
+) -> FloatArray:
+    """About where balls are: where their groups put them, else a metre above the grass, or some way off, (N, 3)."""
+    positions = np.array([item.camera.position for item in observations]).reshape(-1, 3)
+    down = np.where(rays[:, 2] > 1e-3, rays[:, 2], np.nan)
+    depth = (-_ROUGH_HEIGHT_M - positions[:, 2]) / down
+    near = (depth > 0) & (depth < _ROUGH_FARTHEST_M)
+    points = positions + rays * np.where(near, depth, _ROUGH_DEPTH_M)[:, None]
+    for row, place in enumerate(places):
+        if place is not None:
+            points[row] = place
+    return np.asarray(points)

@@ -17,7 +17,7 @@ import { me } from '../../state/me.js';
 import { announce, complain, inform } from '../../state/notice.js';
 import { listValues, nextOpen, trackAddress } from '../../state/track_list.js';
 import { makeTrackPlayer, PACES } from '../../state/track_player.js';
-import { amid, corrected, curvesOf, eventAt, EVENTS, MODES, mostShown, partOf, runsOf, STATES } from '../../state/tracks.js';
+import { amid, corrected, curvesOf, eventAt, EVENTS, jumpText, MODES, mostShown, partOf, runsOf, STATES } from '../../state/tracks.js';
 import { Chart, Numbers } from '../chart.js';
 import { pageAddress } from '../dataset_menu.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
@@ -67,12 +67,14 @@ function Band({ frames, at, goTo, whole }) {
 		goTo(first + Math.min(Math.floor(((event.clientX - box.left) / box.width) * total), total - 1));
 	}
 	const inside = frames.events.filter(({ frame }) => frame >= first && frame < first + total);
+	const jumps = frames.jumps.filter(({ frame }) => frame >= first && frame < first + total);
 	const shown = at >= first && at < first + total;
 	return html`
 		<div class="track__band" data-whole=${whole} onClick=${click}>
 			<ol class="track__events" aria-label="Events">
 				${inside.map((event) => html`<li key=${`${event.frame} ${event.kind}`} style=${{ left: left(event.frame) }} data-kind=${event.kind} data-added=${event.added} title=${`${event.kind} in frame ${event.frame}`}><span class="hidden-text">${event.kind} in frame ${event.frame}</span><span aria-hidden="true">${EVENTS.find(({ kind }) => kind === event.kind)?.letter}</span></li>`)}
 			</ol>
+			${jumps.length ? html`<ol class="track__jumps" aria-label="Jumps where other views take over">${jumps.map((jump) => html`<li key=${jump.frame} style=${{ left: left(jump.frame) }} title=${jumpText(jump)}><span class="hidden-text">${jumpText(jump)}</span><span aria-hidden="true">J</span></li>`)}</ol>` : null}
 			<ol class="track__modes" aria-label="What the ball does">
 				${modes.map(({ value, from, to }) => html`<li key=${from} style=${{ flexGrow: to - from + 1 }} data-mode=${value || 'gap'} title=${`${MODES[value].name}: frames ${frames.frame[from]} to ${frames.frame[to]}`}><span class="hidden-text">${MODES[value].name}, frames ${frames.frame[from]} to ${frames.frame[to]}</span><span aria-hidden="true">${MODES[value].letter}</span></li>`)}
 			</ol>
@@ -143,6 +145,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 	const group = frames.group[place];
 	const against = frames.contradicted.filter(({ frame }) => frame === at);
 	const event = eventAt(frames.events, at);
+	const jump = frames.jumps.find(({ frame }) => frame === at);
 	const { worst } = track.summary;
 	return html`
 		<section class="card" aria-labelledby="frame-title" data-frame=${at}>
@@ -153,6 +156,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 				<dt>Speed</dt><dd>${velocity ? `${fixed(3.6 * Math.hypot(...velocity), 0)} km/h` : '–'}</dd>
 				<dt>Known</dt><dd>${STATES[frames.state[place]]}${frames.views[place].length ? ` (${frames.views[place].join(', ')})` : ''}</dd>
 				<dt>Does</dt><dd>${MODES[frames.mode[place]].name}${event ? `; ${event.kind} in frame ${event.frame}` : ''}</dd>
+				${jump ? html`<dt>Jump</dt><dd>${jumpText(jump)}</dd>` : null}
 				<dt>Left out</dt><dd>${frames.left_out_px[place] === null ? '–' : `${fixed(frames.left_out_px[place], 1)} px`}</dd>
 			</dl>
 			${against.map((one) => html`<div class="track__against" key=${one.view}><p><strong>${one.view}</strong> is ${fixed(one.px, 0)} px off. ${one.sentence}</p><p class="note">${one.fix}</p></div>`)}

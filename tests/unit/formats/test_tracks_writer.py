@@ -23,7 +23,7 @@ from app.formats.tracks_writer import (
 )
 from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
-from app.tracking.ball_track import BallEvent, BallTrack
+from app.tracking.ball_track import BallEvent, BallTrack, ViewJump
 from tests.flights import FIRST, places
 from tests.foreign_readers import read_by
 from tests.rigs import TRUTH
@@ -48,6 +48,7 @@ def track(first: int = 100, count: int = 4) -> BallTrack:
         ("roll", "roll", "", "flight"),
         (("cam3", "cam4"), ("cam3",), (), ()),
         (BallEvent(first + 3, 4.12, "kick", np.array([1.5, -2.0, -0.11]), 0.01),),
+        jumps=(ViewJump(first + 1, 4.04, 0.4, ("cam3",)),),
     )
 
 
@@ -96,6 +97,7 @@ class TestWriteTracks:
         assert [row["frame"] for row in found] == [100, 101, 102, 103]
         assert (found[0]["mode"], found[0]["cameras"]) == ("roll", ["cam3", "cam4"])
         assert found[0]["vx_m_s"] == 12.5
+        assert [row["jump_m"] for row in found] == [None, 0.4, None, None]
         assert np.array_equal(np.reshape(found[0]["covariance"], (6, 6)), track().covariance[0])
         assert [found[2][name] for name in ("x_m", "covariance", "mode", "sigma_m")] == [None] * 4
 

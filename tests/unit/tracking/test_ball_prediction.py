@@ -18,15 +18,15 @@ def test_it_is_that_of_a_fit_without_the_instant() -> None:
     knots = knots_of(measurements, times, np.zeros(2))
     history = search(knots, Pitch())
     given = history.mode, history.event
-    unseen = np.zeros(len(times))
-    whole = fit(knots, *given, history.used, history.state, knots.noise, unseen)
+    unseen, start = np.zeros(len(times)), np.pad(history.state, ((0, 0), (0, 3)))
+    whole = fit(knots, *given, history.used, start, knots.noise, unseen)
     px = left_out(knots, whole, knots.noise, np.ones(len(times), bool))
     checked = 0
     for knot in (12, 20, 33, 41):
         rays = np.flatnonzero(knots.at == knot)
         used = history.used.copy()
         used[rays] = False
-        without = fit(knots, *given, used, whole.state[:, :6], knots.noise, unseen)
+        without = fit(knots, *given, used, whole.state, knots.noise, unseen)
         for ray in rays:
             row = knots.rows[ray]
             seen_at = measurements.cameras[row].project(without.state[knot, :3][None])[0]

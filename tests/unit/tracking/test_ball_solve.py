@@ -143,6 +143,17 @@ class TestHandover:
         assert track.events == () and track.contradicted == ()
         assert np.abs(np.diff(track.velocity[:, 1])).max() < 1.0
 
+    def test_it_is_told_and_both_sides_are_less_sure(self) -> None:
+        track, sound = self.handed(self.TILTED), self.handed(RIGHT)
+        (jump,) = track.jumps
+        assert sound.jumps == ()
+        aside = abs(track.position[28, 1] - track.position[27, 1])
+        assert jump.frame == FRAMES[28] and "other" in jump.views
+        assert jump.metres == pytest.approx(aside, abs=0.15)
+        near, far = slice(24, 32), slice(0, 3)
+        assert (track.sigma[near] > 0.8 * jump.metres).all()
+        assert track.sigma[near].min() > track.sigma[far].max() > sound.sigma[far].max()
+
     def test_a_kick_at_that_instant_is_one(self) -> None:
         for camera in (RIGHT, self.TILTED):
             track = self.handed(camera, kicked=-9.0)

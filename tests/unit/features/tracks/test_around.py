@@ -26,7 +26,7 @@ def track(store: Store, flight: list[int]) -> int:
 
 
 def at_frame(store: Store, track: int) -> np.ndarray:
-    detail = track_around(store, track, FIRST + AT).detail
+    detail = track_around(store, track, FIRST + AT)
     (row,) = np.flatnonzero(detail.ball.frames == FIRST + AT)
     return np.asarray(detail.ball.position[row])
 
@@ -41,8 +41,9 @@ class TestTrackAround:
         self, store: Store, flight: list[int], track: int
     ) -> None:
         move(store, flight[AT], 60.0)
-        detail = track_around(store, track, FIRST + AT).detail
-        assert detail.track.stale
+        detail = track_around(store, track, FIRST + AT)
+        (changed,) = list_tracks(store, "demo")
+        assert changed.stale
         frames = [
             int(detail.inputs.measurements.frames[item.measurement])
             for item in detail.ball.contradicted
@@ -51,7 +52,7 @@ class TestTrackAround:
         assert not read_track(store, track).ball.contradicted
 
     def test_has_no_frames_beyond_those_of_the_track(self, store: Store, track: int) -> None:
-        detail = track_around(store, track, FIRST).detail
+        detail = track_around(store, track, FIRST)
         assert detail.ball.frames[0] == FIRST
         assert AROUND <= len(detail.ball.frames) < 60
 
@@ -61,7 +62,7 @@ class TestTrackAround:
                 store, group, "rejected", "ball_not_visible",
                 if_match=load(store, group).etag, actor="ann",
             )  # fmt: skip
-        detail = track_around(store, track, FIRST + AT).detail
+        detail = track_around(store, track, FIRST + AT)
         assert detail.ball.reason == "No group around this frame takes part."
 
     def test_is_of_the_worst_frame_where_none_is_named(self, store: Store, track: int) -> None:

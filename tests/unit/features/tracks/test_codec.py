@@ -34,6 +34,7 @@ from app.tracking.ball_track import (
     Correction,
     LeftOut,
     Untracked,
+    ViewJump,
 )
 from tests.flights import FIRST, flight_groups, places
 from tests.unit.tracking.test_ball_solve import BOTH, FRAMES, TIMES, seen
@@ -97,6 +98,7 @@ class TestTrackJson:
             left_out=LeftOut(px, px, 1.5, 1.5, 1),
             offsets=(("cam2", 0.04),),
             untracked=(Untracked(FIRST, FIRST + 3, 5, "They contradict each other."),),
+            jumps=(ViewJump(FIRST + 2, 4.08, 0.5, ("cam1", "cam2")),),
         )
         again = track_from_json(track_to_json(whole))
         assert equal(again, whole)
@@ -152,7 +154,7 @@ class TestVersion:
     def test_the_track_of_a_pinned_input_is_what_its_version_says(self) -> None:
         """A change here asks for another ``TRACK_VERSION``: tracks of the old one are stale then."""
         track = make_track(pinned())
-        assert (TRACK_VERSION, track.reason) == ("3", None)
+        assert (TRACK_VERSION, track.reason) == ("4", None)
         rows = [10, 30, 75, 103, 150]
         assert track.position[rows].ravel() == pytest.approx(PLACES, abs=1e-5)
         assert track.sigma[rows] == pytest.approx(SIGMA, rel=1e-4)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import delete, select
 
+from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import dataset_id
 from app.features.datasets.tables import ImportFindingModel
@@ -18,6 +21,8 @@ from app.features.groups.suggested_edits import offers_of_finding
 from app.features.queue.refresh_queries import differing_rows
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
+from app.features.tracks import findings, making
+from app.features.tracks.findings import refresh_all_findings, save_notices
 from app.features.tracks.service import (
     TrackChange,
     change_track,
@@ -25,8 +30,10 @@ from app.features.tracks.service import (
     make_tracks,
     read_track,
 )
+from app.features.tracks.tables import TrackModel
 from app.soccer.finding import TRACK_DISAGREES, Finding
 from app.soccer.frames import ImagePoint
+from app.tracking.ball_track import Correction
 from tests.flights import FIRST, places
 from tests.rigs import TRUTH
 from tests.unit.features.tracks.test_service import move
@@ -161,3 +168,75 @@ class TestFindings:
         (track,) = list_tracks(store, "demo")
         detail = read_track(store, track.id)
         assert len(detail.ball.contradicted) == track.summary.contradicted >= 1
+
+
+def is_write(store: Store, session: Session) -> bool:
+    """Whether nobody else can write beside a session."""
+    return session.engine is store._writer
+
+
+class TestMeanwhile:
+    """What changes between the read and the write."""
+
+    def test_verdicts_that_never_cease_end_in_what_holds_at_last(
+        self, store: Store, beside: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        verdicts, read = itertools.cycle(["accepted", "rejected"]), findings._read_notices
+        turns: list[str] = []
+
+        def judged_meanwhile(*given: Any) -> Any:
+            found = read(*given)
+            if not is_write(store, given[0]):
+                turns.append(next(verdicts))
+                assert len(turns) <= findings.TRIES
+                judge(store, turns[-1])
+            return found
+
+        monkeypatch.setattr(findings, "_read_notices", judged_meanwhile)
+        refresh_all_findings(store, dataset_id(store, "demo"), ["rig"])
+        assert turns == ["accepted", "rejected", "accepted"]
+        assert [group for group, _ in told(store)] == [str(FIRST + AT)]
+
+    def test_a_group_that_is_no_more_is_passed_over(self, store: Store, beside: int) -> None:
+        with store.read() as session:
+            found = findings._read_notices(session, dataset_id(store, "demo"), ["rig"])
+        gone = replace(found.items[0], group_id=10_000)
+        with store.write() as session:
+            both = replace(found, items=[gone, *found.items])
+            save_notices(session, dataset_id(store, "demo"), both)
+        assert [group for _, group in rows(store)] == [beside]
+
+    def test_corrections_that_never_cease_are_all_in_the_track(
+        self, store: Store, beside: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        read, turns = making.corrected, list[int]()
+
+        def corrected_meanwhile(*given: Any) -> Any:
+            if len(turns) < making.TRIES - 1:
+                turns.append(FIRST + 30 + len(turns))
+                (track,) = list_tracks(store, "demo")
+                said = tuple(Correction(frame, "kick", True) for frame in turns)
+                change_track(
+                    store, track.id, TrackChange(corrections=said), track.etag, actor="ben"
+                )
+            return read(*given)
+
+        move(store, beside, 30.0)
+        monkeypatch.setattr(making, "corrected", corrected_meanwhile)
+        make(store)
+        (track,) = list_tracks(store, "demo")
+        assert [item.frame for item in track.corrections] == turns == [FIRST + 30, FIRST + 31]
+
+    def test_a_track_that_is_deleted_comes_back(
+        self, store: Store, beside: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        digest = making.inputs_digest
+
+        def deleted_meanwhile(*given: Any) -> Any:
+            with store.write() as session:
+                session.execute(delete(TrackModel))
+            return digest(*given)
+
+        monkeypatch.setattr(making, "inputs_digest", deleted_meanwhile)
+        make(store)
+        assert [track.key for track in list_tracks(store, "demo")] == ["rig"]

@@ -72,7 +72,7 @@ class TestFrames:
     def test_come_in_columns_of_one_length(self, api, track) -> None:
         found = api.get(f"{API}/tracks/{track['id']}/frames").json()
         lists = {name: value for name, value in found.items() if isinstance(value, list)}
-        columns = lists.keys() - {"events", "contradicted"}
+        columns = lists.keys() - {"events", "jumps", "contradicted"}
         assert {len(lists[name]) for name in columns} == {60}
         assert found["frame"] == list(range(FIRST, FIRST + 60))
         assert found["raw"][0] is not None

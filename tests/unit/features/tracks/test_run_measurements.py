@@ -78,7 +78,7 @@ class TestFollowedRuns:
     ) -> None:
         recording.accept(0)
         recording.accept(1)
-        around = track_around(store, made(store).track.id, 60).detail
+        around = track_around(store, made(store).track.id, 60)
         assert around.ball.reason is None
         assert set(around.inputs.measurements.views) == {"final", "final link 1"}
 
