@@ -16,6 +16,8 @@ from app.tracking.ball_run import DetectedBall
 
 CANDIDATES = 14
 """Places of a frame that are looked at."""
+CLICKED = 3.0
+"""How much likelier a place where a person clicked is the ball than anything else, as a logarithm."""
 STATIC_LAGS = (3, 6)
 """So many frames before it is looked whether a place looked the same."""
 
@@ -100,6 +102,18 @@ def find_candidates(
     looks = _looks(alike, contrast) + values[:, 6]
     static = _static(places, alike * np.maximum(contrast, 0.05), size, earlier)
     return Candidates(places, looks, static, parts, values[:, 4:6])
+
+
+def clicked_place(frame: Frame, size: float, x: float, y: float) -> Candidates:
+    """The place at which a person says that the ball is, and no other."""
+    place = np.array([x, y])
+    return Candidates(
+        place[None],
+        np.array([CLICKED]),
+        np.full((1, len(STATIC_LAGS)), np.nan),
+        [_part(frame, place, size)],
+        np.zeros((1, 2)),
+    )
 
 
 def _peaks_of(

@@ -8,14 +8,14 @@ that looked the same before the ball came there is clutter, and no history jumps
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.tracking.ball_candidates import STATIC_LAGS, Candidates, find_candidates
+from app.tracking.ball_candidates import STATIC_LAGS, Candidates, clicked_place, find_candidates
 from app.tracking.ball_frames import Frame, inverse_of, moved_by, turn_between
 from app.tracking.ball_picture import BallColour, BallSpot, Image, find_ball, find_like, fit_disc
 from app.tracking.ball_run import (
@@ -34,6 +34,8 @@ REACH, LARGEST_ROI = 5.0, 420
 """How far a ball is kicked from one frame to the next, diameters; and how much of a picture is searched, pixels."""
 KICKED = 0.04
 """Probability of a kick or bounce a frame."""
+LEAD = 6
+"""Frames between two clicks up to which both tell how the ball moves."""
 MISSED = -2.0
 """Score of a frame in which the ball is not seen."""
 MOST_MISSED = 24
@@ -96,12 +98,20 @@ def follow_ball(
     else:
         spot, colour = _found_again(read(hints.seen.frame), image, click, expected, hints)
     first = FollowedBall(number, spot.x, spot.y, spot.diameter, spot.sigma_px, 1.0, "followed")
+    clicks = {one.frame: one for one in hints.clicks if one.frame != number} | {number: click}
     ways, ends = [], list[End]()
     done = 0
     for numbers in (before, after):
-        way = _Way(Frame.of(number, image, colour), spot, hints)
+        wanted = list(numbers)
+        lead = _lead(click, clicks, -1 if wanted and wanted[0] < number else 1)
+        start = clicks[lead[0]] if lead else click
+        begin = image if start is click else read(start.frame)
+        at = spot if start is click else replace(spot, x=start.x, y=start.y)
+        way = _Way(Frame.of(start.frame, begin, colour), at, hints, clicks)
+        for each in lead[1:]:
+            way.step(Frame.of(each, read(each), colour))
         end: End = "limit"
-        for each in numbers:
+        for each in wanted:
             stopped = way.step(Frame.of(each, read(each), colour))
             done += 1
             if tell is not None:
@@ -109,9 +119,24 @@ def follow_ball(
             if stopped is not None:
                 end = stopped
                 break
-        ways.append(way.balls())
+            if each in clicks:
+                break
+        ways.append(way.balls(max(len(lead) - 1, 0)))
         ends.append(end)
     return BallRun((click,), (*reversed(ways[0]), first, *ways[1]), *ends)
+
+
+def _lead(click: BallClick, clicks: Mapping[int, BallClick], step: int) -> list[int]:
+    """Frames from the nearest other click behind a click to itself, which tell how the ball moves; empty without one."""
+    behind = [
+        frame
+        for frame in clicks
+        if 0 < step * (click.frame - frame) <= LEAD and frame != click.frame
+    ]
+    if not behind:
+        return []
+    nearest = min(behind, key=lambda frame: abs(frame - click.frame))
+    return list(range(nearest, click.frame + step, step))
 
 
 def _found_again(
@@ -151,8 +176,14 @@ class _Step:
 class _Way:
     """Follows a ball one way, frame by frame."""
 
-    def __init__(self, frame: Frame, spot: BallSpot, hints: FollowHints):
-        self._last, self._hints = frame, hints
+    def __init__(
+        self,
+        frame: Frame,
+        spot: BallSpot,
+        hints: FollowHints,
+        clicks: Mapping[int, BallClick],
+    ):
+        self._last, self._hints, self._clicks = frame, hints, clicks
         self._diameter = spot.diameter
         self._clicked = spot
         self._places = spot.center[None]
@@ -169,7 +200,11 @@ class _Way:
         """Look at the next frame; returns why the way ends there."""
         turn = turn_between(self._last, frame, self._hints.cameras)
         self._carry(frame, turn)
-        candidates = self._look(frame)
+        click = self._clicks.get(frame.number)
+        if click is None:
+            candidates = self._look(frame)
+        else:
+            candidates = clicked_place(frame, self._diameter, click.x, click.y)
         self._choose(frame, candidates)
         self._last = frame
         best = self._places[0]
@@ -263,7 +298,7 @@ class _Way:
             clutter = ((away > 1.5 * size) & (found.static[None] > STATIC_SHARE)).any(axis=2)
         total = self._scores[:, None] + moves + found.looks[None] - STATIC * clutter
         total += self._hinted(frame, found.places)
-        unseen = self._scores + MISSED
+        unseen = self._scores + (-np.inf if frame.number in self._clicks else MISSED)
         every = np.concatenate([total.ravel(), unseen])
         order = np.argsort(-every)[: 8 * BEAM]
         parents = np.where(order < total.size, order // max(count, 1), order - total.size)
@@ -317,8 +352,12 @@ class _Way:
         smear, angle = found.smears[place]
         return fit_disc(part, float(x), float(y), size, float(smear), float(angle))
 
-    def balls(self) -> list[FollowedBall]:
-        """The frames of the best history, the nearest to the click first, as far as the ball was seen."""
+    def balls(self, skipped: int) -> list[FollowedBall]:
+        """The frames of the best history, the nearest to the click first, as far as the ball was seen.
+
+        Args:
+            skipped: Frames before the click.
+        """
         steps, rows = self._steps, list[int]()
         row = 0
         for step in reversed(steps):
@@ -327,7 +366,7 @@ class _Way:
         rows.reverse()
         seen = [step.chosen[row] >= 0 for step, row in zip(steps, rows, strict=True)]
         last = max((at for at, one in enumerate(seen) if one), default=-1)
-        return [self._ball(at, rows) for at in range(last + 1)]
+        return [self._ball(at, rows) for at in range(skipped, last + 1)]
 
     def _ball(self, at: int, rows: Sequence[int]) -> FollowedBall:
         step, row = self._steps[at], rows[at]

@@ -62,12 +62,14 @@ class FollowHints:
         detected: Candidates of a detector; they take part with their score, as others do.
         seen: The same ball in another frame, where a person clicked it: how it looks. A click that mends is the ball
             wherever it is; None: a click is refused where nothing looks like a ball.
+        clicks: Other clicks on the same ball: it is there, whatever a frame looks like.
     """
 
     cameras: Mapping[int, Camera] = field(default_factory=dict)
     places: Mapping[int, PredictedPlace] = field(default_factory=dict)
     detected: Mapping[int, Sequence[DetectedBall]] = field(default_factory=dict)
     seen: FollowedBall | None = None
+    clicks: Sequence[BallClick] = ()
 
 
 @dataclass(frozen=True)
@@ -126,12 +128,11 @@ class BallRun:
         """How many frames are in a state."""
         return sum(ball.state == state for ball in self.balls)
 
-    def surest(self, near: int) -> FollowedBall | None:
-        """The clicked ball that is seen best, of those seen as well the one nearest to a frame."""
+    def surest(self) -> FollowedBall | None:
+        """The clicked ball that is seen best: before socks and boots another thing may stand for a ball near by."""
         clicked = {click.frame for click in self.clicks}
-        mine = [ball for ball in self.balls if ball.frame in clicked]
-        fitted = [ball for ball in mine if ball.sigma_px < UNSEEN_PX]
-        return min(fitted or mine, key=lambda ball: abs(ball.frame - near), default=None)
+        mine = (ball for ball in self.balls if ball.frame in clicked)
+        return min(mine, key=lambda ball: ball.sigma_px / ball.diameter, default=None)
 
     def mended(self, new: BallRun) -> BallRun:
         """The run with what one more click says.

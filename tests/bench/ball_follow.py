@@ -107,9 +107,12 @@ def followed_shot(
         before = range(frame - 1, max(first, frame - EACH_WAY) - 1, -1)
         after = range(frame + 1, min(last, frame + EACH_WAY) + 1)
         mended = run_at(frame)
-        sure = None if mended is None else runs[mended].surest(frame)
+        given = hints
+        if mended is not None:
+            run = runs[mended]
+            given = replace(hints, seen=run.surest(), clicks=run.clicks)
         one = BallClick(frame, float(x), float(y))
-        found = follow_ball(frames.read, one, before, after, replace(hints, seen=sure))
+        found = follow_ball(frames.read, one, before, after, given)
         told.seconds += time.process_time() - began
         told.clicks += 1
         tried.add(frame)

@@ -184,7 +184,7 @@ def add_run(
         ConflictError: The recording cannot be read.
         InputError: The frame is outside of the recording, or nothing near the click looks like a ball.
     """
-    recording, run = _followed(store, follower, recording_id, click, None)
+    recording, run = _followed(store, follower, recording_id, click)
     with store.write() as session:
         number = insert_run(
             session,
@@ -218,8 +218,7 @@ def mend_run(
     """
     before = get_run(store, recording_id, run_id)
     _require_open(before, if_match)
-    seen = before.run.surest(click.frame)
-    _, new = _followed(store, follower, recording_id, click, seen)
+    _, new = _followed(store, follower, recording_id, click, before.run)
     with store.write() as session:
         before = _need(session, recording_id, run_id)
         _require_open(before, if_match)
@@ -299,9 +298,9 @@ def _followed(
     follower: BallFollower,
     recording_id: int,
     click: BallClick,
-    seen: FollowedBall | None,
+    mended: BallRun | None = None,
 ) -> tuple[Recording, BallRun]:
-    """A recording, and what a click in it is followed to; ``seen`` is the same ball in another frame."""
+    """A recording, and what a click in it is followed to; ``mended`` is the run of the same ball so far."""
     shots = get_shots(store, recording_id)
     recording = shots.recording
     recording.require_readable()
@@ -314,7 +313,9 @@ def _followed(
     inside = (one for one in shots.items if one.first <= click.frame <= one.last)
     shot = next(((one.first, one.last) for one in inside), (click.frame, click.frame))
     around = range(max(shot[0], click.frame - EACH_WAY), min(shot[1], click.frame + EACH_WAY) + 1)
-    hints = replace(follow_hints(store, recording, around), seen=seen)
+    hints = follow_hints(store, recording, around)
+    if mended is not None:
+        hints = replace(hints, seen=mended.surest(), clicks=mended.clicks)
     run = follower.follow(recording, click, shot, hints)
     if run is None:
         raise InputError(

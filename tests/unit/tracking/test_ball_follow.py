@@ -70,6 +70,13 @@ def straight(frames: int = FRAMES, speed: float = 5.0) -> FloatArray:
     return np.column_stack([60 + speed * steps, 60 + 1.7 * steps])
 
 
+def hide(picture: Image, place: FloatArray, hidden: bool) -> None:
+    """Put somebody before a ball."""
+    if hidden:
+        x, y = place.astype(int)
+        picture[y - 30 : y + 30, x - 12 : x + 12] = (120, 30, 40)
+
+
 class TestFollowBall:
     @pytest.mark.parametrize("pan", [0.0, 4.0])
     def test_one_click_in_the_middle_follows_to_both_ends(self, pan: float) -> None:
@@ -106,6 +113,23 @@ class TestFollowBall:
         assert run.last == FRAMES - 1
         assert hidden and {ball.state for ball in hidden} == {"uncertain"}
         assert max(film.off(run)[-10:]) < 1.0
+
+    def test_it_goes_through_other_clicks_and_ends_at_them(self) -> None:
+        steps = np.arange(FRAMES)
+        way = np.column_stack([120 + 0.4 * steps, np.full(FRAMES, 120.0)])
+        way[20:] = way[20] + (steps[20:, None] - 20) * np.array([0.0, 2.0])
+        film = Film(way, before=lambda picture, at: hide(picture, way[at], 14 < at < 36))
+        clicks = [BallClick(frame, *film.way[frame]) for frame in (4, 30)]
+        run = film.followed(8, FollowHints(clicks=clicks))
+        assert (run.first, run.last) == (4, 30)
+        assert film.off(run)[[0, -1]].max() < 1.0
+        assert film.followed(8).last > 30
+
+    def test_two_clicks_tell_how_a_ball_moves(self) -> None:
+        """A ball so fast that another one, which lies about, is nearer to where it was."""
+        film = Film(straight(30, 11.0), clutter=((222.0, 135.0),))
+        run = film.followed(5, FollowHints(clicks=[BallClick(4, *film.way[4])]))
+        assert run.first == 4 and film.off(run).max() < 4.0
 
     def test_a_ball_that_goes_behind_a_wall_for_good_is_lost(self) -> None:
         def wall(picture: Image, _: int) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from app.tracking.ball_run import BallClick, BallRun, End, FollowedBall
 
 
@@ -51,10 +53,11 @@ class TestMended:
 
 
 class TestSurest:
-    def test_it_is_the_nearest_click_that_was_seen(self) -> None:
+    def test_it_is_the_click_that_was_seen_best_however_far_off(self) -> None:
         found = run(5, range(40)).mended(run(20, range(18, 23)))
-        assert [found.surest(near).frame for near in (0, 14, 39)] == [5, 20, 20]  # type: ignore[union-attr]
+        balls = [replace(one, sigma_px=0.5) if one.frame == 20 else one for one in found.balls]
+        assert replace(found, balls=tuple(balls)).surest().frame == 5  # type: ignore[union-attr]
         unseen = FollowedBall(30, 300.0, 50.0, 8.0, 2.0, 1.0, "followed")
         blind = BallRun((BallClick(30, 300.0, 50.0),), (unseen,), "lost", "lost")
-        assert found.mended(blind).surest(39).frame == 20  # type: ignore[union-attr]
-        assert blind.surest(0) == unseen
+        assert found.mended(blind).surest().frame == 5  # type: ignore[union-attr]
+        assert blind.surest() == unseen
