@@ -35,7 +35,7 @@ from app.features.verdicts import commands as verdicts
 from app.features.versions import commands as versions
 from app.finite import quoted
 from app.terminal.options import act_as
-from app.terminal.server import work_at
+from app.terminal.server import work_against_server
 from app.terminal.terminal import allow_any_text, escape_controls, print_error
 from app.workers import commands as cluster
 
@@ -134,7 +134,7 @@ def options(
 ) -> None:
     """Turn multi-view soccer frames into a trusted 3D ball dataset."""
     act_as(actor)
-    work_at(server, token_file, context.invoked_subcommand)
+    work_against_server(server, token_file, context.invoked_subcommand)
     if server is not None and token_file is not None and actor is not None:
         raise typer.BadParameter(
             "the log names the person of the token; leave it out", param_hint="--actor"

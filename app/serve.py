@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.terminal.options import Cluster, acting, read_settings
+from app.terminal.options import Cluster, current_actor, read_settings
 from app.terminal.server import opened_store
 from app.terminal.terminal import say, show_progress
 
@@ -110,7 +110,9 @@ def _make_sample(settings: Settings) -> None:
 
     folder, pool = settings.home / SAMPLE, partial(executor_of, settings)
     with opened_store(settings) as store, show_progress("Making the sample") as progress:
-        make_sample_dataset(store, SAMPLE, folder, SampleOrder(), pool, progress, actor=acting())
+        make_sample_dataset(
+            store, SAMPLE, folder, SampleOrder(), pool, progress, actor=current_actor()
+        )
 
 
 def _serve_part(settings: Settings, socket: socket) -> None:
@@ -135,7 +137,7 @@ def _print_first_link(store: Store, base: str) -> None:
     """Show whoever starts a server without an admin how to become one."""
     from app.features.people.links import FIRST_LASTS, make_first_link
 
-    link = make_first_link(store, actor=acting())
+    link = make_first_link(store, actor=current_actor())
     if link is not None:
         hours = int(FIRST_LASTS.total_seconds() // 3600)
         say(f"No admin can log in yet. Become one here (good once, for {hours} hours):")

@@ -352,7 +352,7 @@ def spawned_pool(
         try:
             yield pool
         except BaseException:
-            abandon(pool)
+            kill_executor(pool)
             raise
 
 
@@ -364,7 +364,7 @@ def _initialize_spawned(initialize: Callable[[], object] | None) -> None:
         initialize()
 
 
-def abandon(executor: ProcessPoolExecutor) -> None:
+def kill_executor(executor: ProcessPoolExecutor) -> None:
     """End the processes of an executor with the tasks that they run, without waiting for them."""
     workers = list((executor._processes or {}).values())
     tasks: Any = getattr(executor, "_call_queue")  # noqa: B009

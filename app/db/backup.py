@@ -24,8 +24,8 @@ from sqlalchemy import inspect, text
 
 from app.config import Settings
 from app.db.dialects.dialect import dialect_in, dialect_of
-from app.db.engine import make_engine, reported
-from app.db.home import is_half_written, refused
+from app.db.engine import make_engine, report_storage_errors
+from app.db.home import is_half_written, refused_file_error
 from app.db.locks import DatabaseInUse
 from app.db.log import verify_chain
 from app.db.recovery.anchor import Anchor, anchor_of, require_own_database
@@ -134,7 +134,7 @@ def write_backup(
             sync(out.parent)
     except OSError as error:
         hint = f"Make {out.parent} writable for this user, or name another folder."
-        raise refused(Path(error.filename or out), error, hint) from error
+        raise refused_file_error(Path(error.filename or out), error, hint) from error
     return manifest
 
 
@@ -202,7 +202,7 @@ def examine_database(
     own = settings.model_copy(update={"database_url": f"sqlite+pysqlite:///{file}"})
     engine = make_engine(own)
     try:
-        with reported(own), Session(engine) as session:
+        with report_storage_errors(own), Session(engine) as session:
             dialect, tables = dialect_in(session), set(inspect(session).get_table_names())
             if "alembic_version" not in tables or "log" not in tables:
                 raise DamagedError(f"{known_as} is not a Touchline database", hint=EXAMINE)
@@ -260,10 +260,10 @@ def _copy_database(settings: Settings, copy: Path) -> None:
     os.close(os.open(copy, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     engine = make_engine(settings)
     try:
-        with reported(settings):
+        with report_storage_errors(settings):
             require_own_database(engine, settings)
         with (
-            reported(settings),
+            report_storage_errors(settings),
             engine.connect() as connection,
             closing(pysqlite3.dbapi2.connect(str(copy))) as target,
         ):

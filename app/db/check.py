@@ -27,7 +27,7 @@ class Check:
     mend: str | None = None
 
 
-def compared(name: str, whole: str, apart: Sequence[str], wrong: str, mend: str) -> Check:
+def compare_records(name: str, whole: str, apart: Sequence[str], wrong: str, mend: str) -> Check:
     """What came of looking at many records.
 
     Args:
@@ -78,4 +78,4 @@ def compare_with_log(
         # Parts of what is in a set may be missing, and missing parts have no order.
         names = sorted(map(call, logged ^ present))
     whole = f"{len(present):,}, as the log says"
-    return compared(name, whole, names, "not as the log says", advice)
+    return compare_records(name, whole, names, "not as the log says", advice)

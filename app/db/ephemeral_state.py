@@ -55,7 +55,7 @@ def note_attempt(session: Session, whose: str, at: float) -> None:
     session.execute(insert(AttemptModel), [{"whose": whose, "at": at}])
 
 
-def put_begun(session: Session, name: str, value: bytes, ends: str, at: str, most: int) -> None:
+def store_pending(session: Session, name: str, value: bytes, ends: str, at: str, most: int) -> None:
     """Keep what somebody has begun, in the place of what they had; what has ended goes.
 
     Args:

@@ -135,7 +135,7 @@ def _is_own_database(file: Path) -> bool:
     return bool(header and anchor and anchor.installation.startswith(f"{header.tag:07x}"))
 
 
-def refused(path: Path, error: OSError, hint: str = WRITABLE) -> StorageError:
+def refused_file_error(path: Path, error: OSError, hint: str = WRITABLE) -> StorageError:
     """What a disk said about a file, as a sentence with its remedy; without ``hint`` of the home."""
     if error.errno == errno.ENOSPC:
         return StorageError(
@@ -157,7 +157,7 @@ def make_file(path: Path) -> None:
     except FileExistsError:
         return
     except OSError as error:
-        raise refused(path, error) from error
+        raise refused_file_error(path, error) from error
 
 
 def file_system(folder: Path, mounts: Path = _MOUNTS) -> str:
@@ -194,7 +194,7 @@ def installation_key(settings: Settings, name: str) -> bytes:
             _make_key_file(path)
         key = path.read_bytes()
     except OSError as error:
-        raise refused(path, error) from error
+        raise refused_file_error(path, error) from error
     if len(key) != _BYTES:
         raise DamagedError(
             f"{path} is not a key: it has {len(key)} bytes, not {_BYTES}",
@@ -225,7 +225,7 @@ PART = ".part"
 """How the name of a half-sent upload's folder ends."""
 
 
-def clear(path: Path) -> None:
+def delete_path(path: Path) -> None:
     """Delete a file, or a folder with all in it; it may be gone already."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
@@ -256,7 +256,7 @@ def _matches_pattern(pattern: list[str], parts: tuple[str, ...]) -> bool:
     return len(parts) >= len(pattern) and all(map(fnmatchcase, parts, pattern))
 
 
-def leftovers(settings: Settings) -> Iterator[Path]:
+def find_leftovers(settings: Settings) -> Iterator[Path]:
     """Files and folders that something killed was writing: nothing in them changed for a day."""
     oldest = time.time() - DAY
     for pattern in _HALF_WRITTEN:
@@ -270,9 +270,9 @@ def leftovers(settings: Settings) -> Iterator[Path]:
 
 def delete_leftovers(settings: Settings) -> int:
     """Delete them; returns how many there were."""
-    found = list(leftovers(settings))
+    found = list(find_leftovers(settings))
     for path in found:
-        clear(path)
+        delete_path(path)
     return len(found)
 
 

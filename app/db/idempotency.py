@@ -17,7 +17,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.statements import insert
-from app.db.json_columns import Json, inflate, parse
+from app.db.json_columns import Json, decompress, parse
 from app.db.session import Base, Session, now, pending_response, text_of
 from app.db.store import Store
 from app.errors import ConflictError
@@ -82,7 +82,7 @@ def find_response(session: Session, key: str, actor: str) -> StoredResponse | No
     ).one_or_none()
     if row is None:
         return None
-    body = inflate(row.body) if row.body else None
+    body = decompress(row.body) if row.body else None
     return StoredResponse(row.request_digest, row.status, parse(row.headers), body)
 
 

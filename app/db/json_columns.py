@@ -90,11 +90,11 @@ def unpack(data: bytes) -> Json:
     Raises:
         DamagedError: The bytes are not what was written.
     """
-    text = inflate(data)
+    text = decompress(data)
     return parse(_NULL_CHARACTERS.sub(rb"\1\\ufffd", text) if b"\\u0000" in text else text)
 
 
-def inflate(data: bytes) -> bytes:
+def decompress(data: bytes) -> bytes:
     """What was compressed.
 
     Raises:

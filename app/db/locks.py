@@ -10,7 +10,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.config import Settings
-from app.db.home import DATABASE_LOCK, OPENING_LOCK, PRACTICE_LOCK, SERVER_LOCK, make_home, refused
+from app.db.home import (
+    DATABASE_LOCK,
+    OPENING_LOCK,
+    PRACTICE_LOCK,
+    SERVER_LOCK,
+    make_home,
+    refused_file_error,
+)
 from app.errors import BusyError, StorageError
 
 AGAIN_S = 0.005
@@ -153,4 +160,4 @@ def _open_lock_file(path: Path) -> int:
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
     except OSError as error:
-        raise refused(path, error) from error
+        raise refused_file_error(path, error) from error

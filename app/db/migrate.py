@@ -10,7 +10,7 @@ from sqlalchemy import Connection, Engine, inspect, text
 from app.config import Settings
 from app.db.backup import write_backup
 from app.db.dialects.dialect import WRITE, Dialect, dialect_of
-from app.db.engine import make_engine, reported
+from app.db.engine import make_engine, report_storage_errors
 from app.db.home import make_file
 from app.db.locks import DatabaseInUse
 from app.db.recovery.anchor import renew_anchor, require_own_database
@@ -81,7 +81,7 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
     engine = make_engine(settings)
     copy = None
     try:
-        with reported(settings):
+        with report_storage_errors(settings):
             revision = schema_revision(engine)
             _refuse_newer(revision, settings)
             require_own_database(engine, settings)

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from app.config import Settings
 from app.db.backup import DATABASE, EXPORTS, FRAMES, examine_database, require_file, verify_backup
-from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused
+from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused_file_error
 from app.db.locks import database_alone, server_lock
 from app.db.migrate import KNOWN_REVISIONS, newer_schema
 from app.db.recovery.anchor import Anchor, anchor_file, make_anchor
@@ -72,7 +72,7 @@ def restore(settings: Settings, source: Path) -> Restored:
             with _temporary_folder(settings) as folder:
                 return _restore_in_folder(settings, source, folder)
         except OSError as error:
-            raise refused(Path(error.filename or settings.home), error) from error
+            raise refused_file_error(Path(error.filename or settings.home), error) from error
 
 
 def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> Restored:

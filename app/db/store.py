@@ -15,7 +15,7 @@ from sqlalchemy.exc import TimeoutError as NoConnectionError
 from app.admission import release_admission
 from app.config import Settings
 from app.db.dialects.dialect import AGAIN, WRITE, dialect_of
-from app.db.engine import make_engine, reported
+from app.db.engine import make_engine, report_storage_errors
 from app.db.home import make_file
 from app.db.locks import DatabaseInUse
 from app.db.migrate import (
@@ -94,7 +94,7 @@ class Store:
         self._peeker = dialect_of(settings).nonblocking_engine(settings)
         # Connections of its own: one that waits for no disk must never carry what was promised.
         self._passing = make_engine(settings, lasting=False).execution_options(**WRITE)
-        self.sharing = dialect_of(settings).sharing(engine, lambda: reported(settings))
+        self.sharing = dialect_of(settings).sharing(engine, lambda: report_storage_errors(settings))
         self._lock = lock
         self.turn = turn
         self._listeners: list[Callable[[], None]] = []
@@ -263,7 +263,7 @@ class Store:
     @contextmanager
     def _noting_damage(self) -> Iterator[None]:
         try:
-            with reported(self.settings):
+            with report_storage_errors(self.settings):
                 yield
         except DamagedError as error:
             self.note_damage(error)
@@ -352,7 +352,7 @@ def _open_engine(settings: Settings, alone: bool) -> Engine:
             require_sound(settings)
         make_file(settings.database_file)
     try:
-        with reported(settings):
+        with report_storage_errors(settings):
             dialect.require_promises(engine)
             if schema_revision(engine) is None:
                 bring_up_to_date(settings, alone=alone)

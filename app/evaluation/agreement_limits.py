@@ -77,7 +77,7 @@ class Spread:
 MEASURES = ("line_px", "ball_px", "diameter_px", "ball_m", "jac", "position_m")
 
 
-def disagreements(
+def find_disagreements(
     distance: GroupDistance, verdicts: tuple[str | None, str | None], limits: AgreementLimits
 ) -> tuple[Disagreement, ...]:
     """What two annotations say differently, the worst first; nothing: they agree.
@@ -87,13 +87,13 @@ def disagreements(
         verdicts: Of each, None where there is none yet.
         limits: What is allowed.
     """
-    found = list(_of_group(distance, verdicts, limits))
+    found = list(_disagreements_of_group(distance, verdicts, limits))
     for view in distance.views:
-        found.extend(_of_view(view, limits))
+        found.extend(_disagreements_of_view(view, limits))
     return tuple(sorted(found, key=lambda item: -item.weight))
 
 
-def spreads(distances: Iterable[GroupDistance]) -> dict[str, Spread]:
+def measure_spreads(distances: Iterable[GroupDistance]) -> dict[str, Spread]:
     """Each of ``MEASURES`` over many groups: of every line, every ball, every view and group."""
     values: dict[str, list[float | None]] = {name: [] for name in MEASURES}
     for distance in distances:
@@ -105,10 +105,10 @@ def spreads(distances: Iterable[GroupDistance]) -> dict[str, Spread]:
             values["diameter_px"].append(None if wider is None else abs(wider))
             values["jac"].extend(view.jac)
             values["position_m"].append(view.position_m)
-    return {name: _spread(numbers, name == "jac") for name, numbers in values.items()}
+    return {name: _median_and_tail(numbers, name == "jac") for name, numbers in values.items()}
 
 
-def _spread(numbers: list[float | None], low: bool) -> Spread:
+def _median_and_tail(numbers: list[float | None], low: bool) -> Spread:
     known = [number for number in numbers if number is not None]
     if not known:
         return Spread(0)
@@ -116,7 +116,7 @@ def _spread(numbers: list[float | None], low: bool) -> Spread:
     return Spread(len(known), median, tail)
 
 
-def _of_group(
+def _disagreements_of_group(
     distance: GroupDistance, verdicts: tuple[str | None, str | None], limits: AgreementLimits
 ) -> Iterator[Disagreement]:
     first, second = verdicts
@@ -135,7 +135,7 @@ def _of_group(
         yield Disagreement("ball_m", text, None, None, ball.distance_m, limits.ball_m)
 
 
-def _of_view(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
+def _disagreements_of_view(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     if view.included[0] != view.included[1]:
         yield Disagreement(
             "view", f"only annotation {'ba'[view.included[0]]} uses the view", view.view
@@ -159,14 +159,14 @@ def _of_view(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreeme
     if wider is not None and abs(wider) > limits.diameter_px:
         text = f"the ball of annotation {'b' if wider > 0 else 'a'} is {abs(wider):.1f} px wider"
         yield Disagreement("diameter_px", text, view.view, None, abs(wider), limits.diameter_px)
-    yield from _of_lines(view, limits)
+    yield from _disagreements_of_lines(view, limits)
     jac = view.jac_least
     if jac is not None and jac < limits.jac:
         text = f"the camera of one annotation fits the lines of the other with JaC {jac:.2f}"
         yield Disagreement("jac", text, view.view, None, jac, limits.jac)
 
 
-def _of_lines(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
+def _disagreements_of_lines(view: ViewDistance, limits: AgreementLimits) -> Iterator[Disagreement]:
     alone = [line for line in view.lines if line.only is not None]
     if len(alone) > limits.markings:
         names = ", ".join(f"{line.marking} (annotation {line.only})" for line in alone)

@@ -146,7 +146,10 @@ def compare_annotations(
     for first in a.views:
         second = b.view(first.key)
         if second is not None:
-            cameras = (_calibration(solution_a, first.key), _calibration(solution_b, first.key))
+            cameras = (
+                _calibration_of_view(solution_a, first.key),
+                _calibration_of_view(solution_b, first.key),
+            )
             views.append(_compare_views(first, second, (a, b), cameras))
     ball_a = None if solution_a is None else solution_a.ball
     ball_b = None if solution_b is None else solution_b.ball
@@ -161,13 +164,13 @@ def compare_lines(a: Lines, b: Lines) -> tuple[LineDistance, ...]:
     """
     found = []
     for marking in sorted({*a, *b}):
-        first, second = _points(a, marking), _points(b, marking)
+        first, second = _points_of_marking(a, marking), _points_of_marking(b, marking)
         if not len(first) or not len(second):
             only: Side = "a" if len(first) else "b"
             if len(first) or len(second):
                 found.append(LineDistance(marking, only))
             continue
-        there, back = _directed(first, second), _directed(second, first)
+        there, back = _distances_beside(first, second), _distances_beside(second, first)
         if not len(there) + len(back):
             # Drawn one behind the other: what is left is how far apart they are.
             there = distance_to_polyline(first, second)[0]
@@ -185,7 +188,7 @@ def compare_balls(a: tuple[BallAnnotation, ...], b: tuple[BallAnnotation, ...]) 
     where either is a point without a box.
     """
     states = ball_state(a), ball_state(b)
-    places = [_place(a), _place(b)]
+    places = [_only_visible_ball(a), _only_visible_ball(b)]
     first, second = places
     if first is None or second is None:
         return BallDistance(*states)
@@ -251,16 +254,16 @@ def _compare_views(
     )
 
 
-def _calibration(solution: Solution | None, view: str) -> Calibration | None:
+def _calibration_of_view(solution: Solution | None, view: str) -> Calibration | None:
     found = None if solution is None else solution.view(view)
     return None if found is None else found.calibration
 
 
-def _points(lines: Lines, marking: str) -> FloatArray:
+def _points_of_marking(lines: Lines, marking: str) -> FloatArray:
     return np.array(lines.get(marking) or (), dtype=float).reshape(-1, 2)
 
 
-def _directed(points: FloatArray, line: FloatArray) -> FloatArray:
+def _distances_beside(points: FloatArray, line: FloatArray) -> FloatArray:
     """Distances of the points that lie beside a polyline, not beyond its ends, shape (<= N,)."""
     if len(line) < 2:
         return distance_to_polyline(points, line)[0]
@@ -271,7 +274,7 @@ def _directed(points: FloatArray, line: FloatArray) -> FloatArray:
     return apart[~beyond]
 
 
-def _place(
+def _only_visible_ball(
     balls: tuple[BallAnnotation, ...],
 ) -> tuple[tuple[float, float], float | None] | None:
     """Centre and diameter of the only ball to be seen, pixels."""

@@ -80,16 +80,18 @@ def coco_average_precision(judged: Sequence[JudgedFrame]) -> tuple[float | None,
         return 0.0, 0.0
     from faster_coco_eval import COCO, COCOeval_faster
 
-    truth = COCO(_coco_truth(judged), print_function=_silent)
+    truth = COCO(_coco_truth(judged), print_function=_no_output)
     found = truth.loadRes(_coco_results(judged))
-    run = COCOeval_faster(truth, found, "bbox", print_function=_silent)
+    run = COCOeval_faster(truth, found, "bbox", print_function=_no_output)
     run.evaluate()
     run.accumulate()
     precision = np.asarray(run.eval["precision"])[:, :, 0, 0, -1]
     return float(precision[0].mean()), float(precision.mean())
 
 
-def curve(hits: Hits, threshold: int = 0, weights: FloatArray | None = None) -> Curve:
+def precision_recall_curve(
+    hits: Hits, threshold: int = 0, weights: FloatArray | None = None
+) -> Curve:
     """Precision against recall.
 
     Args:
@@ -107,15 +109,15 @@ def curve(hits: Hits, threshold: int = 0, weights: FloatArray | None = None) -> 
     return Curve(recall, precision, hits.scores)
 
 
-def interpolated(found: Curve) -> float:
+def interpolated_precision(found: Curve) -> float:
     """COCO's AP: the mean of the interpolated precision at 101 recalls."""
-    return float(_at_recalls(found).mean())
+    return float(_precision_at_recalls(found).mean())
 
 
-def area(found: Curve) -> float:
+def area_under_curve(found: Curve) -> float:
     """VOC's AP since 2010: the area under the interpolated precision."""
     steps = np.diff(found.recall, prepend=0.0)
-    return float(np.sum(steps * _envelope(found.precision)))
+    return float(np.sum(steps * _precision_envelope(found.precision)))
 
 
 def mean_interpolated(hits: Hits, weights: FloatArray | None = None) -> float:
@@ -127,22 +129,22 @@ def mean_interpolated(hits: Hits, weights: FloatArray | None = None) -> float:
     right = np.cumsum(each * hits.found.T, axis=1)
     precision = right / np.maximum(np.cumsum(each), np.finfo(float).eps)
     envelope = np.zeros((len(IOUS), len(each) + 1))
-    envelope[:, :-1] = _envelope(precision)
+    envelope[:, :-1] = _precision_envelope(precision)
     places = np.stack([np.searchsorted(recall, RECALLS, side="left") for recall in right / balls])
     at = np.take_along_axis(envelope, places, axis=1)
     return float(np.mean(at.mean(axis=1)))
 
 
-def _at_recalls(found: Curve) -> FloatArray:
+def _precision_at_recalls(found: Curve) -> FloatArray:
     if not len(found.recall) or not np.isfinite(found.recall).all():
         return np.full(len(RECALLS), np.nan if len(found.recall) else 0.0)
     places = np.searchsorted(found.recall, RECALLS, side="left")
-    envelope = np.append(_envelope(found.precision), 0.0)
+    envelope = np.append(_precision_envelope(found.precision), 0.0)
     at: FloatArray = envelope[places]
     return at
 
 
-def _envelope(precision: FloatArray) -> FloatArray:
+def _precision_envelope(precision: FloatArray) -> FloatArray:
     """The best precision at this recall or any higher one, along the last axis."""
     best: FloatArray = np.maximum.accumulate(precision[..., ::-1], axis=-1)[..., ::-1]
     return best
@@ -184,7 +186,7 @@ def _coco_results(judged: Sequence[JudgedFrame]) -> list[dict[str, object]]:
     ]
 
 
-def _silent(*_words: object, **_options: object) -> None:
+def _no_output(*_words: object, **_options: object) -> None:
     """Where the evaluator's remarks go: stdout belongs to results."""
 
 
@@ -211,15 +213,18 @@ def detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Ta
         return Cell(value, low, high, balls, len(judged))
 
     def spread(weights: FloatArray) -> float:
-        return interpolated(curve(hits, 0, weights[place]))
+        return interpolated_precision(precision_recall_curve(hits, 0, weights[place]))
 
-    once = curve(hits)
+    once = precision_recall_curve(hits)
     recall = float(once.recall[-1]) if balls and len(once.recall) else (0.0 if balls else None)
     cells = (
         cell(ap_50, *resamples.statistic(spread)),
         cell(ap, *resamples.statistic(lambda weights: mean_interpolated(hits, weights[place]))),
-        cell(area(once) if balls else None, *resamples.statistic(lambda w: _area(hits, w[place]))),
-        cell(recall, *resamples.statistic(lambda w: _recall(hits, w[place]))),
+        cell(
+            area_under_curve(once) if balls else None,
+            *resamples.statistic(lambda w: _area_of_hits(hits, w[place])),
+        ),
+        cell(recall, *resamples.statistic(lambda w: _highest_recall(hits, w[place]))),
     )
     note = (
         f"{plural(len(judged), 'frame')}: {balls} with a ball, {len(judged) - balls} without; "
@@ -233,7 +238,7 @@ def precision_recall(judged: Sequence[JudgedFrame]) -> Figure:
     """Precision against recall at IoU 0.5 and 0.75."""
     hits = find_hits(judged)
     balls = int(hits.balls.sum())
-    series = tuple(_series(hits, index, words) for index, words in CURVES) if balls else ()
+    series = tuple(_curve_series(hits, index, words) for index, words in CURVES) if balls else ()
     panel = Panel(
         "Precision and recall",
         Axis("Recall", "", 0.0, 1.0),
@@ -244,14 +249,14 @@ def precision_recall(judged: Sequence[JudgedFrame]) -> Figure:
     return Figure("precision_recall", "Precision against recall", (panel,), note)
 
 
-def _series(hits: Hits, index: int, words: str) -> Series:
-    found = curve(hits, index)
+def _curve_series(hits: Hits, index: int, words: str) -> Series:
+    found = precision_recall_curve(hits, index)
     chosen = np.unique(np.linspace(0, max(len(found.recall) - 1, 0), MAX_PLACES).astype(int))
     if not len(found.recall):
         chosen = np.zeros(0, dtype=int)
     return Series(
         f"iou_{words}",
-        f"IoU {words}: AP {interpolated(found):.3f}",
+        f"IoU {words}: AP {interpolated_precision(found):.3f}",
         tuple(found.recall[chosen].tolist()),
         tuple(found.precision[chosen].tolist()),
         count=tuple((chosen + 1).tolist()),
@@ -259,10 +264,10 @@ def _series(hits: Hits, index: int, words: str) -> Series:
     )
 
 
-def _area(hits: Hits, weights: FloatArray) -> float:
-    return area(curve(hits, 0, weights))
+def _area_of_hits(hits: Hits, weights: FloatArray) -> float:
+    return area_under_curve(precision_recall_curve(hits, 0, weights))
 
 
-def _recall(hits: Hits, weights: FloatArray) -> float:
-    found = curve(hits, 0, weights)
+def _highest_recall(hits: Hits, weights: FloatArray) -> float:
+    found = precision_recall_curve(hits, 0, weights)
     return float(found.recall[-1]) if len(found.recall) else 0.0

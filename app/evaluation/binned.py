@@ -84,7 +84,7 @@ def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
     middle = Series(
         "median",
         "Median, and the middle half",
-        tuple(_center(bins, place) for place in places),
+        tuple(_bin_center(bins, place) for place in places),
         tuple(quarters[:, 1].tolist()),
         low=tuple(quarters[:, 0].tolist()),
         high=tuple(quarters[:, 2].tolist()),
@@ -95,7 +95,7 @@ def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
         bins.title,
         Axis(bins.label, bins.unit, 0.0),
         Axis("Error of the place", "m", 0.0),
-        (_points(kept, bins.field), middle),
+        (_scatter_series(kept, bins.field), middle),
     )
     note = f"{plural(len(kept), 'frame')} with a detection of IoU > 0, oracle cameras."
     return Figure(bins.figure, bins.title, (panel,), note)
@@ -138,12 +138,12 @@ def detection_table(
     return Table(name, f"Detection by {bins.label.lower()}", columns, tuple(rows), note)
 
 
-def _center(bins: Bins, place: int) -> float:
+def _bin_center(bins: Bins, place: int) -> float:
     low, high = bins.bounds(place)
     return (low + high) / 2 if high is not None else low + (low - bins.edges[place - 1]) / 2
 
 
-def _points(frames: Sequence[FrameResult], field: str) -> Series:
+def _scatter_series(frames: Sequence[FrameResult], field: str) -> Series:
     """The frames themselves; of very many an even choice, which shows the same cloud."""
     pairs = [
         (value, frame.error_m)

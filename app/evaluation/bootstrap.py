@@ -64,16 +64,16 @@ class Resamples:
         sizes = np.bincount(place, minlength=len(self.matches)).astype(float)
         with np.errstate(invalid="ignore", divide="ignore"):
             means = (self.counts @ sums) / (self.counts @ sizes)
-        return Cell(float(array.mean()), *interval(means), count, whole)
+        return Cell(float(array.mean()), *percentile_interval(means), count, whole)
 
     def statistic(
         self, compute: Callable[[FloatArray], float]
     ) -> tuple[float | None, float | None]:
         """The interval of any number that is computed from a weight per match, shape (M,)."""
-        return interval(np.array([compute(weights) for weights in self.counts]))
+        return percentile_interval(np.array([compute(weights) for weights in self.counts]))
 
 
-def interval(values: FloatArray) -> tuple[float | None, float | None]:
+def percentile_interval(values: FloatArray) -> tuple[float | None, float | None]:
     """Ends of the central 95 % of resampled values: the percentile interval of the bootstrap.
 
     Args:

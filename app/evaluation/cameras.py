@@ -77,7 +77,7 @@ def cameras_table(
         judged: Ids of the frames that a run lists.
     """
     match = {frame.id: frame.match for frame in frames}
-    made = tuple(_row(name, label, scores, match, resamples) for name, label, scores in rows)
+    made = tuple(_score_row(name, label, scores, match, resamples) for name, label, scores in rows)
     count = len(rows[0][2]) if rows else 0
     unseen = sum(frame not in judged for frame in (rows[0][2] if rows else ()))
     note = (
@@ -95,7 +95,7 @@ def cameras_table(
 
 def jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figure:
     """Share of frames whose JaC is above a threshold, for each gamma."""
-    panels = tuple(_panel(name, label, scores, min_jac) for name, label, scores in rows)
+    panels = tuple(_jac_panel(name, label, scores, min_jac) for name, label, scores in rows)
     note = (
         f"{len(rows[0][2]) if rows else 0} frames with annotated lines. Points of the predicted "
         f"cameras at γ = {GAMMAS_PERCENT[0]:g} % open their frames."
@@ -103,7 +103,7 @@ def jac_figure(rows: Sequence[tuple[str, str, Scores]], min_jac: float) -> Figur
     return Figure("jac", "Frames above a JaC", panels, note)
 
 
-def _row(
+def _score_row(
     name: str, label: str, scores: Scores, match: Mapping[int, str], resamples: Resamples
 ) -> Row:
     total, count = score_frames(scores.values()), len(scores)
@@ -125,7 +125,7 @@ def _row(
     return Row(name, label, cells, FrameRange("predicted_jac"))
 
 
-def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
+def _jac_panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
     values = np.array(
         [item.jac if item is not None else (0.0,) * len(GAMMAS_PERCENT) for item in scores.values()]
     ).reshape(-1, len(GAMMAS_PERCENT))
@@ -140,7 +140,7 @@ def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
                 tuple(JAC_LIMITS.tolist()),
                 tuple(share.tolist()),
                 count=tuple(above.tolist()),
-                frames=_above() if name == "predicted" and place == 0 else (),
+                frames=_ranges_above_limits() if name == "predicted" and place == 0 else (),
             )
         )
     return Panel(
@@ -152,7 +152,7 @@ def _panel(name: str, label: str, scores: Scores, min_jac: float) -> Panel:
     )
 
 
-def _above() -> tuple[FrameRange, ...]:
+def _ranges_above_limits() -> tuple[FrameRange, ...]:
     """The frames above each threshold itself, which a lower bound alone would take in."""
     bounds = (math.nextafter(threshold, math.inf) for threshold in JAC_LIMITS.tolist())
     return tuple(FrameRange("predicted_jac", low=bound) for bound in bounds)

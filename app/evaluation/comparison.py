@@ -90,7 +90,7 @@ def compare_tables(first: Sequence[Table], second: Sequence[Table]) -> list[Diff
     found: list[Difference] = []
     for name in names:
         pair = [next((t for t in tables if t.name == name), None) for tables in (first, second)]
-        found += _compare(name, pair[0], pair[1])
+        found += _compare_table(name, pair[0], pair[1])
     return found
 
 
@@ -129,7 +129,7 @@ def compare_frames(
     return FrameComparison(field, len(pairs), better, worse, gained, lost, mean, tuple(rows))
 
 
-def _compare(name: str, first: Table | None, second: Table | None) -> list[Difference]:
+def _compare_table(name: str, first: Table | None, second: Table | None) -> list[Difference]:
     both = [table for table in (first, second) if table is not None]
     rows = {row.name: row.label for table in both for row in table.rows}
     # A release may measure what the one before did not, and the other way round.
@@ -138,11 +138,12 @@ def _compare(name: str, first: Table | None, second: Table | None) -> list[Diffe
         Difference(name, row, column, f"{label}: {head.label}", head.unit, head.better, *cells)
         for row, label in rows.items()
         for column, head in columns.items()
-        if (cells := (_cell(first, row, column), _cell(second, row, column))) != (None, None)
+        if (cells := (_find_cell(first, row, column), _find_cell(second, row, column)))
+        != (None, None)
     ]
 
 
-def _cell(table: Table | None, row: str, column: str) -> Cell | None:
+def _find_cell(table: Table | None, row: str, column: str) -> Cell | None:
     if table is None or table.row(row) is None:
         return None
     has = any(known.name == column for known in table.columns)

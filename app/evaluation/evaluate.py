@@ -10,9 +10,9 @@ from app.evaluation.average_precision import detection_summary, precision_recall
 from app.evaluation.binned import DISTANCE, PARALLAX, SIZE, detection_table, error_figure
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.cameras import Scores, cameras_table, jac_figure, score_cameras
-from app.evaluation.frame import Detection, Frame, JudgedFrame, iou, judge
+from app.evaluation.frame import Detection, Frame, JudgedFrame, iou, judge_detections
 from app.evaluation.localization import localization_table, measure_frame, precision_distance
-from app.evaluation.reference_boxes import boxes_figure, boxes_table, comparable
+from app.evaluation.reference_boxes import boxes_figure, boxes_table, has_every_box
 from app.evaluation.result import Evaluation, Figure, FrameResult, Table
 from app.geometry.camera import Camera
 from app.progress import ReportProgress, partial_progress
@@ -71,10 +71,10 @@ def evaluate(
     """
     say = progress or (lambda _done, _total=None, _sentence="": None)
     resamples = Resamples.draw([item.match for item in frames], options.resamples, options.seed)
-    scores = _score(frames, inputs, say)
-    judged = judge(frames, inputs.detections or {}, options.boxes)
+    scores = _score_all_cameras(frames, inputs, say)
+    judged = judge_detections(frames, inputs.detections or {}, options.boxes)
     say(1, 4, "Placing balls")
-    results = _measure(judged, inputs, scores, options)
+    results = _measure_frames(judged, inputs, scores, options)
     say(2, 4, "Average precision")
     tables, figures = [], []
     if inputs.detections is not None:
@@ -96,14 +96,17 @@ def evaluate(
         tables.append(cameras_table(rows, frames, resamples, {item.frame.id for item in judged}))
         figures.append(jac_figure(rows, options.min_jac))
     say(3, 4, "Sensitivity")
-    table, figure = _sensitivity(frames, options)
+    table, figure = _measure_sensitivity(frames, options)
     say(4, 4, "Done")
     return Evaluation(
-        _counts(frames, judged, inputs), (*tables, table), (*figures, figure), tuple(results)
+        _count_denominators(frames, judged, inputs),
+        (*tables, table),
+        (*figures, figure),
+        tuple(results),
     )
 
 
-def _score(
+def _score_all_cameras(
     frames: Sequence[Frame], inputs: Inputs, say: ReportProgress
 ) -> tuple[Scores, Scores] | None:
     """Predicted cameras and the dataset's own against the lines."""
@@ -119,7 +122,7 @@ def _score(
     return predicted, oracle
 
 
-def _measure(
+def _measure_frames(
     judged: Sequence[JudgedFrame],
     inputs: Inputs,
     scores: tuple[Scores, Scores] | None,
@@ -136,14 +139,16 @@ def _measure(
         results.append(
             replace(
                 result,
-                predicted_jac=_jac(scores[0], frame.id) if scores else None,
-                box_iou=iou(item.truth, box) if item.truth and box and comparable(frame) else None,
+                predicted_jac=_jac_of_frame(scores[0], frame.id) if scores else None,
+                box_iou=iou(item.truth, box)
+                if item.truth and box and has_every_box(frame)
+                else None,
             )
         )
     return results
 
 
-def _jac(scores: Scores, frame: int) -> float | None:
+def _jac_of_frame(scores: Scores, frame: int) -> float | None:
     """None without lines; lines without a camera count as 0, as they do in the table."""
     if frame not in scores:
         return None
@@ -172,14 +177,16 @@ def _detection_figures(
         yield error_figure(results, bins)
 
 
-def _sensitivity(frames: Sequence[Frame], options: Options) -> tuple[Table, Figure]:
-    able = len(sensitivity.choose(frames, options.seed, len(frames)))
-    chosen = sensitivity.choose(frames, options.seed)
-    samples = [sensitivity.measure(frame, options.ball_diameter_m) for frame in chosen]
+def _measure_sensitivity(frames: Sequence[Frame], options: Options) -> tuple[Table, Figure]:
+    able = len(sensitivity.choose_frames(frames, options.seed, len(frames)))
+    chosen = sensitivity.choose_frames(frames, options.seed)
+    samples = [
+        sensitivity.measure_frame_sensitivity(frame, options.ball_diameter_m) for frame in chosen
+    ]
     return sensitivity.sensitivity_table(samples, able), sensitivity.sensitivity_figure(samples)
 
 
-def _counts(
+def _count_denominators(
     frames: Sequence[Frame], judged: Sequence[JudgedFrame], inputs: Inputs
 ) -> dict[str, int]:
     """Every denominator, by name."""

@@ -54,29 +54,29 @@ def figure_png(figure: Figure) -> bytes:
         canvas.suptitle(figure.title, x=0.02, ha="left", size=15)
         axes = canvas.subplots(1, count, squeeze=False)[0]
         for place, panel in zip(axes, figure.panels, strict=False):
-            _draw(place, panel, panel.title if count > 1 else "")
+            _draw_panel(place, panel, panel.title if count > 1 else "")
         canvas.supxlabel(figure.note, size=9, color=GRAY, wrap=True)
         file = BytesIO()
         canvas.savefig(file, format="png")
     return file.getvalue()
 
 
-def _draw(axes: Axes, panel: Panel, title: str) -> None:
+def _draw_panel(axes: Axes, panel: Panel, title: str) -> None:
     axes.set(title=title, xlabel=_axis_label(panel.x), ylabel=_axis_label(panel.y))
     colors = [item.color for item in panel.series if item.color is not None]
     scale = _color_scale(axes, colors, panel.color) if colors else None
     for index, item in enumerate(panel.series):
         color = PALETTE[index % len(PALETTE)] if scale is None else scale.to_rgba(item.color)
-        _series(axes, item, color, 2.2 if scale is None else 1.1)
-    _limits(axes, panel)
+        _draw_series(axes, item, color, 2.2 if scale is None else 1.1)
+    _set_limits(axes, panel)
     for mark in panel.marks:
-        _mark(axes, mark)
+        _draw_mark(axes, mark)
     handles, labels = axes.get_legend_handles_labels()
     if scale is None and handles:
         axes.legend(handles[:MAX_LEGEND], labels[:MAX_LEGEND])
 
 
-def _series(axes: Axes, item: Series, color: Any, width: float) -> None:
+def _draw_series(axes: Axes, item: Series, color: Any, width: float) -> None:
     label = item.label or None
     if item.kind == "points":
         axes.scatter(item.x, item.y, 22, color, alpha=0.55, linewidths=0, label=label)
@@ -103,7 +103,7 @@ def _color_scale(axes: Axes, colors: list[float], meaning: Axis | None) -> Any:
     return scale
 
 
-def _limits(axes: Axes, panel: Panel) -> None:
+def _set_limits(axes: Axes, panel: Panel) -> None:
     """The ends that the axes shall have, and a few stray points shall not flatten the rest."""
     axes.set_xlim(panel.x.low, panel.x.high)
     axes.set_ylim(panel.y.low, panel.y.high)
@@ -115,7 +115,7 @@ def _limits(axes: Axes, panel: Panel) -> None:
             axes.set_ylim(low, high)
 
 
-def _mark(axes: Axes, mark: Mark) -> None:
+def _draw_mark(axes: Axes, mark: Mark) -> None:
     across = mark.axis == "x"
     (axes.axvline if across else axes.axhline)(mark.at, color=MARK, linestyle="--", linewidth=1.4)
     place = (mark.at, 0.97) if across else (0.01, mark.at)

@@ -89,7 +89,7 @@ class JudgedFrame:
     detections: tuple[Detection, ...]
 
 
-def judge(
+def judge_detections(
     frames: Sequence[Frame], detections: Mapping[int, Sequence[Detection]], boxes: str
 ) -> list[JudgedFrame]:
     """The frames that have the box to compare with, or no ball at all.

@@ -87,11 +87,11 @@ class FrameNames:
                 stations.setdefault(frame.station, []).append(frame.id)
             own = _distinguishing_names(frame)
             telling |= own
-            for name in own | _short(frame):
+            for name in own | _names_within_dataset(frame):
                 other = index.setdefault(name, frame.id)
                 if other != frame.id:
                     index[name] = _SEVERAL
-            for number in _numbers(frame):
+            for number in _numbers_of_frame(frame):
                 if numbered.setdefault(number, frame.id) != frame.id:
                     numbered[number] = _SEVERAL
             if not frame.station:
@@ -114,13 +114,13 @@ class FrameNames:
 
     def find_number(self, text: str) -> NamedFrame | None:
         """The one frame whose view or picture has a number for its name, ``4`` for ``0004.jpg``."""
-        number = _number(text)
+        number = _parse_number(text)
         identity = None if number is None else self._numbered.get(number)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
 
     def why_not_number(self, text: str) -> str:
         """Why ``find_number`` found nothing, in words."""
-        if _number(text) in self._numbered:
+        if _parse_number(text) in self._numbered:
             return "is the number of several frames of the dataset; name the picture or the camera, too"
         return "is not a number that the name of a picture of the dataset has"
 
@@ -160,7 +160,7 @@ class FrameNames:
         return None
 
 
-def _number(text: str) -> int | None:
+def _parse_number(text: str) -> int | None:
     """A number as tables write it, ``4``, ``0004`` or ``4.0``."""
     found = _DIGITS.fullmatch(id_text(text) or "")
     return int(found[0]) if found else None
@@ -179,36 +179,38 @@ def _distinguishing_names(frame: NamedFrame) -> set[str]:
     )
     last = match.rsplit("/", 1)[-1]
     places = {match, last} if _MATCH in last else {match}
-    within = _within(frame)
+    within = _names_within_match(frame)
     if match:
         names = {f"{place}/{name}" for place in places for name in within}
     else:
         names = within if frame.station else {f"{group}/{view}"}
-    return _glued(names) | {name for name in _exported(frame) if name}
+    return _joined_names(names) | {name for name in _exported_names(frame) if name}
 
 
-def _short(frame: NamedFrame) -> set[str]:
+def _names_within_dataset(frame: NamedFrame) -> set[str]:
     """Names that another match could have as well."""
     last = _without_ending(frame.match).rsplit("/", 1)[-1]
-    within = _within(frame)
+    within = _names_within_match(frame)
     pictures = {
         _without_ending(frame.picture),
         _without_ending(frame.picture).rsplit("/", 1)[-1],
     } - {""}
-    return pictures | _glued(within | ({f"{last}/{name}" for name in within} if last else set()))
+    return pictures | _joined_names(
+        within | ({f"{last}/{name}" for name in within} if last else set())
+    )
 
 
-def _within(frame: NamedFrame) -> set[str]:
+def _names_within_match(frame: NamedFrame) -> set[str]:
     """Names of a frame within its match."""
     view, group = _without_ending(frame.view), _without_ending(frame.group)
     return {f"{view}/{group}", f"{group}/{view}"} if frame.station else {view}
 
 
-def _glued(names: set[str]) -> set[str]:
+def _joined_names(names: set[str]) -> set[str]:
     return names | {name.replace("/", glue) for name in names for glue in ("_", "__", "-")}
 
 
-def _numbers(frame: NamedFrame) -> set[int]:
+def _numbers_of_frame(frame: NamedFrame) -> set[int]:
     """Numbers that a frame's view, picture or (static camera) group is called by."""
     names = {_without_ending(name).rsplit("/", 1)[-1] for name in (frame.view, frame.picture)}
     if frame.station:
@@ -217,7 +219,7 @@ def _numbers(frame: NamedFrame) -> set[int]:
     return {int(match[1]) for match in found if match}
 
 
-def _exported(frame: NamedFrame) -> Iterator[str]:
+def _exported_names(frame: NamedFrame) -> Iterator[str]:
     """Names that our exports give to the frame, without the folder of a split."""
     station = Station(frame.station or frame.view, frame.size, shared=bool(frame.station))
     view = View(frame.view, station)

@@ -43,9 +43,9 @@ def measure_frame(
     sure = [found for found in item.detections if found.score >= min_score]
     best = sure[0] if sure else None
     hit = next((found for found in sure if truth is not None and iou(found.box, truth) > 0), None)
-    distance = _distance(frame)
+    distance = _distance_from_camera(frame)
     own, other = (
-        _errors(frame, camera, best, hit, diameter_m) for camera in _both(frame, predicted)
+        _place_errors(frame, camera, best, hit, diameter_m) for camera in _both(frame, predicted)
     )
     return FrameResult(
         frame_id=frame.id,
@@ -64,10 +64,10 @@ def measure_frame(
         parallax_degrees=frame.parallax_degrees,
         size_error_percent=100 * (hit.box.diameter / truth.diameter - 1) if hit and truth else None,
         error_m=own[0],
-        error_percent=_share(own[0], distance),
+        error_percent=_percent_of_distance(own[0], distance),
         any_error_m=own[1],
         predicted_error_m=other[0],
-        predicted_error_percent=_share(other[0], distance),
+        predicted_error_percent=_percent_of_distance(other[0], distance),
         predicted_any_error_m=other[1],
     )
 
@@ -94,7 +94,7 @@ def _both(frame: Frame, predicted: Camera | None) -> tuple[Camera | None, Camera
     return frame.camera, predicted
 
 
-def _errors(
+def _place_errors(
     frame: Frame,
     camera: Camera | None,
     best: Detection | None,
@@ -106,13 +106,13 @@ def _errors(
     return error, error if best is hit else place_error(frame, camera, best, diameter_m)
 
 
-def _distance(frame: Frame) -> float | None:
+def _distance_from_camera(frame: Frame) -> float | None:
     if frame.camera is None or frame.point is None:
         return None
     return float(np.linalg.norm(frame.camera.position - frame.point))
 
 
-def _share(error: float | None, distance: float | None) -> float | None:
+def _percent_of_distance(error: float | None, distance: float | None) -> float | None:
     return 100 * error / distance if error is not None and distance else None
 
 
@@ -157,8 +157,8 @@ def localization_table(
     balls = [frame for frame in frames if frame.ball and frame.distance_m is not None]
     rows = []
     for name, label, error, percent, any_error in SOURCES[: 1 + predicted]:
-        rows.append(_overlapping(balls, name, label, error, percent, resamples))
-        rows.append(_everywhere(balls, name, label, any_error, resamples))
+        rows.append(_row_of_hits(balls, name, label, error, percent, resamples))
+        rows.append(_row_of_all_frames(balls, name, label, any_error, resamples))
     note = (
         f"{plural(len(balls), 'frame')} with a 3D ball. MAE and median are over the frames whose detection "
         f"has a place; IoU > 0 rows leave out frames without an overlapping detection."
@@ -172,10 +172,10 @@ def precision_distance(frames: Sequence[FrameResult], *, predicted: bool) -> Fig
     places = (np.arange(0, round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
     series = []
     for name, label, error, _percent, any_error in SOURCES[: 1 + predicted]:
-        placed = _values(balls, error)
-        missed = _values(balls, any_error)
-        series.append(_within(name, label, placed, len(placed), places, error))
-        everywhere = _within(
+        placed = _known_values(balls, error)
+        missed = _known_values(balls, any_error)
+        series.append(_share_within_series(name, label, placed, len(placed), places, error))
+        everywhere = _share_within_series(
             f"{name}_all", f"{label}, all frames", missed, len(balls), places, any_error
         )
         series.append(replace(everywhere, kind="dashed"))
@@ -190,7 +190,7 @@ def precision_distance(frames: Sequence[FrameResult], *, predicted: bool) -> Fig
     return Figure("precision_distance", "Precision against distance", (panel,), note)
 
 
-def _overlapping(
+def _row_of_hits(
     balls: Sequence[FrameResult],
     name: str,
     label: str,
@@ -200,51 +200,51 @@ def _overlapping(
 ) -> Row:
     kept = [frame for frame in balls if getattr(frame, error) is not None]
     matches = [frame.match for frame in kept]
-    values, shares = _values(kept, error), _values(kept, percent)
+    values, shares = _known_values(kept, error), _known_values(kept, percent)
     near = [float(value < NEAR_M) for value in values]
     cells = (
         resamples.mean(values, matches, len(balls)),
         resamples.mean(shares, matches, len(balls)),
         resamples.mean(near, matches, len(balls)),
-        _median(values, len(balls)),
+        _median_cell(values, len(balls)),
     )
     return Row(name, f"{label}, IoU > 0", cells, FrameRange(error))
 
 
-def _everywhere(
+def _row_of_all_frames(
     balls: Sequence[FrameResult], name: str, label: str, error: str, resamples: Resamples
 ) -> Row:
     kept = [frame for frame in balls if getattr(frame, error) is not None]
-    values, matches = _values(kept, error), [frame.match for frame in kept]
+    values, matches = _known_values(kept, error), [frame.match for frame in kept]
     percent = [
         100 * value / frame.distance_m
         for value, frame in zip(values, kept, strict=True)
         if frame.distance_m
     ]
-    near = [float(_near(getattr(frame, error))) for frame in balls]
+    near = [float(_is_near(getattr(frame, error))) for frame in balls]
     cells = (
         resamples.mean(values, matches, len(balls)),
         resamples.mean(percent, matches, len(balls)),
         resamples.mean(near, [frame.match for frame in balls]),
-        _median(values, len(balls)),
+        _median_cell(values, len(balls)),
     )
     return Row(f"{name}_all", f"{label}, all frames", cells, FrameRange("distance_m"))
 
 
-def _near(error: float | None) -> bool:
+def _is_near(error: float | None) -> bool:
     return error is not None and error < NEAR_M
 
 
-def _values(frames: Sequence[FrameResult], field: str) -> list[float]:
+def _known_values(frames: Sequence[FrameResult], field: str) -> list[float]:
     found = (getattr(frame, field) for frame in frames)
     return [value for value in found if value is not None]
 
 
-def _median(values: Sequence[float], whole: int) -> Cell:
+def _median_cell(values: Sequence[float], whole: int) -> Cell:
     return Cell(float(np.median(values)) if values else None, count=len(values), of=whole)
 
 
-def _within(
+def _share_within_series(
     name: str, label: str, values: Sequence[float], of: int, places: np.ndarray, field: str
 ) -> Series:
     ordered = np.sort(np.asarray(values, dtype=float))

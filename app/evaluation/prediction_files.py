@@ -116,17 +116,19 @@ def read_predictions(
             raise run.found.report.problems[0]
         run.found.format = kind
         if images is not None and kind != "coco":
-            raise _unused("images", "a COCO document", kind)
+            raise _unused_option_error("images", "a COCO document", kind)
         if size is not None and kind == "yolo":
-            raise _unused("size", "a size: its numbers are shares of the image", kind)
+            raise _unused_option_error("size", "a size: its numbers are shares of the image", kind)
         if kind == "tracks":
             if size is not None or category is not None:
                 option = "size" if size is not None else "category"
-                raise _unused(option, f"a {option}: its balls are places on the pitch", kind)
+                raise _unused_option_error(
+                    option, f"a {option}: its balls are places on the pitch", kind
+                )
             run.found.tracks = read_tracks(tree, path, run.found.report, limits)
             return run.found
         if kind == "coco":
-            beside = [] if images is None else _document(images, run, limits)
+            beside = [] if images is None else _read_document(images, run, limits)
             _read_coco(_json_documents(tree, path, run.found.report), run, beside)
         elif kind == "yolo":
             _read_yolo(tree, path, run)
@@ -136,7 +138,7 @@ def read_predictions(
     return run.found
 
 
-def _unused(option: str, what: str, kind: str) -> InputError:
+def _unused_option_error(option: str, what: str, kind: str) -> InputError:
     return InputError(
         f"{kind} does not use {what}", hint=f"Leave {option} out.", pointer=f"/{option}"
     )
@@ -202,11 +204,11 @@ def read_predicted_cameras(
                     f"that; say so (--cameras-size {other.width}x{other.height})"
                 )
                 found.report.note(path.name, name, "principal_point", message)
-            found.cameras[identity] = _sized(camera, made_for, annotated)
+            found.cameras[identity] = _resize_camera(camera, made_for, annotated)
     return found
 
 
-def _sized(camera: Camera, made_for: ImageSize | None, annotated: ImageSize) -> Camera:
+def _resize_camera(camera: Camera, made_for: ImageSize | None, annotated: ImageSize) -> Camera:
     if made_for is None or made_for == annotated:
         return camera
     return camera.scaled(annotated.width / made_for.width, annotated.height / made_for.height)
@@ -216,7 +218,7 @@ Documents = list[tuple[str, Any]]
 """JSON lists and objects, each with the name of its file."""
 
 
-def _document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
+def _read_document(path: Path, run: PredictionRun, limits: Limits) -> Documents:
     with opened_tree(path, run.found.report, limits) as tree:
         if tree is None:
             raise run.found.report.problems[0]
@@ -291,7 +293,7 @@ class _CocoImages:
         sizes: dict[str, ImageSize] = {}
         balls = False
         for shown, value in documents:
-            for number, item in enumerate(_listed(value, "images")):
+            for number, item in enumerate(_list_of_name(value, "images")):
                 with noted(report, shown, f"image {number}"):
                     image = fields.require_object(item)
                     name = str(image.get("file_name", ""))
@@ -303,7 +305,7 @@ class _CocoImages:
                             )
                             sizes[name] = ImageSize(*sides)
                     _add_id(names, image, name)
-            for number, item in enumerate(_listed(value, "categories")):
+            for number, item in enumerate(_list_of_name(value, "categories")):
                 with noted(report, shown, f"category {number}"):
                     category = fields.require_object(item)
                     name = str(category.get("name", ""))
@@ -312,7 +314,7 @@ class _CocoImages:
         return _CocoImages(names, sizes, classes if balls else IdIndex())
 
 
-def _listed(value: Any, name: str) -> list[Any]:
+def _list_of_name(value: Any, name: str) -> list[Any]:
     found = value.get(name) if isinstance(value, dict) else None
     return found if isinstance(found, list) else []
 
@@ -331,7 +333,7 @@ def _add_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
         raise FieldError("id", f"{known_as or 'is missing or no id'}; left out")
 
 
-def _identity(value: Any) -> str:
+def _image_id_text(value: Any) -> str:
     """An id of an image as text, 1.0 like 1.
 
     Raises:
@@ -363,7 +365,7 @@ def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
     identity = ""
     if not own or value.get("image_id") is not None:
         with in_field("image_id"):
-            identity = _identity(value.get("image_id"))
+            identity = _image_id_text(value.get("image_id"))
     box = read_field(value, "bbox", lambda item: Box(*fields.number_list(item, 4)))
     score = read_field(value, "score", fields.number) if "score" in value else None
     if not run.wants(*_class_of(value, known)):
@@ -371,7 +373,7 @@ def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
     named = known.names.find(identity) or ""
     if own:
         frame = run.frame(own)
-        if problem := _contradiction(run, own, identity, named, frame):
+        if problem := _describe_contradiction(run, own, identity, named, frame):
             raise FieldError("file_name", problem)
     elif named or isinstance(value["image_id"], str):
         frame = run.frame(named or identity)
@@ -383,7 +385,7 @@ def _add_coco(run: PredictionRun, item: Any, known: _CocoImages) -> None:
             run.add(frame, box, score, known.sizes.get(own or named), from_corner=True)
 
 
-def _contradiction(
+def _describe_contradiction(
     run: PredictionRun, own: str, identity: str, named: str, frame: NamedFrame | None
 ) -> str | None:
     """Why the name and the number of a result mean two frames, in words; None where they do not."""

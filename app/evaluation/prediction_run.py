@@ -181,7 +181,7 @@ class PredictionRun:
         if from_corner or seen != frame.size:
             # Images are resized about the corner of their first pixel.
             corner = box if from_corner else box_to_corner(box)
-            box = box_from_corner(_scaled(corner, seen, frame.size))
+            box = box_from_corner(_scale_box(corner, seen, frame.size))
         found.append(Detection(box, 1.0 if score is None else score))
 
     def finish(self, path: Path) -> None:
@@ -240,7 +240,7 @@ def box_problem(box: Box, size: ImageSize) -> str | None:
     return None
 
 
-def _scaled(box: Box, seen: ImageSize, annotated: ImageSize) -> Box:
+def _scale_box(box: Box, seen: ImageSize, annotated: ImageSize) -> Box:
     if seen == annotated:
         return box
     x, y = annotated.width / seen.width, annotated.height / seen.height
@@ -293,7 +293,7 @@ class noted:  # noqa: N801
         return True
 
 
-def listed(
+def list_unknown_frames(
     unknown: Mapping[str, int], reasons: Mapping[str, str], most: int
 ) -> Iterator[dict[str, Any]]:
     """The first unknown frames by name, for people."""

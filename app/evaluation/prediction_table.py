@@ -76,7 +76,7 @@ def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -
         raise DatasetFormatError(str(path), None, None, f"holds {what}")
     shown = tree.shown(names[0])
     columns: list[str] | None = None
-    for line, cells in _rows(tree.read_bytes(names[0]), shown, limits):
+    for line, cells in _read_rows(tree.read_bytes(names[0]), shown, limits):
         if columns is None:
             columns = list(cells)
             if problem := _wrong_columns(columns):
@@ -88,7 +88,9 @@ def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -
         raise DatasetFormatError(shown, None, None, "holds no row: is it complete?")
 
 
-def _rows(content: bytes, shown: str, limits: Limits) -> Iterator[tuple[int, Mapping[str, str]]]:
+def _read_rows(
+    content: bytes, shown: str, limits: Limits
+) -> Iterator[tuple[int, Mapping[str, str]]]:
     """The rows with their line numbers, by the plain name of a column."""
     if is_mot(content):
         header = ",".join((*_MOT, "x", "y", "z")).encode()
@@ -135,7 +137,7 @@ def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
         return
     score_name = next((name for name in SCORES if not is_missing(cells.get(name))), None)
     score = read_field(cells, score_name, fields.number) if score_name else None
-    if not _wanted(run, cells):
+    if not _is_ball_row(run, cells):
         return
     frame = _row_frame(run, cells)
     if frame is not None:
@@ -149,7 +151,7 @@ def _add_row(run: PredictionRun, cells: Mapping[str, str]) -> None:
             run.add(frame, box, score, size)
 
 
-def _wanted(run: PredictionRun, cells: Mapping[str, str]) -> bool:
+def _is_ball_row(run: PredictionRun, cells: Mapping[str, str]) -> bool:
     """Whether the class of a row is the ball's."""
     column = next((name for name in _CLASSES if not is_missing(cells.get(name))), None)
     if column is None:

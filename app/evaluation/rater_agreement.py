@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from app.evaluation.bootstrap import Resamples, interval
+from app.evaluation.bootstrap import Resamples, percentile_interval
 from app.geometry.arrays import FloatArray
 
 Rated = Sequence[Sequence[Hashable | None]]
@@ -53,12 +53,12 @@ def cohen_kappa(first: Sequence[Hashable], second: Sequence[Hashable]) -> Coeffi
 
     Source: Cohen, "A coefficient of agreement for nominal scales", 1960, eq. 1.
     """
-    names = _categories([first, second])
+    names = _index_categories([first, second])
     count = len(names)
     parts = np.zeros((len(first), count, count))
     for row, (a, b) in enumerate(zip(first, second, strict=True)):
         parts[row, names[a], names[b]] = 1
-    return _coefficient("cohen", parts, _cohen)
+    return _resampled_coefficient("cohen", parts, _cohen_of_tables)
 
 
 def fleiss_kappa(rated: Rated) -> Coefficient:
@@ -76,10 +76,10 @@ def fleiss_kappa(rated: Rated) -> Coefficient:
         raise ValueError(
             "Fleiss' kappa needs the same number of judgements of each item, two or more"
         )
-    counts = _counts(rated)
+    counts = _count_categories(rated)
     raters = counts.sum(axis=1, keepdims=True)
     agreeing = (counts * (counts - 1)).sum(axis=1, keepdims=True) / (raters * (raters - 1))
-    return _coefficient("fleiss", np.hstack([agreeing, counts / raters]), _fleiss)
+    return _resampled_coefficient("fleiss", np.hstack([agreeing, counts / raters]), _fleiss_of_sums)
 
 
 def krippendorff_alpha(rated: Rated) -> Coefficient:
@@ -93,15 +93,19 @@ def krippendorff_alpha(rated: Rated) -> Coefficient:
 
     Source: Krippendorff, "Computing Krippendorff's alpha-reliability", 2011, section C.
     """
-    counts = _counts([row for row in rated if sum(value is not None for value in row) > 1])
+    counts = _count_categories(
+        [row for row in rated if sum(value is not None for value in row) > 1]
+    )
     judged = counts.sum(axis=1)
     pairs = counts[:, :, None] * counts[:, None, :]
     places = np.arange(counts.shape[1])
     pairs[:, places, places] -= counts
-    return _coefficient("krippendorff", pairs / (judged - 1)[:, None, None], _krippendorff)
+    return _resampled_coefficient(
+        "krippendorff", pairs / (judged - 1)[:, None, None], _alpha_of_coincidences
+    )
 
 
-def _coefficient(
+def _resampled_coefficient(
     name: Literal["cohen", "fleiss", "krippendorff"],
     parts: FloatArray,
     compute: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
@@ -116,12 +120,12 @@ def _coefficient(
     low, high = None, None
     if np.isfinite(value[0]) and len(counts):
         sums = (counts @ parts.reshape(items, -1)).reshape(len(counts), *parts.shape[1:])
-        low, high = interval(compute(sums)[0])
+        low, high = percentile_interval(compute(sums)[0])
     known = float(value[0]) if np.isfinite(value[0]) else None
     return Coefficient(name, known, low, high, float(observed[0]), items)
 
 
-def _cohen(table: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _cohen_of_tables(table: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Kappa and observed agreement of tables of counts, shape (R, K, K)."""
     share = table / table.sum(axis=(1, 2), keepdims=True)
     observed = np.trace(share, axis1=1, axis2=2)
@@ -129,7 +133,7 @@ def _cohen(table: FloatArray) -> tuple[FloatArray, FloatArray]:
     return _beyond_chance(observed, chance), observed
 
 
-def _fleiss(sums: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _fleiss_of_sums(sums: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Kappa and observed agreement of sums of agreement and shares, shape (R, 1 + K)."""
     items = sums[:, 1:].sum(axis=1)
     observed = sums[:, 0] / items
@@ -137,7 +141,7 @@ def _fleiss(sums: FloatArray) -> tuple[FloatArray, FloatArray]:
     return _beyond_chance(observed, chance), observed
 
 
-def _krippendorff(coincidences: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _alpha_of_coincidences(coincidences: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Alpha and observed agreement of coincidence matrices, shape (R, K, K)."""
     totals = coincidences.sum(axis=2)
     judged = totals.sum(axis=1)
@@ -155,7 +159,7 @@ def _beyond_chance(observed: FloatArray, chance: FloatArray) -> FloatArray:
     return found
 
 
-def _categories(rows: Rated) -> dict[Hashable, int]:
+def _index_categories(rows: Rated) -> dict[Hashable, int]:
     names: dict[Hashable, int] = {}
     for row in rows:
         for value in row:
@@ -164,9 +168,9 @@ def _categories(rows: Rated) -> dict[Hashable, int]:
     return names
 
 
-def _counts(rated: Rated) -> FloatArray:
+def _count_categories(rated: Rated) -> FloatArray:
     """How often each item was given each category, shape (N, K)."""
-    names = _categories(rated)
+    names = _index_categories(rated)
     counts = np.zeros((len(rated), len(names)))
     for row, ratings in enumerate(rated):
         for value in ratings:

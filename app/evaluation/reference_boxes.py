@@ -42,17 +42,19 @@ def boxes_table(
         truth: The kind of box whose overlap a run keeps of each frame (``box_iou``): its row
             opens the frames.
     """
-    compared = _compared(frames, careful)
+    compared = _comparable_boxes(frames, careful)
     rows = [
-        _row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
+        _box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
              len(careful), FrameRange("box_iou") if kind == truth else None)
         for kind, label in ROWS
     ]  # fmt: skip
     if detections:
         found = [
-            (frame, hit, box) for frame, box in compared if (hit := _hit(detections, frame, box))
+            (frame, hit, box)
+            for frame, box in compared
+            if (hit := _overlapping_detection(detections, frame, box))
         ]
-        rows.append(_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful)))
+        rows.append(_box_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful)))
     note = (
         f"{len(compared)} frames that have a reference box and a 3D ball, of {len(careful)} reference "
         f"boxes. Size error is |d - d reference| in per cent of the reference box's diagonal. "
@@ -74,7 +76,7 @@ def boxes_figure(
     """
     compared = sorted(
         (distances[frame.id], frame.id, frame, box)
-        for frame, box in _compared(frames, careful)
+        for frame, box in _comparable_boxes(frames, careful)
         if frame.id in distances
     )
     note = f"{plural(len(compared), 'frame')}; a point opens its frame."
@@ -87,14 +89,14 @@ def boxes_figure(
             title,
             Axis("Distance to the camera", "m"),
             axis,
-            tuple(_points(kind, label, compared, measure) for kind, label in ROWS),
+            tuple(_scatter_series(kind, label, compared, measure) for kind, label in ROWS),
         )
         for title, axis, measure in measures
     )
     return Figure("box_overlap", "Boxes against reference boxes", panels, note)
 
 
-def _points(
+def _scatter_series(
     kind: str,
     label: str,
     compared: Sequence[tuple[float, int, Frame, Box]],
@@ -111,18 +113,22 @@ def _points(
     )
 
 
-def _compared(frames: Sequence[Frame], careful: Mapping[int, Box]) -> list[tuple[Frame, Box]]:
+def _comparable_boxes(
+    frames: Sequence[Frame], careful: Mapping[int, Box]
+) -> list[tuple[Frame, Box]]:
     return [
-        (frame, careful[frame.id]) for frame in frames if frame.id in careful and comparable(frame)
+        (frame, careful[frame.id])
+        for frame in frames
+        if frame.id in careful and has_every_box(frame)
     ]
 
 
-def comparable(frame: Frame) -> bool:
+def has_every_box(frame: Frame) -> bool:
     """Whether it has every kind of box, so that all rows are over the same frames."""
     return all(kind in frame.boxes for kind, _ in ROWS)
 
 
-def _row(
+def _box_row(
     kind: str,
     label: str,
     compared: Sequence[tuple[Frame, Box, Box]],
@@ -137,6 +143,8 @@ def _row(
     return Row(kind, label, cells, behind)
 
 
-def _hit(detections: Mapping[int, Sequence[Detection]], frame: Frame, careful: Box) -> Box | None:
+def _overlapping_detection(
+    detections: Mapping[int, Sequence[Detection]], frame: Frame, careful: Box
+) -> Box | None:
     found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
     return next((item.box for item in found if iou(item.box, careful) > 0), None)

@@ -177,10 +177,15 @@ class Figure:
 
 def figure_csv(figure: Figure) -> str:
     """The curves of a figure; the header says what the axes show, with their units."""
-    x, y = _axes([panel.x for panel in figure.panels]), _axes([panel.y for panel in figure.panels])
-    color = _axes([panel.color for panel in figure.panels if panel.color]) or "color"
+    x, y = (
+        _axes_name([panel.x for panel in figure.panels]),
+        _axes_name([panel.y for panel in figure.panels]),
+    )
+    color = _axes_name([panel.color for panel in figure.panels if panel.color]) or "color"
     header = ("panel", "series", "kind", x or "x", y or "y", "low", "high", "count", color)
-    return _text((*header, "group_id"), (row for panel in figure.panels for row in _rows(panel)))
+    return _csv_text(
+        (*header, "group_id"), (row for panel in figure.panels for row in _panel_rows(panel))
+    )
 
 
 def table_csv(table: Table) -> str:
@@ -193,16 +198,16 @@ def table_csv(table: Table) -> str:
                      for value in (item.value, item.low, item.high, item.count, item.of))]
         for row in table.rows
     )  # fmt: skip
-    return _text(header, rows)
+    return _csv_text(header, rows)
 
 
-def _axes(axes: Sequence[Axis]) -> str:
+def _axes_name(axes: Sequence[Axis]) -> str:
     """The name of a column; panels whose axes differ stand in it one after the other."""
     names = [f"{axis.label} ({axis.unit})" if axis.unit else axis.label for axis in axes]
     return " / ".join(dict.fromkeys(names))
 
 
-def _rows(panel: Panel) -> Iterator[list[Value]]:
+def _panel_rows(panel: Panel) -> Iterator[list[Value]]:
     for series in panel.series:
         for place in range(len(series.x)):
             yield [
@@ -222,7 +227,7 @@ def _value_at(series: Series, name: str, place: int) -> Value:
     return values[place] if values else None
 
 
-def _text(header: tuple[str, ...] | list[str], rows: Iterator[list[Value]]) -> str:
+def _csv_text(header: tuple[str, ...] | list[str], rows: Iterator[list[Value]]) -> str:
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(header)

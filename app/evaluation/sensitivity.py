@@ -55,7 +55,7 @@ def shift_places() -> FloatArray:
     return np.linspace(-SHIFT_PERCENT, SHIFT_PERCENT, STEPS)
 
 
-def choose(frames: Sequence[Frame], seed: int, size: int = SAMPLE) -> list[Frame]:
+def choose_frames(frames: Sequence[Frame], seed: int, size: int = SAMPLE) -> list[Frame]:
     """A seeded sample of the frames that have a camera, an optimised box and a 3D ball."""
     able = [
         frame
@@ -69,8 +69,8 @@ def choose(frames: Sequence[Frame], seed: int, size: int = SAMPLE) -> list[Frame
     return [able[index] for index in sorted(chosen.tolist())]
 
 
-def measure(frame: Frame, diameter_m: float) -> Sample:
-    """The curves of one ball; the frame is one of ``choose``."""
+def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> Sample:
+    """The curves of one ball; the frame is one of ``choose_frames``."""
     camera, box = frame.camera, frame.boxes["optimized"]
     assert camera is not None
     center, diameter = np.array(box.center), box.diameter
@@ -83,7 +83,7 @@ def measure(frame: Frame, diameter_m: float) -> Sample:
         )
         return float(np.linalg.norm(place - origin))
 
-    size_slope, shift_slope = slopes(camera, box, diameter_m)
+    size_slope, shift_slope = error_slopes(camera, box, diameter_m)
     return Sample(
         frame,
         float(np.linalg.norm(origin - camera.position)),
@@ -94,7 +94,7 @@ def measure(frame: Frame, diameter_m: float) -> Sample:
     )
 
 
-def slopes(camera: Camera, box: Box, diameter_m: float) -> tuple[float, float]:
+def error_slopes(camera: Camera, box: Box, diameter_m: float) -> tuple[float, float]:
     """How fast the ball moves: metres per pixel of diameter, and per pixel along a row.
 
     With p = C + phi / g R^T q, q the ideal ray of the centre and g the ideal distance of the two
@@ -127,7 +127,7 @@ def slopes(camera: Camera, box: Box, diameter_m: float) -> tuple[float, float]:
 def _wide_slopes(
     camera: Camera, center: FloatArray, diameter: float, diameter_m: float
 ) -> tuple[float, float]:
-    """``slopes`` through a wide lens: along the ray exactly, along a row by central differences."""
+    """``error_slopes`` through a wide lens: along the ray exactly, along a row by central differences."""
 
     def place(shift: float) -> FloatArray:
         moved = center + np.array([shift, 0.0])
@@ -147,7 +147,7 @@ def sensitivity_figure(samples: Sequence[Sample]) -> Figure:
         tuple(
             line
             for item in samples
-            for line in _pair(item, size_places(), item.by_size, item.size_slope)
+            for line in _curve_and_slope(item, size_places(), item.by_size, item.size_slope)
         ),
         color=color,
     )
@@ -158,7 +158,7 @@ def sensitivity_figure(samples: Sequence[Sample]) -> Figure:
         tuple(
             line
             for item in samples
-            for line in _pair(item, shift_places(), item.by_shift, item.shift_slope)
+            for line in _curve_and_slope(item, shift_places(), item.by_shift, item.shift_slope)
         ),
         color=color,
     )
@@ -169,8 +169,8 @@ def sensitivity_figure(samples: Sequence[Sample]) -> Figure:
 def sensitivity_table(samples: Sequence[Sample], able: int) -> Table:
     """How far the ball moves at the ends of both curves, and what that has to do with distance."""
     rows = (
-        _row("size", f"Size ± {SIZE_PERCENT:g} %", samples, able, SIZE_PERCENT),
-        _row(
+        _sensitivity_row("size", f"Size ± {SIZE_PERCENT:g} %", samples, able, SIZE_PERCENT),
+        _sensitivity_row(
             "shift", f"Centre ± {SHIFT_PERCENT:g} % of the diagonal", samples, able, SHIFT_PERCENT
         ),
     )
@@ -188,7 +188,9 @@ def sensitivity_table(samples: Sequence[Sample], able: int) -> Table:
     return Table("sensitivity", "Sensitivity", columns, rows, note)
 
 
-def _row(name: str, label: str, samples: Sequence[Sample], able: int, percent: float) -> Row:
+def _sensitivity_row(
+    name: str, label: str, samples: Sequence[Sample], able: int, percent: float
+) -> Row:
     curves = [item.by_size if name == "size" else item.by_shift for item in samples]
     slope = [item.size_slope if name == "size" else item.shift_slope for item in samples]
     ends = np.array([max(line[0], line[-1]) for line in curves])
@@ -207,7 +209,9 @@ def _row(name: str, label: str, samples: Sequence[Sample], able: int, percent: f
     return Row(name, label, cells)
 
 
-def _pair(item: Sample, places: FloatArray, moved: FloatArray, slope: float) -> tuple[Series, ...]:
+def _curve_and_slope(
+    item: Sample, places: FloatArray, moved: FloatArray, slope: float
+) -> tuple[Series, ...]:
     name = f"{item.frame.group} {item.frame.view}"
     x = tuple(places.round(9).tolist())
     predicted = tuple((slope * np.abs(places)).tolist())

@@ -57,18 +57,18 @@ def read_tracks(
     found = {}
     for name, folder in zip(names, folders, strict=True):
         balls = _Balls()
-        _each_row(tree, name, (*_PLACE,), report, limits, balls.add)
+        _rows_by_track(tree, name, (*_PLACE,), report, limits, balls.add)
         beside = EVENTS if folder == "." else f"{folder}/{EVENTS}"
         events: list[tuple[str, int | None, float | None]] | None = None
         if beside in tables:
             events = []
-            _each_row(tree, beside, ("kind",), report, limits, partial(_add_event, events))
+            _rows_by_track(tree, beside, ("kind",), report, limits, partial(_add_event, events))
         report.imported += len(balls.position)
         found["" if folder == "." else folder] = balls.track(events)
     return found
 
 
-def _each_row(
+def _rows_by_track(
     tree: FileTree,
     name: str,
     columns: tuple[str, ...],
@@ -100,11 +100,11 @@ class _Balls:
         """A row; without a place it is a gap."""
         if all(is_missing(row.get(name)) for name in _PLACE):
             return
-        frame, time = _instant(row)
+        frame, time = _read_instant(row)
         if (frame if frame is not None else time) in self._seen:
             raise FieldError("frame", "has a ball already")
-        x, y, z = (read_field(row, name, _metres) for name in _PLACE)
-        sigma = _sigma(row)
+        x, y, z = (read_field(row, name, _read_metres) for name in _PLACE)
+        sigma = _read_sigma(row)
         self._seen.add(frame if frame is not None else time)
         self.frames.append(frame)
         self.times.append(time)
@@ -122,7 +122,7 @@ class _Balls:
         )
 
 
-def _instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
+def _read_instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
     frame = None if is_missing(row.get("frame")) else read_field(row, "frame", fields.whole_number)
     time = None if is_missing(row.get("time_s")) else read_field(row, "time_s", fields.number)
     if frame is None and time is None:
@@ -132,14 +132,14 @@ def _instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
     return frame, time
 
 
-def _metres(text: str) -> float:
+def _read_metres(text: str) -> float:
     value = fields.number(text)
     if abs(value) > FARTHEST_M:
         raise ValueError(f"is {value:g} m; places are in metres from the centre mark")
     return value
 
 
-def _sigma(row: Mapping[str, str]) -> tuple[float, float, float] | None:
+def _read_sigma(row: Mapping[str, str]) -> tuple[float, float, float] | None:
     names = _SIGMAS if not is_missing(row.get(_SIGMAS[0])) else ("sigma_m",) * 3
     if is_missing(row.get(names[0])):
         return None
@@ -153,4 +153,4 @@ def _add_event(events: list[tuple[str, int | None, float | None]], row: Mapping[
     kind = row["kind"].strip().lower()
     if kind not in KINDS:
         raise FieldError("kind", f"is {quoted(kind)}; kinds are {', '.join(KINDS)}")
-    events.append((kind, *_instant(row)))
+    events.append((kind, *_read_instant(row)))

@@ -128,16 +128,16 @@ def evaluate_tracks(
     Raises:
         InputError: Nothing that is predicted is of an instant with a true ball.
     """
-    own, unknown = _joined(truth, predicted)
+    own, unknown = _match_tracks(truth, predicted)
     found = _Compared()
     for track in truth:
-        _compare(found, track, own.get(track.key))
+        _compare_track(found, track, own.get(track.key))
     error = np.array(found.error)
     if not np.isfinite(error).any():
         raise InputError(
             "nothing that is predicted is of an instant with a true ball: "
-            f"{_named('the stretches', [track.key for track in truth])}"
-            f"{_named('; predicted', unknown) if unknown else ''}",
+            f"{_describe_names('the stretches', [track.key for track in truth])}"
+            f"{_describe_names('; predicted', unknown) if unknown else ''}",
             hint="Name folders by the stretches, and frames as exports of tracks do.",
             pointer="/predictions",
         )
@@ -152,14 +152,14 @@ def evaluate_tracks(
         "predicted_frames_without_truth": found.beside
         + sum(len(predicted[name].position) for name in unknown),
     }
-    note = _note(counts, missed, unknown)
-    tables = [_places(found, note)]
+    note = _describe_counts(counts, missed, unknown)
+    tables = [_places_table(found, note)]
     if found.events:
-        tables.append(_events(found))
-    return Evaluation(counts, tuple(tables), (_within(error),), ())
+        tables.append(_events_table(found))
+    return Evaluation(counts, tuple(tables), (_share_within_figure(error),), ())
 
 
-def _joined(
+def _match_tracks(
     truth: Sequence[TrueTrack], predicted: Mapping[str, PredictedTrack]
 ) -> tuple[dict[str, PredictedTrack], list[str]]:
     """Predictions by key of their stretch, and the names of those that are of none."""
@@ -177,7 +177,7 @@ def _joined(
     return found, unknown
 
 
-def _compare(found: _Compared, track: TrueTrack, predicted: PredictedTrack | None) -> None:
+def _compare_track(found: _Compared, track: TrueTrack, predicted: PredictedTrack | None) -> None:
     there = track.there
     rows = np.full(len(track.frames), -1)
     if predicted is not None:
@@ -203,7 +203,7 @@ def _compare(found: _Compared, track: TrueTrack, predicted: PredictedTrack | Non
 def _rows_of(track: TrueTrack, predicted: PredictedTrack) -> IntArray:
     """The row of the true track of each predicted ball, -1 where there is none, shape (M,)."""
     by_frame = {int(frame): row for row, frame in enumerate(track.frames)}
-    half = _step(track) / 2
+    half = _frame_seconds(track) / 2
     found = np.full(len(predicted.position), -1)
     for at, (frame, time) in enumerate(zip(predicted.frames, predicted.times, strict=True)):
         if frame is not None:
@@ -214,7 +214,7 @@ def _rows_of(track: TrueTrack, predicted: PredictedTrack) -> IntArray:
     return found
 
 
-def _step(track: TrueTrack) -> float:
+def _frame_seconds(track: TrueTrack) -> float:
     return float(np.median(np.diff(track.times))) if len(track.times) > 1 else 0.04
 
 
@@ -224,7 +224,7 @@ def _events_of(
     by_frame = {
         int(frame): float(time) for frame, time in zip(track.frames, track.times, strict=True)
     }
-    step = _step(track)
+    step = _frame_seconds(track)
     said = []
     for kind, frame, time in predicted.events or ():
         if frame is not None and frame in by_frame:
@@ -234,7 +234,7 @@ def _events_of(
     return list(track.events), said, EVENT_FRAMES * step + step / 2
 
 
-def _places(found: _Compared, note: str) -> Table:
+def _places_table(found: _Compared, note: str) -> Table:
     resamples = Resamples.draw(found.stretch, RESAMPLES, SEED)
     state, mode = np.array(found.state), np.array(found.mode)
     parts = [("all", "All frames", np.ones(len(state), dtype=bool))]
@@ -274,7 +274,7 @@ def _place_row(
     )
 
 
-def _events(found: _Compared) -> Table:
+def _events_table(found: _Compared) -> Table:
     rows = [_event_row("any", "Events of any kind", found, None)]
     rows += [
         _event_row(kind, f"{kind.capitalize()}s" if kind != "out" else "Out", found, kind)
@@ -294,7 +294,7 @@ def _event_row(name: str, label: str, found: _Compared, kind: str | None) -> Row
             sorted(at for one, at in some if kind in (None, one)) for some in (real, predicted)
         ]
         true, said = true + len(times[0]), said + len(times[1])
-        hits += _matched(times[0], times[1], slack)
+        hits += _count_matched_events(times[0], times[1], slack)
     f1 = 2 * hits / (true + said) if true + said else None
     return Row(
         name,
@@ -307,7 +307,7 @@ def _event_row(name: str, label: str, found: _Compared, kind: str | None) -> Row
     )
 
 
-def _matched(true: Sequence[float], said: Sequence[float], slack: float) -> int:
+def _count_matched_events(true: Sequence[float], said: Sequence[float], slack: float) -> int:
     """How many pairs of one and the same event there are, the most that are possible."""
     hits = at = 0
     for time in true:
@@ -318,7 +318,7 @@ def _matched(true: Sequence[float], said: Sequence[float], slack: float) -> int:
     return hits
 
 
-def _within(error: FloatArray) -> Figure:
+def _share_within_figure(error: FloatArray) -> Figure:
     """Share of frames within a distance, against the distance."""
     places = (np.arange(round(FARTHEST_M / STEP_M) + 1) * STEP_M).round(6)
     below = np.searchsorted(np.sort(error[np.isfinite(error)]), places, side="left")
@@ -345,7 +345,9 @@ def _within(error: FloatArray) -> Figure:
     return Figure("track_distance", "Precision of tracks against distance", (panel,), note)
 
 
-def _note(counts: Mapping[str, int], missed: Sequence[str], unknown: Sequence[str]) -> str:
+def _describe_counts(
+    counts: Mapping[str, int], missed: Sequence[str], unknown: Sequence[str]
+) -> str:
     said = [
         f"{plural(counts['track_frames'], 'frame')} with a true ball, "
         f"{counts['track_frames_compared']} with a predicted one too. MAE, median and P 2 m are over those; "
@@ -354,11 +356,15 @@ def _note(counts: Mapping[str, int], missed: Sequence[str], unknown: Sequence[st
     if counts["predicted_frames_without_truth"]:
         balls = plural(counts["predicted_frames_without_truth"], "predicted ball")
         said.append(f"{balls} belong to no frame with a true one.")
-    said += [_named("Not predicted", missed) + "."] if missed else []
-    said += [_named("Predicted, but no stretch of the truth", unknown) + "."] if unknown else []
+    said += [_describe_names("Not predicted", missed) + "."] if missed else []
+    said += (
+        [_describe_names("Predicted, but no stretch of the truth", unknown) + "."]
+        if unknown
+        else []
+    )
     return " ".join(said)
 
 
-def _named(what: str, names: Sequence[str]) -> str:
+def _describe_names(what: str, names: Sequence[str]) -> str:
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return f"{what}: {', '.join(names[:NAMED])}{more}"

@@ -69,7 +69,7 @@ class Letterbox:
         return result
 
 
-def decode(
+def decode_output(
     output: FloatArray, box: Letterbox, category: int, min_score: float, most: int
 ) -> list[Detection]:
     """The balls of one picture, the surest first.
@@ -84,10 +84,10 @@ def decode(
     Raises:
         InputError: The output has another shape, or not that many classes.
     """
-    corners, scores = _candidates(np.asarray(output, dtype=float), category)
+    corners, scores = _candidate_boxes(np.asarray(output, dtype=float), category)
     order = np.argsort(-scores, kind="stable")
     order = order[scores[order] >= min_score][:MAX_CANDIDATES]
-    kept = suppress(corners[order], SUPPRESS_IOU, most)
+    kept = suppress_overlapping(corners[order], SUPPRESS_IOU, most)
     places = box.restore(corners[order][kept])
     found = []
     for (x1, y1, x2, y2), score in zip(places.tolist(), scores[order][kept].tolist(), strict=True):
@@ -96,7 +96,7 @@ def decode(
     return found
 
 
-def suppress(corners: FloatArray, limit: float, most: int) -> list[int]:
+def suppress_overlapping(corners: FloatArray, limit: float, most: int) -> list[int]:
     """Non-maximum suppression of boxes x1, y1, x2, y2, the surest first, shape (N, 4).
 
     Returns:
@@ -130,7 +130,7 @@ def ball_category(names: Sequence[str]) -> int | None:
     return balls[0] if len(balls) == 1 else None
 
 
-def _candidates(output: FloatArray, category: int) -> tuple[FloatArray, FloatArray]:
+def _candidate_boxes(output: FloatArray, category: int) -> tuple[FloatArray, FloatArray]:
     if output.ndim != 3 or output.shape[0] != 1:
         raise InputError(
             f"the model's output has the shape {output.shape}, not (1, 4 + classes, N)"

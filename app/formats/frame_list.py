@@ -18,7 +18,7 @@ from app.formats.file_tree import DEFAULT_LIMITS, Limits, Root
 from app.formats.json_text import read_json
 from app.formats.report import Report
 from app.formats.safe_path import read_regular_file, require_safe_path
-from app.object_store.address import is_address, seal
+from app.object_store.address import is_address, seal_address
 from app.object_store.path import StoredPath, find_path, target_path
 from app.plural import plural
 from app.soccer.group import Group, Media, View
@@ -100,7 +100,7 @@ class FrameList:
             stored = find_path(self._settings, address).stored
             if stored is None:
                 raise InputError(f"{address} is a folder, not a file")
-            self._sealed[address] = seal(address, stored.etag)
+            self._sealed[address] = seal_address(address, stored.etag)
         return self._sealed[address]
 
     def with_listed_frames(self, groups: Iterator[Group]) -> Iterator[Group]:

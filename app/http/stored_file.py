@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse, StreamingResponse
 from app.config import Settings
 from app.http.deps import etag_matches
 from app.http.headers import content_disposition
-from app.object_store.address import split_address, unseal
+from app.object_store.address import split_address, unseal_address
 from app.object_store.store import ChangedObjectError, ObjectStore, Stored, open_store
 
 SECONDS = 60
@@ -34,7 +34,7 @@ def stored_file(settings: Settings, sealed: str, name: str, request: Request) ->
         NotFoundError: It is gone, or another one now.
         StorageError: The store cannot be asked.
     """
-    address, _, etag = unseal(sealed)
+    address, _, etag = unseal_address(sealed)
     store_name, key = split_address(address)
     store = open_store(settings, store_name)
     stored = store.head(key)

@@ -22,7 +22,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.media.object_frames import Archives, is_stored, read_object
 from app.media.video import Times, frame_at, kept_index, make_index, open_video
-from app.object_store.address import unseal
+from app.object_store.address import unseal_address
 from app.plural import plural
 from app.soccer.group import Media
 
@@ -166,7 +166,7 @@ def picture_header(media: Media) -> ImageHeader | None:
 
 def frame_name(media: Media) -> str:
     """How a complaint calls a frame: by its file and its place in it, without the folder."""
-    file = Path(unseal(media.path)[0]).name
+    file = Path(unseal_address(media.path)[0]).name
     if media.member is not None:
         return f"frame {media.member} of {file}"
     return f"frame {file}" if media.frame is None else f"frame {media.frame} of {file}"

@@ -39,7 +39,7 @@ from app.media.files import (
     video_times,
 )
 from app.media.images import JPEG
-from app.media.neighbours import neighbours
+from app.media.neighbours import neighbouring_frames
 from app.media.object_frames import fetch_frame, is_kept, is_stored
 from app.media.video import Times, remember_index, remembered_index
 from app.progress import ReportProgress
@@ -109,7 +109,7 @@ class Frames:
 
     def warm(self) -> None:
         """Start a process before anybody waits for it."""
-        self._pool.submit(ready, bounded=False)
+        self._pool.submit(load_libraries, bounded=False)
 
     def cached(self, media: Media, width: int | None, flipped: bool) -> SentPicture | None:
         """What was made before, where it is kept.
@@ -155,14 +155,16 @@ class Frames:
         return made
 
     def ask_neighbours(self, media: Media, group: str, static: bool) -> PoolTask:
-        """Have ``neighbours`` called, which opens videos and archives.
+        """Have ``neighbouring_frames`` called, which opens videos and archives.
 
         Its future may have ``WorkerEnded``.
 
         Raises:
             OverloadedError: Too many wait.
         """
-        work = self._videos.with_index(media, neighbours, media, group, static, self._settings)
+        work = self._videos.with_index(
+            media, neighbouring_frames, media, group, static, self._settings
+        )
         return self._pool.submit(*work)
 
     def close(self) -> None:
@@ -426,5 +428,5 @@ def with_index(stamp: str, times: Times, work: Callable[..., Any], *arguments: A
     return work(*arguments)
 
 
-def ready() -> None:
+def load_libraries() -> None:
     """What a process does that shall only be there: it has loaded what it needs."""

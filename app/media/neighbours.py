@@ -13,7 +13,9 @@ from app.media.object_frames import is_stored
 from app.soccer.group import FARTHEST, Media, split_frame_number
 
 
-def neighbours(media: Media, group: str, static: bool, settings: Settings) -> dict[int, Media]:
+def neighbouring_frames(
+    media: Media, group: str, static: bool, settings: Settings
+) -> dict[int, Media]:
     """Frames of the same camera up to ``FARTHEST`` before and after, by how many frames later.
 
     Args:

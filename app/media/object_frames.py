@@ -20,7 +20,7 @@ from app.config import Settings
 from app.db.locks import lock_within
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.object_store.address import is_address, split_address, unseal
+from app.object_store.address import is_address, split_address, unseal_address
 from app.object_store.path import StoredPath
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
 from app.soccer.group import Media
@@ -163,7 +163,7 @@ def is_stored(media: Media) -> bool:
 
 def is_kept(media: Media, settings: Settings) -> bool:
     """Whether a frame of an object store is on this disk already."""
-    return _cache(settings).has(_name(media))
+    return _cache_of_settings(settings).has(_cache_name(media))
 
 
 def fetch_frame(media: Media, settings: Settings) -> bool:
@@ -185,7 +185,7 @@ def read_object(media: Media, settings: Settings) -> bytes:
     Raises:
         As ``fetch_frame``.
     """
-    cache, name = _cache(settings), _name(media)
+    cache, name = _cache_of_settings(settings), _cache_name(media)
     data = cache.get(name)
     if data is None:
         data = _fetch_object(media, settings)
@@ -194,7 +194,7 @@ def read_object(media: Media, settings: Settings) -> bytes:
 
 
 def _fetch_object(media: Media, settings: Settings) -> bytes:
-    address, kind, value = unseal(media.path)
+    address, kind, value = unseal_address(media.path)
     store_name, key = split_address(address)
     store = open_store(settings, store_name)
     etag = f'"{value}"' if kind == "etag" else ""
@@ -208,7 +208,7 @@ def _fetch_object(media: Media, settings: Settings) -> bytes:
         data = _read_object_or_member(store, key, media.member, etag, settings)
     if kind == "sha256" and hashlib.sha256(data).hexdigest() != value:
         raise ChangedObjectError(
-            f"{_shown(address, media)} is not the frame that was meant: its SHA-256 is another",
+            f"{_address_text(address, media)} is not the frame that was meant: its SHA-256 is another",
             hint=CHANGED_HINT,
         )
     return data
@@ -234,20 +234,20 @@ def _stored_zip(store: ObjectStore, key: str, _etag: str) -> StoredPath:
     return StoredPath(store.name, store.settings, key, store.head(key))
 
 
-def _shown(address: str, media: Media) -> str:
+def _address_text(address: str, media: Media) -> str:
     return address if media.member is None else f"{address}/{media.member}"
 
 
-def _name(media: Media) -> str:
+def _cache_name(media: Media) -> str:
     return repr((media.path, media.member))
 
 
-def _cache(settings: Settings) -> ObjectCache:
-    return _opened(settings.cache / "objects", settings.store_cache_bytes)
+def _cache_of_settings(settings: Settings) -> ObjectCache:
+    return _open_cache(settings.cache / "objects", settings.store_cache_bytes)
 
 
 @lru_cache(maxsize=8)
-def _opened(folder: Path, room: int) -> ObjectCache:
+def _open_cache(folder: Path, room: int) -> ObjectCache:
     return ObjectCache(folder, room)
 
 

@@ -101,7 +101,7 @@ def make_index(
     times = _decode_times(path, tell)
     content = BytesIO()
     np.save(content, times, allow_pickle=False)
-    place = _place(stamp, settings)
+    place = _index_path(stamp, settings)
     # A full disk costs the cache and no frame.
     try:
         place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -128,7 +128,7 @@ def kept_index(stamp: str, settings: Settings) -> Times | None:
     if (remembered := remembered_index(stamp)) is not None:
         return remembered
     with suppress(OSError, ValueError, EOFError):
-        times: Times = np.load(_place(stamp, settings), allow_pickle=False)
+        times: Times = np.load(_index_path(stamp, settings), allow_pickle=False)
         if times.dtype == np.float64 and times.ndim == 1:
             return times
     return None
@@ -184,11 +184,11 @@ class FrameReader:
         self._sought = None
         if self._video is not None and self._next <= number <= self._next + _MARGINS[0]:
             if self._advance(number):
-                return _retrieved(self._video)
+                return _retrieve_frame(self._video)
         elif number > _MARGINS[0]:
             for start in self._starts(number):
                 if self._jump(start, number):
-                    return _retrieved(self._video)
+                    return _retrieve_frame(self._video)
         # Opened anew: sent back to its start, a decoder may land behind the first frame.
         self.close()
         video = self._opened()
@@ -197,7 +197,7 @@ class FrameReader:
                 self.close()
                 return None
             self._next += 1
-        return _retrieved(video)
+        return _retrieve_frame(video)
 
     def approach(self, number: int, most: int) -> bool:
         """Come nearer to a frame, by a jump or by so many frames at most: between two steps others may be asked for.
@@ -236,7 +236,7 @@ class FrameReader:
     def _opened(self) -> cv2.VideoCapture:
         if self._video is None:
             self._opening = ExitStack()
-            self._video = self._opening.enter_context(_opened(self._path))
+            self._video = self._opening.enter_context(_open_video(self._path))
             self._next = 0
         return self._video
 
@@ -283,7 +283,7 @@ class FrameReader:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
+def _open_video(path: Path) -> Iterator[cv2.VideoCapture]:
     with open_video(path) as video:
         if not video.isOpened():
             raise ImageError(f"{path.name} is not a video that can be read")
@@ -295,14 +295,14 @@ def _same_time(time: Any, other: float) -> Any:
     return np.abs(time - other) < _SAME_TIME
 
 
-def _retrieved(video: Any) -> Any:
+def _retrieve_frame(video: Any) -> Any:
     done, picture = video.retrieve()
     return picture if done else None
 
 
 def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     times: list[float] = []
-    with _opened(path) as video:
+    with _open_video(path) as video:
         while skipped_to_next(video) is not None:
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
             if len(times) > MAX_FRAMES:
@@ -312,7 +312,7 @@ def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     return np.array(times)
 
 
-def _place(stamp: str, settings: Settings) -> Path:
+def _index_path(stamp: str, settings: Settings) -> Path:
     """Where the index of a video is kept."""
     # Another decoder may return other frames.
     key = repr((stamp, _VERSION, cv2.__version__))

@@ -35,12 +35,12 @@ def split_address(address: str) -> tuple[str, str]:
     return name, "/".join(parts)
 
 
-def seal(address: str, etag: str) -> str:
+def seal_address(address: str, etag: str) -> str:
     """An address with what the content is called that is meant."""
     return f"{address}#etag={etag.strip(chr(34))}"
 
 
-def unseal(sealed: str) -> tuple[str, str, str]:
+def unseal_address(sealed: str) -> tuple[str, str, str]:
     """Address, and how its content is known: ``etag`` or ``sha256`` and its value, or empty."""
     found = _SEAL.fullmatch(sealed)
     return (found[1], found[2], found[3]) if found else (sealed, "", "")

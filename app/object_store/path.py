@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from app.errors import NotFoundError
-from app.object_store.address import SCHEME, seal, split_address
+from app.object_store.address import SCHEME, seal_address, split_address
 from app.object_store.store import ObjectStore, Stored, open_configured, open_store
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class StoredPath:
     def sealed(self) -> str:
         """Address of the object with what its content is called: another content is not it."""
         assert self.stored is not None
-        return seal(str(self), self.stored.etag)
+        return seal_address(str(self), self.stored.etag)
 
     def __truediv__(self, inside: str) -> StoredPath:
         key = "/".join(filter(None, (self.key, inside.strip("/"))))

@@ -17,7 +17,12 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.pitch_size import PitchFrame, estimate_pitch
-from app.solving.tripod_pitch import PaintedFrame, TripodPitch, about_plan, find_tripod_pitch
+from app.solving.tripod_pitch import (
+    PaintedFrame,
+    TripodPitch,
+    find_tripod_pitch,
+    second_moment_about_plan,
+)
 
 WINDOW_PX = 20.0
 """At 960 wide, to either side that paint is sought: markings of another pitch lie far off."""
@@ -109,4 +114,6 @@ def share_tripod(
     shown = find_tripod_pitch(painted, ImageSize(width, height), pitch, policy)
     if shown is None:
         return None
-    return shown, [about_plan(frame.parameters, *shown.camera(frame)) for frame in painted]
+    return shown, [
+        second_moment_about_plan(frame.parameters, *shown.camera(frame)) for frame in painted
+    ]

@@ -39,7 +39,7 @@ from app.solving.jaccard import (
     unannotated_not_missing,
 )
 from app.solving.labels import find_suspects
-from app.solving.lone_frame import LoneFrame, lone_frame
+from app.solving.lone_frame import LoneFrame, estimate_lone_frame
 from app.solving.observations import Observations, observations_of_lines
 from app.solving.paint_camera import PaintProblem, solve_paint
 from app.solving.picture_camera import WIDTH, PictureProblem, estimate_picture, warp_of
@@ -50,7 +50,7 @@ from app.solving.resect import (
     ResectionProblem,
     measurement_count,
 )
-from app.solving.tripod_pitch import about_plan
+from app.solving.tripod_pitch import second_moment_about_plan
 
 MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""
@@ -199,7 +199,7 @@ def lone_frame_of(
     pitch = policy.fitted(pitch)
     observations = observations_of_lines(lines, pitch, size)
     parameters = problem.parameters(found.camera)
-    return lone_frame(problem, parameters, observations, pitch, policy, left_out)
+    return estimate_lone_frame(problem, parameters, observations, pitch, policy, left_out)
 
 
 def with_lone_covariance(found: Calibration, alone: LoneFrame | None) -> Calibration:
@@ -314,7 +314,7 @@ def calibrate_paint(
     pitch_covariance = found.pitch
     if reading.tripod is not None:
         camera, spread = map(np.array, reading.tripod)
-        known_together = about_plan(found.parameters, camera, spread.reshape(8, 8))
+        known_together = second_moment_about_plan(found.parameters, camera, spread.reshape(8, 8))
         pitch_covariance = known_together - found.covariance
     painted = replace(
         clicked,

@@ -112,7 +112,7 @@ class LoneFrame:
         return replace(pitch, length=length, width=width)
 
 
-def lone_frame(
+def estimate_lone_frame(
     problem: ResectionProblem,
     parameters: FloatArray,
     observations: Observations,
@@ -210,7 +210,7 @@ class _Frame:
             return _Fit(self, unknowns, unknowns - start, rows)
         # Without what pulls the camera aside besides: priors, and the scale of the loss.
         off = step - self._step(start, rows, PARAMETERS)
-        return _Fit(self, _inside(start + step, self.pitch), off, rows)
+        return _Fit(self, _clip_to_plausible(start + step, self.pitch), off, rows)
 
     def noise(self, rows: _Rows) -> FloatArray:
         """Covariance of the thirteen, shape (13, 13)."""
@@ -260,7 +260,7 @@ class _Frame:
             step = self._step(unknowns, rows)
             step /= max(1.0, float((np.abs(step[PARAMETERS:]) / LONGEST).max()))
             for share in HALVINGS:
-                to = _inside(unknowns + share * step, self.pitch)
+                to = _clip_to_plausible(unknowns + share * step, self.pitch)
                 there = self._rows(to)
                 lower = self._cost(to, there)
                 if lower < cost:
@@ -344,7 +344,7 @@ def _camera_jacobian(rows: _Rows) -> FloatArray:
     return carry
 
 
-def _inside(unknowns: FloatArray, pitch: Pitch) -> FloatArray:
+def _clip_to_plausible(unknowns: FloatArray, pitch: Pitch) -> FloatArray:
     """The same within what a pitch and a picture can be."""
     low = np.array([LENGTH_RANGE[0] - pitch.length, WIDTH_RANGE[0] - pitch.width])
     high = np.array([LENGTH_RANGE[1] - pitch.length, WIDTH_RANGE[1] - pitch.width])

@@ -95,7 +95,7 @@ def estimate_match_picture(
         raise DegenerateGeometryError(
             f"{len(seen)} frames show enough markings, a picture needs {MIN_FRAMES}"
         )
-    warp, pull, informations = _adjust(seen)
+    warp, pull, informations = _adjust_picture(seen)
     information = informations.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)
     aspect, right, down = sigmas_of_shared_numbers(pull, information, spent=1).tolist()
     return PictureEstimate(picture_of(warp, (aspect, right, down)), len(seen))
@@ -147,7 +147,7 @@ class _FittedFrame:
         return eliminate_own_numbers((pull, reduced), FRAME_SIGMA)
 
 
-def _adjust(seen: Sequence[_FittedFrame]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _adjust_picture(seen: Sequence[_FittedFrame]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The three numbers once they settle, and each frame's pull and information."""
     warp = np.zeros(3)
     for _ in range(_ROUNDS):

@@ -225,7 +225,7 @@ def guess_matches(places: Sequence[FramePlace | None]) -> list[int]:
     runs = _Runs([place for _, place in known])
     runs.join()
     run = {known[at][0]: number for number, at in enumerate(runs.firsts)}
-    return _filled(run, len(places))
+    return _fill_runs(run, len(places))
 
 
 class _Runs:
@@ -272,7 +272,7 @@ class _Runs:
         return self._equations.fit(slice(first, end)).cost
 
 
-def _filled(run: dict[int, int], count: int) -> list[int]:
+def _fill_runs(run: dict[int, int], count: int) -> list[int]:
     """Runs of all frames from those of first frames; without any, each frame is its own."""
     if not run:
         return list(range(count))

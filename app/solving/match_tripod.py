@@ -77,12 +77,12 @@ def readings_of_one_tripod(
         at = (view.size, policy.fitted(group.pitch))
         frames.setdefault(at, {})[number] = _MainFrame(frame, np.reshape(known, (8, 8)))
     for (size, pitch), some in frames.items():
-        for number, tripod in _shared(some, size, pitch, policy).items():
+        for number, tripod in _shared_cameras(some, size, pitch, policy).items():
             found[number] = replace(found[number], tripod=tripod)
     return found
 
 
-def _shared(
+def _shared_cameras(
     some: Mapping[int, _MainFrame], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
 ) -> dict[int, TripodCamera]:
     if len(some) < LEAST_FRAMES:

@@ -70,7 +70,9 @@ class PaintProblem:
         resection: ResectionProblem, first: FloatArray, covariance: FloatArray | None
     ) -> PaintProblem:
         """The problem of a start and its covariance."""
-        return PaintProblem(resection, first, None if covariance is None else _inverse(covariance))
+        return PaintProblem(
+            resection, first, None if covariance is None else _invert_covariance(covariance)
+        )
 
     @property
     def unit(self) -> float:
@@ -177,7 +179,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         return None
     parameters = problem.first
     for index in range(ROUNDS):
-        seen = offsets_of(problem, parameters, curve_points, sigmas, pitch)
+        seen = measure_offsets(problem, parameters, curve_points, sigmas, pitch)
         strict = index >= SOFT_ROUNDS
         try:
             moved = problem.step(parameters, seen, strict)
@@ -189,7 +191,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
         # The information of one exact place of paint is far above any start's.
         if strict and float(np.abs(seen.jacobian @ moved).max()) < SETTLED * sigmas.min():
             break
-    seen = offsets_of(problem, parameters, curve_points, sigmas, pitch)
+    seen = measure_offsets(problem, parameters, curve_points, sigmas, pitch)
     camera = problem.resection.camera(parameters)
     places = camera.on_ground(curve_points.pixels + np.array(camera.principal_point))
     noise = problem.noise(parameters, seen, np.nan_to_num(places), pitch)
@@ -203,7 +205,7 @@ def solve_paint(problem: PaintProblem, evidence: PaintEvidence, pitch: Pitch) ->
     return PaintCamera(parameters, noise.parameters, noise.pitch, error)
 
 
-def offsets_of(
+def measure_offsets(
     problem: PaintProblem,
     parameters: FloatArray,
     curve_points: CurvePoints,
@@ -229,7 +231,7 @@ def curve_points_of(evidence: PaintEvidence, size: ImageSize) -> tuple[CurvePoin
     return CurvePoints(pixels, table[:, 0].astype(np.int64), np.ones(len(table))), table[:, 3]
 
 
-def _inverse(covariance: FloatArray) -> FloatArray:
+def _invert_covariance(covariance: FloatArray) -> FloatArray:
     scale = np.sqrt(np.diag(covariance))
     inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
     return np.asarray(inverse / np.outer(scale, scale))

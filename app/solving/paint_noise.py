@@ -89,19 +89,19 @@ def marking_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
         sigmas: Standard deviation of each, pixels, shape (N,).
     """
     counts = np.bincount(marking)
-    weights: FloatArray = 1 / (1 + _shares(sigmas) * (counts[marking] - 1))
+    weights: FloatArray = 1 / (1 + _shares_in_common(sigmas) * (counts[marking] - 1))
     return weights
 
 
 def cautious_weights(marking: IntArray, sigmas: FloatArray) -> FloatArray:
     """``marking_weights`` with at least what the points of a marking share where covariances are told."""
     counts = np.bincount(marking)
-    shares = np.maximum(_shares(sigmas), LEAST_SHARE)
+    shares = np.maximum(_shares_in_common(sigmas), LEAST_SHARE)
     weights: FloatArray = 1 / (1 + shares * (counts[marking] - 1))
     return weights
 
 
-def _shares(sigmas: FloatArray) -> FloatArray:
+def _shares_in_common(sigmas: FloatArray) -> FloatArray:
     """What each point has in common with its marking, as a share of its variance, shape (N,)."""
     shares: FloatArray = SHARE + THIN_SHARE * np.minimum(sigmas / THIN_SIGMA_PX, 1.0) ** 2
     return shares
@@ -134,7 +134,7 @@ def paint_noise(
         return None
     weighted = rows * marking_weights(seen.marking, seen.sigmas)[:, None]
     bread = np.linalg.inv(weighted.T @ rows + known)
-    shares = np.maximum(_shares(seen.sigmas), max(noise.share, LEAST_SHARE))[:, None]
+    shares = np.maximum(_shares_in_common(seen.sigmas), max(noise.share, LEAST_SHARE))[:, None]
     sums = np.zeros((int(seen.marking.max()) + 1, rows.shape[1]))
     np.add.at(sums, seen.marking, np.sqrt(shares) * weighted)
     meat = ((1 - shares) * weighted).T @ weighted + sums.T @ sums
@@ -176,8 +176,8 @@ def painted_shift(
     """
     inside = INWARD_SIGMA_M * values[INWARD] * (marking != _MIDDLE)
     inside = inside + LINE_SIGMA_M * values[LINES][marking]
-    raised = CROWN_SIGMA_M * values[CROWN] * _raised(places, pitch)
-    return np.column_stack([inside[:, None] * _inward(places, marking, pitch), -raised])
+    raised = CROWN_SIGMA_M * values[CROWN] * _grass_height(places, pitch)
+    return np.column_stack([inside[:, None] * _inward_directions(places, marking, pitch), -raised])
 
 
 def shifted_offsets(offsets: FloatArray, jacobian: FloatArray, shift: FloatArray) -> FloatArray:
@@ -188,7 +188,7 @@ def shifted_offsets(offsets: FloatArray, jacobian: FloatArray, shift: FloatArray
         jacobian: Derivative of the marking's place along the normal, shape (N, 8).
         shift: ``painted_shift``, shape (N, 3).
     """
-    return np.asarray(offsets - (_by_place(jacobian) * shift).sum(axis=1))
+    return np.asarray(offsets - (_derivatives_by_place(jacobian) * shift).sum(axis=1))
 
 
 def pitch_terms(
@@ -214,9 +214,9 @@ def painted_terms(
             shape (N, 8).
         pitch: The pitch.
     """
-    by_place = _by_place(jacobian)
-    raised = _raised(places, pitch)
-    across = (by_place[:, :2] * _inward(places, marking, pitch)).sum(axis=1)
+    by_place = _derivatives_by_place(jacobian)
+    raised = _grass_height(places, pitch)
+    across = (by_place[:, :2] * _inward_directions(places, marking, pitch)).sum(axis=1)
     seen = np.unique(marking)
     return np.column_stack(
         [
@@ -235,15 +235,15 @@ def size_terms(marking: IntArray, jacobian: FloatArray, pitch: Pitch) -> FloatAr
     usual = Pitch()
     if (pitch.length, pitch.width) != (usual.length, usual.width):
         return np.zeros((len(marking), 2))
-    return PAINT_SIZE_SIGMA_M * _by_place(jacobian)[:, :2] * _size_moves()[marking]
+    return PAINT_SIZE_SIGMA_M * _derivatives_by_place(jacobian)[:, :2] * _size_moves()[marking]
 
 
-def _by_place(jacobian: FloatArray) -> FloatArray:
+def _derivatives_by_place(jacobian: FloatArray) -> FloatArray:
     """By the place on the pitch, shape (N, 3): a pitch that moves is a camera that moves back."""
     return -jacobian[:, X : Z + 1]
 
 
-def _raised(places: FloatArray, pitch: Pitch) -> FloatArray:
+def _grass_height(places: FloatArray, pitch: Pitch) -> FloatArray:
     """Height of the grass as a share of its crown, which runs along the middle, shape (N,)."""
     return np.asarray(np.maximum(1 - (2 * places[:, 1] / pitch.width) ** 2, 0.0))
 
@@ -261,7 +261,7 @@ def _size_moves() -> FloatArray:
     return np.asarray((moves[:, :2] + ends) / 2)
 
 
-def _inward(places: FloatArray, marking: IntArray, pitch: Pitch) -> FloatArray:
+def _inward_directions(places: FloatArray, marking: IntArray, pitch: Pitch) -> FloatArray:
     """Unit directions across the markings, into the area that each bounds, shape (N, 2)."""
     curves = pitch_curves(pitch)
     found = _STRAIGHT[marking]
@@ -271,7 +271,7 @@ def _inward(places: FloatArray, marking: IntArray, pitch: Pitch) -> FloatArray:
     return found
 
 
-def _direction(name: str) -> tuple[float, float]:
+def _inward_direction(name: str) -> tuple[float, float]:
     """Into the area that a straight marking bounds; along x for the middle line."""
     words = name.split(" ")
     if words[-1] in ("top", "bottom"):
@@ -281,4 +281,4 @@ def _direction(name: str) -> tuple[float, float]:
     return (-right if words[-1] == "main" else right), 0.0
 
 
-_STRAIGHT = np.array([_direction(name) for name in MARKINGS])
+_STRAIGHT = np.array([_inward_direction(name) for name in MARKINGS])

@@ -49,7 +49,7 @@ class _Linear:
         """Step of the first ``width`` unknowns; ``prior`` is their information, shape (11,)."""
         normal = (self.normal + np.diag(prior))[:width, :width]
         pull = (self.pull + prior * offset)[:width]
-        scale = _scale(normal)
+        scale = _normal_scale(normal)
         solved = np.linalg.solve(normal / np.outer(scale, scale), pull / scale)
         step: FloatArray = solved / scale
         return step
@@ -66,17 +66,17 @@ def find_picture(
         observations: What that camera was found from.
     """
     try:
-        return _find(problem, parameters, observations)
+        return _fit_picture(problem, parameters, observations)
     except np.linalg.LinAlgError:
         return None
 
 
-def _find(
+def _fit_picture(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations
 ) -> Picture | None:
     warp = np.zeros(3)
     floor = (MIN_CLICK_SIGMA_PX * problem.unit) ** 2
-    first = _linear(problem, parameters, observations, warp)
+    first = _linearize(problem, parameters, observations, warp)
     freedom = first.points - _WIDTH
     if freedom < 1:
         return None
@@ -103,12 +103,12 @@ def _find(
         if not np.isfinite(moved).all():
             return None
         parameters = problem.refine(undo_warp(problem, observations, warp), moved[None]).parameters
-        linear = _linear(problem, parameters, observations, warp)
+        linear = _linearize(problem, parameters, observations, warp)
         variance = max(linear.squares / (freedom + 1), floor)
     left = max(linear.squares, floor * freedom)
     ratio = (before - left) / left * freedom / 3
     prior[PARAMETERS:] = variance / PRIOR**2
-    sigma = np.sqrt(variance * np.diag(_inverse(linear.normal + np.diag(prior)))[PARAMETERS:])
+    sigma = np.sqrt(variance * np.diag(_invert_normal(linear.normal + np.diag(prior)))[PARAMETERS:])
     if ratio < BELIEVED or not _is_large(warp, sigma).any():
         return None
     stretch, x, y = warp.tolist()
@@ -123,7 +123,7 @@ def _is_large(warp: FloatArray, sigma: FloatArray) -> BoolArray:
     return large
 
 
-def _linear(
+def _linearize(
     problem: ResectionProblem, parameters: FloatArray, observations: Observations, warp: FloatArray
 ) -> _Linear:
     """The least-squares problem about a camera and a picture; points beyond an end are left out."""
@@ -158,7 +158,7 @@ def _linear(
     )
 
 
-def _scale(normal: FloatArray) -> FloatArray:
+def _normal_scale(normal: FloatArray) -> FloatArray:
     """Root of the diagonal of a normal matrix; LinAlgError where an unknown is in no equation."""
     scale: FloatArray = np.sqrt(np.diag(normal))
     if not scale.all():
@@ -166,7 +166,7 @@ def _scale(normal: FloatArray) -> FloatArray:
     return scale
 
 
-def _inverse(normal: FloatArray) -> FloatArray:
-    scale = _scale(normal)
+def _invert_normal(normal: FloatArray) -> FloatArray:
+    scale = _normal_scale(normal)
     inverse: FloatArray = np.linalg.inv(normal / np.outer(scale, scale)) / np.outer(scale, scale)
     return inverse

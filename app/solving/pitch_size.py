@@ -138,19 +138,19 @@ def estimate_pitch(
         raise DegenerateGeometryError(
             f"{len(seen)} frames show enough markings, the size of a pitch needs {least}"
         )
-    pitch, seen, _ = _adjust(pitch, seen)
+    pitch, seen, _ = _adjust_size(pitch, seen)
     # Labels are judged on the pitch as it is now: on one of the wrong size the touchlines look
     # mislabelled.
     costs = np.array([item.fit.cost / len(item.observations.pixels) for item in seen])
     fits = costs <= _MISFIT_SHARE * np.median(costs)
-    pitch, seen, shares = _adjust(
+    pitch, seen, shares = _adjust_size(
         pitch, [item for item, kept in zip(seen, fits, strict=True) if kept]
     )
-    if not one_match and _disagree(shares):
+    if not one_match and _frames_disagree(shares):
         raise DegenerateGeometryError(
             f"{len(seen)} frames show pitches of several sizes; import them with their matches"
         )
-    sigma = _sigmas(shares)
+    sigma = _sigmas_of_size(shares)
     heard = (_effective_frames(shares) >= MIN_VOICES) | _is_confirmed(shares)
     known = (sigma <= UNKNOWN_SIGMA_M) & heard & _is_inside(pitch)
     return PitchEstimate(
@@ -272,7 +272,7 @@ def size_moves(
     return moves
 
 
-def _adjust(
+def _adjust_size(
     pitch: Pitch, seen: Sequence[_FittedFrame]
 ) -> tuple[Pitch, list[_FittedFrame], list[Share]]:
     """Sizes and cameras adjusted together until the sizes settle."""
@@ -287,14 +287,14 @@ def _adjust(
     return pitch, list(seen), shares
 
 
-def _sigmas(shares: Sequence[Share]) -> FloatArray:
+def _sigmas_of_size(shares: Sequence[Share]) -> FloatArray:
     """Standard deviations of length and width, metres, shape (2,)."""
     pulls = np.array([pull for pull, _ in shares])
     information = np.sum([part for _, part in shares], axis=0)
     return sigmas_of_shared_numbers(pulls, information + np.eye(2) / _LOOSE_M**2, spent=2)
 
 
-def _disagree(shares: Sequence[Share]) -> bool:
+def _frames_disagree(shares: Sequence[Share]) -> bool:
     """Whether frames differ about length or width by more than chance makes frames of one pitch.
 
     A frame's gradient is zero but for chance, with its information as variance.

@@ -38,7 +38,7 @@ from app.solving.camera_positions import MAIN_MEAN, MAIN_SIGMA, is_main_position
 from app.solving.lone_frame import CROWN_SIGMA_M, INWARD_SIGMA_M, PAINT_SIZE_SIGMA_M
 from app.solving.many_frames import CERTAIN_SIGMAS
 from app.solving.observations import principal_point
-from app.solving.paint_camera import PaintProblem, offsets_of
+from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import (
     CROWN,
     INWARD,
@@ -219,7 +219,9 @@ class TripodPitch:
         return np.asarray(0.5 * (covariance + covariance.T))
 
 
-def about_plan(parameters: FloatArray, found: FloatArray, covariance: FloatArray) -> FloatArray:
+def second_moment_about_plan(
+    parameters: FloatArray, found: FloatArray, covariance: FloatArray
+) -> FloatArray:
     """Second moment of how far the true camera is from one on the plan, shape (8, 8).
 
     Args:
@@ -311,7 +313,7 @@ class _Frames:
 
     def seen(self, at: int) -> PaintOffsets:
         frame, known = self._frames[at], self._known
-        seen = offsets_of(
+        seen = measure_offsets(
             self._problem, self.parameters[at], frame.sightings, frame.sigmas, known.pitch
         )
         shift = painted_shift(self._grass[at], seen.marking, known.terms, known.pitch)
@@ -384,7 +386,7 @@ class _Frames:
         for _ in range(ROUNDS):
             parts = self.parts()
             alone = np.linalg.solve(parts.own, parts.own_right[..., None])[..., 0]
-            carried = _carried(parts)
+            carried = _moves_of_parameters(parts)
             below = parts.right - np.einsum("nis,ni->s", parts.between, alone)
             step = np.linalg.solve(_without_frames(parts, carried), below)
             self.parameters = self.parameters + alone - carried @ step
@@ -399,7 +401,7 @@ class _Frames:
             if np.abs(step[_PITCH]).max() < SETTLED:
                 break
         parts = self.parts()
-        covariance = np.linalg.inv(_without_frames(parts, _carried(parts)))
+        covariance = np.linalg.inv(_without_frames(parts, _moves_of_parameters(parts)))
         away = self.parameters[:, X : Z + 1] - self._known.position
         return replace(
             self._known,
@@ -408,7 +410,7 @@ class _Frames:
         )
 
 
-def _carried(parts: _Parts) -> FloatArray:
+def _moves_of_parameters(parts: _Parts) -> FloatArray:
     """How far each frame's parameters move with what is shared, shape (F, 8, SHARED)."""
     return np.asarray(np.linalg.solve(parts.own, parts.between))
 

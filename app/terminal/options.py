@@ -56,7 +56,7 @@ def parse_place(text: str) -> str:
     return text
 
 
-def acting() -> str:
+def current_actor() -> str:
     """Who acts in this command: the local user, or the script that `--actor` names."""
     return _ACTING.get()
 

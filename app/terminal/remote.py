@@ -70,14 +70,14 @@ VERSION = (
 def dataset_values(client: Client) -> list[dict[str, Any]]:
     """As ``datasets list`` has them."""
     items = client.get("datasets")["items"]
-    return [{**some(item, *DATASET), "policy": item["policy"]["name"]} for item in items]
+    return [{**select_values(item, *DATASET), "policy": item["policy"]["name"]} for item in items]
 
 
 def finding_values(client: Client, dataset: str) -> Iterator[dict[str, Any]]:
     """As ``findings`` has them."""
     names = ("kind", "group", "sentence", "view", "marking", "suggested", "number", "threshold")
     for item in client.pages("findings", dataset=dataset):
-        yield some(item, *names, "confidence", "fix", "dismissed")
+        yield select_values(item, *names, "confidence", "fix", "dismissed")
 
 
 def solve_values(
@@ -92,10 +92,10 @@ def solve_values(
     from app.features.solutions.service import outcome_sentence
 
     if policy is None:
-        job = client.post(f"datasets/{part(dataset)}/solve")
+        job = client.post(f"datasets/{quote_address_part(dataset)}/solve")
     else:
         job = set_policy(client, dataset, policy)
-    done = follow(client, job, progress)
+    done = follow_job(client, job, progress)
     result = done["result"]
     failed = [[item["group"], item["problem"]] for item in result["failures"]]
     values = {"total": result["groups"], "solved": result["solved"], "passed": result["passed"]}
@@ -110,10 +110,15 @@ def solve_values(
 
 def policy_values(client: Client, dataset: str) -> tuple[str, dict[str, Any]]:
     """The policy of a dataset as YAML, and as ``policy show`` has it."""
-    found = client.get(f"datasets/{part(dataset)}/policy")
+    found = client.get(f"datasets/{quote_address_part(dataset)}/policy")
     names = ("version", "name", "hash", "at", "actor")
-    history = [some({**item, "at": time_text(item["at"])}, *names) for item in found["history"]]
-    values = {**some(found, "dataset", "name", "hash", "version", "values"), "history": history}
+    history = [
+        select_values({**item, "at": time_text(item["at"])}, *names) for item in found["history"]
+    ]
+    values = {
+        **select_values(found, "dataset", "name", "hash", "version", "values"),
+        "history": history,
+    }
     return found["yaml"], values
 
 
@@ -121,7 +126,7 @@ def set_policy(client: Client, dataset: str, policy: Policy) -> dict[str, Any]:
     """Let the server judge a dataset by another policy; the job that solves what is stale then."""
     from app.features.policies.service import policy_to_yaml
 
-    place = f"datasets/{part(dataset)}/policy"
+    place = f"datasets/{quote_address_part(dataset)}/policy"
     present = client.get(place)
     return dict(client.put(place, {"yaml": policy_to_yaml(policy)}, if_match=present))
 
@@ -130,7 +135,7 @@ def policy_change(job: Mapping[str, Any]) -> dict[str, Any]:
     """What ``set_policy`` did, as ``policy set`` has it."""
     policy = job["result"]["policy"]
     return {
-        **some(policy, "dataset", "name", "hash", "version"),
+        **select_values(policy, "dataset", "name", "hash", "version"),
         "to_solve": job["result"]["to_solve"],
     }
 
@@ -139,7 +144,7 @@ def verdict_values(
     client: Client, dataset: str, body: Mapping[str, Any], *, dry_run: bool
 ) -> tuple[dict[str, Any], dict[str, Any] | None]:
     """What a verdict on all groups of a query would do on the server, and what it did."""
-    place = f"datasets/{part(dataset)}/verdicts"
+    place = f"datasets/{quote_address_part(dataset)}/verdicts"
     plan = client.send("POST", place, params={"dry_run": "true"}, json=dict(body)).json()
     return plan, None if dry_run else dict(client.post(place, dict(body)))
 
@@ -153,36 +158,36 @@ def freeze_values(
     dry_run: bool,
 ) -> dict[str, Any]:
     """Let the server freeze a dataset."""
-    place = f"datasets/{part(dataset)}/versions"
+    place = f"datasets/{quote_address_part(dataset)}/versions"
     if dry_run:
         return dict(client.post(place, {**request, "dry_run": True}))
-    job = follow(client, client.post(place, request), progress)
+    job = follow_job(client, client.post(place, request), progress)
     return _version_values(client.get(f"versions/{job['result']['version']}"))
 
 
 def version_values(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``versions`` has them."""
-    items = client.get(f"datasets/{part(dataset)}/versions")["items"]
+    items = client.get(f"datasets/{quote_address_part(dataset)}/versions")["items"]
     return [_version_values(item) for item in items]
 
 
 def _version_values(item: Mapping[str, Any]) -> dict[str, Any]:
     policy = {"policy": item["policy"]["name"], "policy_hash": item["policy"]["hash"]}
-    return some({**item, **policy, "created": time_text(item["created"])}, *VERSION)
+    return select_values({**item, **policy, "created": time_text(item["created"])}, *VERSION)
 
 
 def batch_values(client: Client, dataset: str) -> list[dict[str, Any]]:
     """As ``batch list`` has them."""
-    items = client.get(f"datasets/{part(dataset)}/batches")["items"]
+    items = client.get(f"datasets/{quote_address_part(dataset)}/batches")["items"]
     return [_batch_values(item) for item in items]
 
 
-def give_values(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
+def assign_batch(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
     """Let the server give a batch out; as ``batch give`` has it."""
-    return _batch_values(client.post(f"datasets/{part(dataset)}/batches", dict(body)))
+    return _batch_values(client.post(f"datasets/{quote_address_part(dataset)}/batches", dict(body)))
 
 
-def one_batch(client: Client, number: int) -> dict[str, Any]:
+def read_batch(client: Client, number: int) -> dict[str, Any]:
     """As ``batch show`` has it."""
     return _batch_values(client.get(f"batches/{number}"))
 
@@ -194,7 +199,7 @@ def close_batch(client: Client, number: int) -> dict[str, Any]:
 
 def choose_gold(client: Client, dataset: str, body: Mapping[str, Any]) -> dict[str, Any]:
     """Let the server make gold groups; as ``batch gold`` has it."""
-    return dict(client.post(f"datasets/{part(dataset)}/gold", dict(body)))
+    return dict(client.post(f"datasets/{quote_address_part(dataset)}/gold", dict(body)))
 
 
 def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str, Any]:
@@ -205,10 +210,10 @@ def change_gold(client: Client, number: int, gold_every: int | None) -> dict[str
 def _batch_values(item: Mapping[str, Any]) -> dict[str, Any]:
     last = None if item["last"] is None else time_text(item["last"])
     own = {"query": item["q"], "created": time_text(item["created"]), "last": last}
-    return some({**item, **own}, *BATCH)
+    return select_values({**item, **own}, *BATCH)
 
 
-def follow(client: Client, job: Mapping[str, Any], progress: ReportProgress) -> dict[str, Any]:
+def follow_job(client: Client, job: Mapping[str, Any], progress: ReportProgress) -> dict[str, Any]:
     """Wait for a job of the server and show how far it is; Ctrl+C leaves it running.
 
     Raises:
@@ -232,13 +237,13 @@ def time_text(text: str) -> str:
     return text.replace("Z", "+00:00")
 
 
-def part(name: str) -> str:
+def quote_address_part(name: str) -> str:
     """A name as one part of an address."""
     from urllib.parse import quote
 
     return quote(name, safe="")
 
 
-def some(values: Mapping[str, Any], *names: str) -> dict[str, Any]:
+def select_values(values: Mapping[str, Any], *names: str) -> dict[str, Any]:
     """The values of some names, in their order."""
     return {name: values[name] for name in names}

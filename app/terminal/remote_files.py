@@ -15,7 +15,7 @@ from app.formats.output import write_files_to_zip
 from app.formats.safe_path import resolve_inside
 from app.object_store.address import is_address
 from app.progress import ReportProgress
-from app.terminal.remote import IMPORT, follow, part, some, time_text
+from app.terminal.remote import IMPORT, follow_job, quote_address_part, select_values, time_text
 
 if TYPE_CHECKING:
     from app.features.predictions.reader import PredictionFiles
@@ -70,7 +70,7 @@ def import_values(
         "dry_run": dry_run,
     }
     try:
-        report = follow(client, client.post("imports", body), progress)["result"]
+        report = follow_job(client, client.post("imports", body), progress)["result"]
     except JobError as error:
         report, problem = error.job["result"], error.job["problem"]
         if not report or not problem:
@@ -81,8 +81,10 @@ def import_values(
 
 def _import_report_values(result: Mapping[str, Any]) -> dict[str, Any]:
     """As ``import`` has it; the server keeps names in their alphabetical order."""
-    skipped = [some(item, "file", "record", "field", "problem") for item in result["skipped"]]
-    return {**some(result, *IMPORT), "skipped": skipped}
+    skipped = [
+        select_values(item, "file", "record", "field", "problem") for item in result["skipped"]
+    ]
+    return {**select_values(result, *IMPORT), "skipped": skipped}
 
 
 def export_values(
@@ -93,22 +95,22 @@ def export_values(
     A text is an address in a store of the server, which writes it there.
     """
     if isinstance(out, str):
-        job = follow(client, client.post("exports", {**request, "to": out}), progress)
+        job = follow_job(client, client.post("exports", {**request, "to": out}), progress)
         report = _export_report_values(client.get(f"exports/{job['id']}"))
         return {"out": out, "format": request["format"], **report}
     from app.formats.output import output_tree
 
     with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
         job = client.post("exports", request)
-        follow(client, job, progress)
+        follow_job(client, job, progress)
         found = client.get(f"exports/{job['id']}")
         content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
-        unpack(content, folder)
+        unpack_zip(content, folder)
     return {"out": str(out), "format": request["format"], **_export_report_values(found)}
 
 
 def _export_report_values(found: Mapping[str, Any]) -> dict[str, Any]:
-    return some(found, "counts", "left_out", "missing_images")
+    return select_values(found, "counts", "left_out", "missing_images")
 
 
 def evaluate(
@@ -130,10 +132,10 @@ def evaluate(
     }
     found_sets = {name: found["id"] for name, found in sets.items()}
     body = {**vars(request.request), **found_sets, "version": request.version}
-    place = f"datasets/{part(dataset)}/evaluations"
-    job = follow(client, client.post(place, body), progress)
+    place = f"datasets/{quote_address_part(dataset)}/evaluations"
+    job = follow_job(client, client.post(place, body), progress)
     found = client.get(f"evaluations/{job['result']['evaluation']}")
-    dataset_id = client.get(f"datasets/{part(dataset)}")["id"]
+    dataset_id = client.get(f"datasets/{quote_address_part(dataset)}")["id"]
     names = {
         "predictions": "prediction_set_id",
         "careful": "careful_set_id",
@@ -156,14 +158,14 @@ def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> No
     place = f"evaluations/{values['id']}"
 
     def fetch(kind: str, name: str, file: Path) -> None:
-        client.download(f"{place}/{kind}/{part(name)}", file)
+        client.download(f"{place}/{kind}/{quote_address_part(name)}", file)
 
     write_parts(out, values, client.pages(f"{place}/frames"), fetch)
 
 
 def _prediction_set_values(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any]:
     """The set of a source: of its files, which are read once, or of its name."""
-    place = f"datasets/{part(dataset)}/predictions"
+    place = f"datasets/{quote_address_part(dataset)}/predictions"
     path = source.path
     if path is not None and not path.exists():
         known = {item["name"]: item for item in client.get(place)["items"]}
@@ -188,7 +190,7 @@ def send_file(client: Client, path: Path) -> str:
     from app.features.imports.upload_queries import upload_id
     from touchline.errors import NotFoundError as NotThere
 
-    with as_one_file(path) as file:
+    with zip_folder(path) as file:
         try:
             return str(client.get(f"uploads/{upload_id(file)}")["id"])
         except NotThere:
@@ -201,7 +203,7 @@ _CHUNK = 1 << 20
 
 
 @contextmanager
-def as_one_file(path: Path) -> Iterator[Path]:
+def zip_folder(path: Path) -> Iterator[Path]:
     """A file itself, or all files of a folder as a zip of its name, there until the block ends.
 
     The same files make the same zip, so that it is known again.
@@ -217,7 +219,7 @@ def as_one_file(path: Path) -> Iterator[Path]:
         yield packed
 
 
-def unpack(packed: Path, folder: Path) -> None:
+def unpack_zip(packed: Path, folder: Path) -> None:
     """All files of a zip into a folder.
 
     Raises:

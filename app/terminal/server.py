@@ -54,7 +54,7 @@ class ServerPlace:
 _SERVER: ContextVar[ServerPlace | None] = ContextVar("server", default=None)
 
 
-def work_at(url: str | None, token_file: Path | None, command: str | None) -> None:
+def work_against_server(url: str | None, token_file: Path | None, command: str | None) -> None:
     """Let this command work against a server; None: in a home on this machine.
 
     Raises:
@@ -81,14 +81,14 @@ def work_at(url: str | None, token_file: Path | None, command: str | None) -> No
     _SERVER.set(ServerPlace(url.rstrip("/"), token_file))
 
 
-def given_server() -> ServerPlace | None:
+def current_server() -> ServerPlace | None:
     """The server that this command works against; None: it works in a home."""
     return _SERVER.get()
 
 
 def require_home() -> None:
     """Raise InputError in what cannot be asked of the server that was named."""
-    if given_server() is not None:
+    if current_server() is not None:
         raise InputError(
             "this works in a home on this machine, not against a server",
             hint="Leave out --server (TOUCHLINE_SERVER).",
@@ -120,7 +120,7 @@ def read_token(path: Path) -> str:
 
 
 @contextmanager
-def connected(server: ServerPlace) -> Iterator[Client]:
+def connect_to_server(server: ServerPlace) -> Iterator[Client]:
     """A connection to a server that was looked at: it is there, of this version, and knows us.
 
     Raises:

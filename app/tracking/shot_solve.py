@@ -42,7 +42,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.camera_positions import MAIN_MEAN, MAIN_SIGMA, is_main_position
-from app.solving.paint_camera import PaintProblem, offsets_of
+from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import (
     TERMS,
     PaintOffsets,
@@ -58,9 +58,9 @@ from app.solving.tripod_pitch import (
     KAPPA_SLOPE_SIGMA,
     PaintedFrame,
     TripodPitch,
-    about_plan,
     find_tripod_pitch,
     grass_of,
+    second_moment_about_plan,
 )
 from app.tracking.follow import LOST, TRACKED, TrackedFrame
 from app.tracking.motion import AIM, FAR_M, BackgroundMatches, rotate_camera
@@ -130,7 +130,7 @@ def solve_shot(
         # What the background carries, or somebody drew, is known as on the plan.
         known = dict(enumerate(shot.covariances())) | known
     about = [
-        about_plan(shot.parameters[place], on_shown.parameters[place], known[place])
+        second_moment_about_plan(shot.parameters[place], on_shown.parameters[place], known[place])
         for place in range(len(chosen))
     ]
     return SolvedShot(
@@ -265,7 +265,7 @@ class _Shot:
         sight = self._sights[place]
         if sight is None:
             return None
-        seen = offsets_of(
+        seen = measure_offsets(
             self._problem, self.parameters[place], sight.sightings, sight.sigmas, self._pitch
         )
         shift = self._shifts.get(place)

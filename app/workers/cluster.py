@@ -132,7 +132,7 @@ def read_place(address: str, keys: Path | None) -> SchedulerPlace:
     return SchedulerPlace(f"tls://{parts.netloc}", keys)
 
 
-def build() -> dict[str, str]:
+def software_versions() -> dict[str, str]:
     """What a process computes with; two that are equal give the same bits."""
     python = ".".join(platform.python_version_tuple()[:2])
     libraries = {name: version(name) for name in _NUMBERS}
@@ -151,7 +151,7 @@ def carry_out(wanted: dict[str, str], work: Callable[..., R], arguments: tuple[A
     Raises:
         ClusterError: It is of another version.
     """
-    require_same(wanted, build(), platform.node())
+    require_same(wanted, software_versions(), platform.node())
     return work(*arguments)
 
 
@@ -180,7 +180,7 @@ class Cluster(Executor):
     """
 
     def __init__(self, place: SchedulerPlace):
-        self._place, self._build = place, build()
+        self._place, self._build = place, software_versions()
         self._under_way: dict[Future[Any], _SentTask] = {}
         self._lock = threading.Lock()
         self._ended, self._lost = threading.Event(), threading.Event()
@@ -316,7 +316,7 @@ class Cluster(Executor):
         client = _connect_client(self._place)
         try:
             client.wait_for_workers(1, timeout=_WORKERS_S)
-            found = client.run(build)
+            found = client.run(software_versions)
             for where, one in found.items():
                 require_same(self._build, one, where)
         except ClusterError:
@@ -354,7 +354,7 @@ def _count_workers(client: Any) -> int:
 def _connect_client(place: SchedulerPlace) -> Any:
     from distributed import Client
 
-    hush()
+    silence_dask()
     try:
         return Client(
             place.address, security=place.security(), timeout=_CONNECT_S, set_as_default=False
@@ -367,7 +367,7 @@ def _connect_client(place: SchedulerPlace) -> Any:
         ) from error
 
 
-def hush() -> None:
+def silence_dask() -> None:
     """Let Dask's own log be: what went wrong is said here, in one sentence."""
     for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from app.errors import ClusterError
-from app.workers.cluster import SchedulerPlace, hush
+from app.workers.cluster import SchedulerPlace, silence_dask
 
 AGAIN_S = 2.0
 """Seconds until a worker whose scheduler has gone looks for it again."""
@@ -55,7 +55,7 @@ def _run_event_loop(program: Coroutine[Any, Any, None]) -> None:
     import dask
     import distributed.scheduler  # noqa: F401  # so that its log is known
 
-    hush()
+    silence_dask()
     with dask.config.set(_NO_PAGES):
         asyncio.run(program)
 

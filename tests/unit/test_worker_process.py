@@ -33,7 +33,7 @@ from app.worker_process import (
     WorkerEnded,
     WorkerLimits,
     WorkerProcess,
-    abandon,
+    kill_executor,
 )
 from tests.waiting import SECONDS
 
@@ -326,7 +326,7 @@ class TestAbandon:
         while not (tmp_path / "mark").exists() and time.monotonic() < end:
             time.sleep(0.05)
         time.sleep(0.2)
-        abandon(executor)
+        kill_executor(executor)
         try:
             manager.join(SECONDS / 2)
             assert not manager.is_alive()

@@ -102,7 +102,7 @@ def run_sqlite_statement(cursor: Any, statement: str, *, new: bool) -> str:
     if statement.startswith(f"CREATE INDEX {SCAN} "):
         return _NOTHING
     if found := _TRIGGER.fullmatch(statement):
-        cursor.execute(trigger(**found.groupdict()))
+        cursor.execute(trigger_statements(**found.groupdict()))
         return _NOTHING
     if found := _DROP.fullmatch(statement):
         # The trigger goes with its function.
@@ -110,7 +110,7 @@ def run_sqlite_statement(cursor: Any, statement: str, *, new: bool) -> str:
     return statement
 
 
-def trigger(
+def trigger_statements(
     name: str,
     moment: str,
     verb: str,

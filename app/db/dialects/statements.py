@@ -75,7 +75,7 @@ class _Values(FunctionElement[Any]):
     inherit_cache = True
 
 
-class member(FunctionElement[str]):  # noqa: N801 - written like SQLAlchemy's functions
+class json_member(FunctionElement[str]):  # noqa: N801 - written like SQLAlchemy's functions
     """The text under a name in a JSON object in a text: ``member(column, "name")``."""
 
     inherit_cache = True
@@ -85,7 +85,7 @@ class member(FunctionElement[str]):  # noqa: N801 - written like SQLAlchemy's fu
         super().__init__(column, f"$.{name}")
 
 
-class larger(FunctionElement[Any]):  # noqa: N801 - written like SQLAlchemy's functions
+class larger_of(FunctionElement[Any]):  # noqa: N801 - written like SQLAlchemy's functions
     """The larger of two values that are there."""
 
     inherit_cache = True
@@ -144,7 +144,7 @@ def _compile_values(element: Any, compiler: Any, **kw: Any) -> str:
     return f"LATERAL (SELECT pair.value FROM jsonb_each_text(CAST({json} AS JSONB)) AS pair)"
 
 
-@compiles(member, "postgresql")
+@compiles(json_member, "postgresql")
 def _compile_member(element: Any, compiler: Any, **kw: Any) -> str:
     column, path = element.clauses
     column, path = compiler.process(column, **kw), compiler.process(path, **kw)
@@ -159,9 +159,9 @@ def _compile_as(kind: type[ClauseElement], form: str, *engine: str) -> None:
         return form.format(compiler.process(element.clauses, **kw))
 
 
-_compile_as(member, "json_extract({})")
-_compile_as(larger, "max({})")
-_compile_as(larger, "greatest({})", "postgresql")
+_compile_as(json_member, "json_extract({})")
+_compile_as(larger_of, "max({})")
+_compile_as(larger_of, "greatest({})", "postgresql")
 _compile_as(any_of, "min({})")
 _compile_as(any_of, "(array_agg({}))[1]", "postgresql")
 _compile_as(pairs_of, "json_group_array(json_array({}))")

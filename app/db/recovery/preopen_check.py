@@ -14,7 +14,7 @@ from urllib.parse import quote
 import pysqlite3.dbapi2
 
 from app.config import Settings
-from app.db.engine import make_engine, reported
+from app.db.engine import make_engine, report_storage_errors
 from app.db.home import ASIDE, KEYS
 from app.db.recovery.anchor import read_anchor, require_own_database
 from app.db.recovery.wal import DatabaseHeader, WriteAheadLog, read_header, read_log
@@ -89,7 +89,7 @@ def _require_log_end_of_anchor(settings: Settings) -> None:
     url = f"sqlite+pysqlite:///file:{file}?mode=ro&uri=true"
     engine = make_engine(settings.model_copy(update={"database_url": url}))
     try:
-        with reported(settings):
+        with report_storage_errors(settings):
             require_own_database(engine, settings)
     finally:
         engine.dispose()

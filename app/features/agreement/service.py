@@ -14,7 +14,7 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError, ReviewError, StorageError
-from app.evaluation.agreement_limits import AgreementLimits, Disagreement, disagreements
+from app.evaluation.agreement_limits import AgreementLimits, Disagreement, find_disagreements
 from app.evaluation.annotation_distance import GroupDistance, compare_annotations
 from app.features.agreement.queries import (
     AGREED,
@@ -116,7 +116,7 @@ def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Com
                 pointer="/with",
             )
         verdicts = (_verdict_of(first), _verdict_of(second))
-        pairs.append(AnnotationPair(a, b, distance, disagreements(distance, verdicts, limits)))
+        pairs.append(AnnotationPair(a, b, distance, find_disagreements(distance, verdicts, limits)))
     pairs.sort(key=lambda pair: (-_largest_weight(pair.disagreements), -len(pair.disagreements)))
     return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from app.db.json_columns import unpack
 from app.db.store import Store
-from app.evaluation.agreement_limits import MEASURES, AgreementLimits, Spread, spreads
+from app.evaluation.agreement_limits import MEASURES, AgreementLimits, Spread, measure_spreads
 from app.evaluation.annotation_distance import GroupDistance
 from app.evaluation.rater_agreement import (
     Coefficient,
@@ -183,7 +183,7 @@ def _agreement_of_two(
     both = [(one[two[0]], one[two[1]]) for one in verdicts]
     both = [(a, b) for a, b in both if a is not None and b is not None]
     kappa = cohen_kappa([a for a, _ in both], [b for _, b in both])
-    return PeopleAgreement(two, len(found), kappa, spreads(pair.distance for pair in found))
+    return PeopleAgreement(two, len(found), kappa, measure_spreads(pair.distance for pair in found))
 
 
 def _agreement_of_all(people: Sequence[str], read: Sequence[_ComparedGroup]) -> PeopleAgreement:
@@ -191,7 +191,7 @@ def _agreement_of_all(people: Sequence[str], read: Sequence[_ComparedGroup]) -> 
     verdicts = [values for values in verdicts if len(values) > 1]
     equal = len({len(values) for values in verdicts}) == 1
     kappa = fleiss_kappa(verdicts) if equal else None
-    return PeopleAgreement(tuple(people), len(read), kappa, spreads(_group_distances(read)))
+    return PeopleAgreement(tuple(people), len(read), kappa, measure_spreads(_group_distances(read)))
 
 
 def _group_distances(read: Sequence[_ComparedGroup]) -> Iterator[GroupDistance]:
@@ -213,7 +213,7 @@ def _group_agreement(one: _ComparedGroup) -> GroupAgreement:
         tuple(one.verdicts.values()),
         row.worst,
         row.disagreements,
-        spreads(pair.distance for pair in one.pairs),
+        measure_spreads(pair.distance for pair in one.pairs),
         row.outcome,
         None if row.take_id is None else people[row.take_id],
         row.decided,

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import GoldStart
-from app.terminal.options import Json, acting
+from app.terminal.options import Json, current_actor
 from app.terminal.remote import BATCH
-from app.terminal.server import connected, given_server, opened_store
+from app.terminal.server import connect_to_server, current_server, opened_store
 from app.terminal.terminal import print_rows, print_values
 
 commands = typer.Typer(help="Groups that are assigned to people.", no_args_is_help=True)
@@ -22,11 +22,11 @@ Number = Annotated[int, typer.Argument(help="Number of the batch.", min=1)]
 @commands.command("list")
 def list_(dataset: Dataset, json_: Json = False) -> None:
     """List the batches of a dataset: open ones and those that are due first come first."""
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal.remote import batch_values
 
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             found = batch_values(client, dataset)
     else:
         from app.features.batches.service import list_batches
@@ -71,30 +71,30 @@ def give(
         "gold_every": gold_every,
         "skip_given": not again,
     }
-    server = given_server()
+    server = current_server()
     if server is not None:
-        from app.terminal.remote import give_values
+        from app.terminal.remote import assign_batch
 
         body = {**fields, "q": query, "due": None if day is None else day.isoformat()}
-        with connected(server) as client:
-            print_values(give_values(client, dataset, body), json_)
+        with connect_to_server(server) as client:
+            print_values(assign_batch(client, dataset, body), json_)
         return
     from app.features.batches.service import NewBatch, make_batch
 
     with opened_store() as store:
         new = NewBatch(query=query, due=day, **fields)
-        print_values(_values(make_batch(store, dataset, new, actor=acting())), json_)
+        print_values(_values(make_batch(store, dataset, new, actor=current_actor())), json_)
 
 
 @commands.command()
 def show(batch: Number, json_: Json = False) -> None:
     """Show how far a batch is."""
-    server = given_server()
+    server = current_server()
     if server is not None:
-        from app.terminal.remote import one_batch
+        from app.terminal.remote import read_batch
 
-        with connected(server) as client:
-            print_values(one_batch(client, batch), json_)
+        with connect_to_server(server) as client:
+            print_values(read_batch(client, batch), json_)
         return
     from app.features.batches.service import get_batch
 
@@ -121,19 +121,19 @@ def gold(
 
     if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
         raise typer.BadParameter("say sample or version", param_hint="--from")
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal.remote import choose_gold
 
         body = {"source": source, "version": version, "q": query, "size": size, "start": start}
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             print_values(choose_gold(client, dataset, body), json_)
         return
     from app.features.independent_annotations.known_truth import GoldChoice, mark_known
 
     choice = GoldChoice(TruthSource(source), version, query, size, start)
     with opened_store() as store:
-        found = mark_known(store, dataset, choice, actor=acting())
+        found = mark_known(store, dataset, choice, actor=current_actor())
     print_values({"groups": [*found.groups], "left_out": found.left_out}, json_)
 
 
@@ -147,35 +147,39 @@ def change(
     """Change how many gold groups a batch mixes in, also while people work on it."""
     if (gold_every is None) != no_gold:
         raise typer.BadParameter("say how many, or --no-gold", param_hint="--gold-every")
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal.remote import change_gold
 
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             print_values(change_gold(client, batch, gold_every), json_)
         return
     from app.features.batches.service import change_batch
 
     with opened_store() as store:
-        found = change_batch(store, batch, actor=acting(), gold_every=gold_every, no_gold=no_gold)
+        found = change_batch(
+            store, batch, actor=current_actor(), gold_every=gold_every, no_gold=no_gold
+        )
     print_values(_values(found), json_)
 
 
 @commands.command()
 def close(batch: Number, json_: Json = False) -> None:
     """Give nothing more out of a batch; what was said of its groups stays."""
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal.remote import close_batch
 
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             print_values(close_batch(client, batch), json_)
         return
     from app.features.batches.queries import CLOSED
     from app.features.batches.service import change_batch
 
     with opened_store() as store:
-        print_values(_values(change_batch(store, batch, actor=acting(), state=CLOSED)), json_)
+        print_values(
+            _values(change_batch(store, batch, actor=current_actor(), state=CLOSED)), json_
+        )
 
 
 def _values(batch: Any) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from app.db.check import Check, compared
+from app.db.check import Check, compare_records
 from app.db.dialects.dialect import dialect_in
 from app.db.json_columns import as_written
 from app.db.log import Entry, LogEntry, append, entries_of_kinds
@@ -336,7 +336,7 @@ def _compare_with_log(session: Session, restore: str) -> Check:
     present = all_threads(session)
     keys = sorted(logged.keys() | present.keys())
     apart = [str(key) for key in keys if logged.get(key) != present.get(key)]
-    return compared("threads", f"{len(present):,}, as the log says", apart, WRONG, restore)
+    return compare_records("threads", f"{len(present):,}, as the log says", apart, WRONG, restore)
 
 
 def logged_threads(entries: Iterable[LogEntry]) -> dict[int, ThreadRecord]:

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from app.terminal.options import Json, acting
+from app.terminal.options import Json, current_actor
 from app.terminal.remote import DATASET
-from app.terminal.server import ServerPlace, connected, given_server, opened_store
+from app.terminal.server import ServerPlace, connect_to_server, current_server, opened_store
 from app.terminal.terminal import print_json, print_values, say
 
 commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
@@ -17,7 +17,7 @@ commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
 @commands.command("list")
 def list_(json_: Json = False) -> None:
     """List every dataset with its progress."""
-    server = given_server()
+    server = current_server()
     values = _read_local_datasets() if server is None else _read_remote_datasets(server)
     if json_:
         print_json(values)
@@ -43,7 +43,7 @@ def _read_local_datasets() -> list[dict[str, Any]]:
 def _read_remote_datasets(server: ServerPlace) -> list[dict[str, Any]]:
     from app.terminal.remote import dataset_values
 
-    with connected(server) as client:
+    with connect_to_server(server) as client:
         return dataset_values(client)
 
 
@@ -63,7 +63,7 @@ def delete(
     with opened_store() as store:
         contents = read_contents(store, name)
         typed = contents.name if yes else _ask_for_name(contents.name, contents.counts)
-        contents = delete_dataset(store, contents.id, confirm=typed, actor=acting())
+        contents = delete_dataset(store, contents.id, confirm=typed, actor=current_actor())
     print_values({"deleted": contents.name, **contents.counts}, json_)
 
 

@@ -24,14 +24,14 @@ from app.terminal.options import (
     POLICY_OR_FILE,
     Dataset,
     Json,
-    acting,
+    current_actor,
     parse_cameras,
     parse_frame_offset,
     parse_place,
     parse_size,
     read_settings,
 )
-from app.terminal.server import connected, given_server, opened_store
+from app.terminal.server import connect_to_server, current_server, opened_store
 from app.terminal.terminal import print_error, print_export, print_import, say, show_progress
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def import_(
     if len(paths) > 1:
         raise typer.BadParameter(f"{format_} is read from one place: name one PATH")
     path = paths[0]
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote_files
 
@@ -145,7 +145,7 @@ def import_(
             **({"grouping": group_by} if group_by else {}),
             **({} if propose else {"propose": False}),
         }
-        with connected(server) as client, show_progress("Importing") as progress:
+        with connect_to_server(server) as client, show_progress("Importing") as progress:
             values, nothing = remote_files.import_values(
                 client, dataset, format_, path if is_address(path) else Path(path), options,
                 lines=lines, frames=frames, policy=policy or _usual_policy(format_),
@@ -178,7 +178,7 @@ def import_(
     with opened_store(settings) as store, show_progress("Importing") as progress:
         imported = import_source(
             store, dataset, source, settings, progress,
-            actor=acting(), dry_run=dry_run, policy=chosen,
+            actor=current_actor(), dry_run=dry_run, policy=chosen,
         )  # fmt: skip
     print_import(imported.values(), json_)
     if not imported.imported_anything:
@@ -244,14 +244,14 @@ def export(
         "views": views,
         "version": version,
     }
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote_files
 
         if images == "link":
             raise typer.BadParameter("a server cannot link to frames here; choose copy or none")
         request = {"dataset": dataset, "format": format_, "all": everything, **options}
-        with connected(server) as client, show_progress("Exporting") as progress:
+        with connect_to_server(server) as client, show_progress("Exporting") as progress:
             sent_to = out if is_address(out) else Path(out)
             values = remote_files.export_values(client, sent_to, request, progress)
         print_export(values, json_)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from app.db.database_worker import Caller
-from app.db.home import DAY, clear, last_written
+from app.db.home import DAY, delete_path, last_written
 from app.db.json_columns import Json
 from app.db.session import now
 from app.db.store import Store
@@ -192,7 +192,7 @@ class ExportFolder:
 
     def _delete_partial_files(self, name: str) -> None:
         for path in self.folder.glob(f".{name}.*{PARTIAL}"):
-            clear(path)
+            delete_path(path)
 
     def _record_path(self, name: str) -> Path:
         return self.folder / f"{name}.json"

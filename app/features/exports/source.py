@@ -30,7 +30,7 @@ from app.formats.frame_names import (
 from app.formats.safe_path import resolve_inside
 from app.media.files import media_facts, picture_header
 from app.media.frames import SentPicture
-from app.object_store.address import is_address, unseal
+from app.object_store.address import is_address, unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.policy import Policy
@@ -329,7 +329,7 @@ class ExportImages:
         if facts:
             self.media.append({"group": group.key, "view": view.key, **facts})
         elif is_address(media.path):
-            _, kind, value = unseal(media.path)
+            _, kind, value = unseal_address(media.path)
             self.media.append(
                 {"group": group.key, "view": view.key, **({kind: value} if kind else {})}
             )

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import Select, func, insert, select
 
 from app.canonical import canonical
-from app.db.dialects.statements import larger
+from app.db.dialects.statements import larger_of
 from app.db.json_columns import pack
 from app.db.session import Session, UsedIdModel
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
@@ -108,7 +108,7 @@ def _last_id_statement(model: Any) -> Select[Any]:
     table, used_id = model.__table__, UsedIdModel.__table__
     newest = select(func.coalesce(func.max(table.c.id), 0)).scalar_subquery()
     used = select(used_id.c.id).where(used_id.c.table == table.name)
-    return select(larger(newest, func.coalesce(used.scalar_subquery(), 0)))
+    return select(larger_of(newest, func.coalesce(used.scalar_subquery(), 0)))
 
 
 @dataclass

@@ -22,7 +22,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from app.config import Settings
-from app.db.home import PART, clear
+from app.db.home import PART, delete_path
 from app.db.locks import require_lock
 from app.db.session import now
 from app.durable import replace_file, sync
@@ -405,7 +405,7 @@ class UploadWriter:
         """Leave nothing behind."""
         with suppress(OSError):
             self._file.close()
-        clear(self._folder)
+        delete_path(self._folder)
 
 
 def require_size(settings: Settings, size: int) -> None:
@@ -439,7 +439,7 @@ def _remove_folder(folder: Path) -> None:
     aside = folder.with_name(f"{uuid.uuid4().hex}{PART}")
     with suppress(FileNotFoundError):
         folder.rename(aside)
-    clear(aside)
+    delete_path(aside)
 
 
 def is_full_disk(error: OSError) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 
-from app.db.check import Check, compare_with_log, compared
+from app.db.check import Check, compare_records, compare_with_log
 from app.db.dialects.dialect import dialect_in
 from app.db.log import entries_of_kinds, newest_entry
 from app.db.session import Session
@@ -150,7 +150,7 @@ def _check_digests(session: Session) -> Check:
         if (present, group.inputs_hash) != (views, hashed):
             apart.append(f"group {group.id}")
     whole = f"of {count:,} groups and cameras, each matching its annotations"
-    return compared("digests", whole, apart, "not of what was said", REBUILD)
+    return compare_records("digests", whole, apart, "not of what was said", REBUILD)
 
 
 def _check_queue(session: Session, mend: str) -> Check:
@@ -161,7 +161,7 @@ def _check_queue(session: Session, mend: str) -> Check:
         return Check("queue", False, error.message, mend)
     whole = f"{count:,} rows, as groups, verdicts and solutions say"
     wrong = "not as groups, verdicts and solutions say"
-    return compared("queue", whole, [str(number) for number in apart], wrong, mend)
+    return compare_records("queue", whole, [str(number) for number in apart], wrong, mend)
 
 
 def _check_solutions(store: Store) -> list[Check]:

@@ -15,7 +15,7 @@ import pysqlite3.dbapi2
 from app.config import Settings
 from app.db.check import Check
 from app.db.dialects.sqlite import MIN_SQLITE
-from app.db.home import leftovers, make_home, open_to_others
+from app.db.home import find_leftovers, make_home, open_to_others
 from app.db.log import entries_after, last_time
 from app.db.recovery.anchor import read_anchor
 from app.db.session import Session, text_of
@@ -240,7 +240,7 @@ def _check_clock(session: Session) -> Check:
 
 
 def _check_leftovers(settings: Settings) -> Check:
-    found = [str(path.relative_to(settings.home)) for path in leftovers(settings)]
+    found = [str(path.relative_to(settings.home)) for path in find_leftovers(settings)]
     if found:
         sentence = f"{len(found):,} half-written files are left: {found[0]}"
         return Check(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.db.check import Check, compare_with_log, compared
+from app.db.check import Check, compare_records, compare_with_log
 from app.db.log import LogEntry, entries_of_kinds
 from app.db.session import Session
 from app.errors import StorageError
@@ -199,7 +199,7 @@ def _count_damaged(items: Iterable[tuple[str, bool]]) -> tuple[int, list[str]]:
 
 
 def _check_written_records(name: str, count: int, apart: Sequence[str], restore: str) -> Check:
-    return compared(name, f"{count:,}, each as it was written", apart, WRONG, restore)
+    return compare_records(name, f"{count:,}, each as it was written", apart, WRONG, restore)
 
 
 def _differing_solutions(session: Session, rows: Sequence[Any], damaged: Set[str]) -> Iterator[str]:

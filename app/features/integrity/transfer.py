@@ -29,7 +29,7 @@ from sqlalchemy import (
 
 from app.config import Settings
 from app.db.dialects.dialect import WRITE, Dialect, dialect_in, dialect_of
-from app.db.engine import make_engine, reported
+from app.db.engine import make_engine, report_storage_errors
 from app.db.home import make_file
 from app.db.locks import database_alone, server_lock
 from app.db.log import verify_chain
@@ -207,7 +207,7 @@ def transfer_database(
             make_file(target.database_file)
         engine = make_engine(target)
         held.callback(engine.dispose)
-        held.enter_context(reported(target))
+        held.enter_context(report_storage_errors(target))
         # Before the source is read: what goes wrong in there is told as the source's.
         dialect.require_promises(engine)
         with store.read() as session:

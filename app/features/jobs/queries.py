@@ -11,7 +11,7 @@ from sqlalchemy import Index, case, delete, false, func, insert, select, update
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.canonical import canonical
-from app.db.dialects.statements import member
+from app.db.dialects.statements import json_member
 from app.db.json_columns import Json, parse
 from app.db.session import Base, Session, now, text_of
 from app.features.datasets.tables import DatasetModel
@@ -254,7 +254,7 @@ def _job_from_row(row: Any) -> Job:
 _TO_BE = case(
     (
         (JobModel.kind == "import") & JobModel.dataset_id.is_(None),
-        member(JobModel.request, "dataset"),
+        json_member(JobModel.request, "dataset"),
     )
 )
 _SELECT = select(

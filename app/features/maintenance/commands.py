@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from app.terminal.options import Json, acting
+from app.terminal.options import Json, current_actor
 from app.terminal.server import opened_store
 from app.terminal.terminal import print_values
 
@@ -40,9 +40,9 @@ def maintenance(
     begin, end = _parse_time(starts, "--starts"), _parse_time(until, "--until")
     with opened_store() as store:
         if clear:
-            clear_banner(store, actor=acting())
+            clear_banner(store, actor=current_actor())
         elif text is not None:
-            set_banner(store, text, starts=begin, until=end, actor=acting())
+            set_banner(store, text, starts=begin, until=end, actor=current_actor())
         banner = read_banner(store)
     print_values(vars(banner) if banner else {"text": None}, json_)
 

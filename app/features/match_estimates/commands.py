@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.plural import plural
-from app.terminal.options import Dataset, Json, Size, Workers, acting
+from app.terminal.options import Dataset, Json, Size, Workers, current_actor
 from app.terminal.server import opened_store, opened_to_solve
 from app.terminal.terminal import print_json, print_rows, print_values, say
 
@@ -94,7 +94,9 @@ def _estimate_pitches_of_dataset(
         if not wanted:
             return found
         with store.write() as session:
-            return change_pitches(session, dataset, wanted, if_match=found.etag, actor=acting())
+            return change_pitches(
+                session, dataset, wanted, if_match=found.etag, actor=current_actor()
+            )
 
 
 def _print_pitches(found: DatasetPitches, match: str | None, json_: bool) -> None:
@@ -196,7 +198,7 @@ def _pictures_of_dataset(
         changed = 0
         if wanted:
             with store.write() as session:
-                changed = change_pictures(session, dataset, wanted, actor=acting())
+                changed = change_pictures(session, dataset, wanted, actor=current_actor())
     if json_:
         print_json([{**_picture_values(item), "changed": item.match in wanted} for item in chosen])
         return
@@ -265,13 +267,13 @@ def positions(
         chosen = None if match is None else [match]
         with opened_to_solve("Estimating", workers) as (store, executor, progress):
             found = share_positions(
-                store, dataset, chosen, actor=acting(), executor=executor, progress=progress
+                store, dataset, chosen, actor=current_actor(), executor=executor, progress=progress
             )
     else:
         with opened_store() as store:
             if undo:
                 with store.write() as session:
-                    take_back_positions(session, dataset, match, actor=acting())
+                    take_back_positions(session, dataset, match, actor=current_actor())
             found = get_positions(store, dataset)
     print_sentences(filter_by_match(found.items, match), json_)
 
@@ -300,9 +302,9 @@ def noise(
     with opened_store() as store:
         if alike:
             with store.write() as session:
-                take_noise_back(session, dataset, actor=acting())
+                take_noise_back(session, dataset, actor=current_actor())
         found = read_noise(store, dataset)
-        policy = apply_noise(store, found, actor=acting()).policy if apply else None
+        policy = apply_noise(store, found, actor=current_actor()).policy if apply else None
     if json_:
         applied = None if policy is None else {"name": policy.name, "hash": policy.hash}
         advice = [{**asdict(item), "agrees": item.agrees} for item in found.advice]
@@ -382,11 +384,11 @@ def rig(
         raise typer.BadParameter("accept a rig or take it back, one at a time")
     with opened_store() as store:
         if undo:
-            print_values({"taken_back": take_back(store, dataset, actor=acting())}, json_)
+            print_values({"taken_back": take_back(store, dataset, actor=current_actor())}, json_)
             return
         proposed = propose_adjustment(store, dataset, lines)
         if accept is not None:
-            accept_rig(store, proposed, accept.value, actor=acting())
+            accept_rig(store, proposed, accept.value, actor=current_actor())
     values = {**proposal_values(proposed), "accepted": accept and accept.value}
     if json_:
         print_json(values)

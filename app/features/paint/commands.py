@@ -13,7 +13,7 @@ import typer
 from app.features.match_estimates.commands import print_sentences
 from app.plural import plural
 from app.soccer.choices import ProposalOutcome
-from app.terminal.options import Json, Workers, acting, parse_size, read_settings
+from app.terminal.options import Json, Workers, current_actor, parse_size, read_settings
 from app.terminal.server import opened_store
 from app.terminal.terminal import print_json, print_values, say, show_progress
 
@@ -69,7 +69,7 @@ def paint(
     with opened_store() as store:
         if undo:
             with store.write() as session:
-                take_back_paint(session, dataset, actor=acting())
+                take_back_paint(session, dataset, actor=current_actor())
         if undo or show:
             found = get_paint(store, dataset)
         else:
@@ -78,7 +78,7 @@ def paint(
                     store,
                     dataset,
                     None if match is None else [match],
-                    actor=acting(),
+                    actor=current_actor(),
                     workers=workers,
                     progress=progress,
                 )

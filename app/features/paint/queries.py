@@ -12,7 +12,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.statements import any_of, insert, values_of
-from app.db.json_columns import as_written, inflate, parse
+from app.db.json_columns import as_written, decompress, parse
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, PaintEvidenceModel, StationModel, ViewModel
@@ -96,7 +96,7 @@ def read_readings(session: Session, digests: Iterable[str]) -> dict[str, PaintRe
 @lru_cache(maxsize=64)
 def reading_from_row(digest: str, body: bytes) -> PaintReading:
     with as_written():
-        reading = reading_from_text(inflate(body).decode())
+        reading = reading_from_text(decompress(body).decode())
         if reading.digest != digest:
             raise ValueError(f"{digest} is the digest of another reading")
     return reading

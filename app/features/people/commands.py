@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.terminal.options import Json, acting, read_settings
+from app.terminal.options import Json, current_actor, read_settings
 from app.terminal.server import opened_store
 from app.terminal.terminal import print_json, print_values, say
 
@@ -48,7 +48,7 @@ def add(
 
     wanted, post = _parse_role(role), _make_mailer()
     with opened_store() as store:
-        _, row = invite_one(store, name, wanted, email, post, actor=acting())
+        _, row = invite_one(store, name, wanted, email, post, actor=current_actor())
     _print_link(row, json_)
 
 
@@ -69,7 +69,7 @@ def invite_many(
 
     rows, post = read_list(file.read()), _make_mailer()
     with opened_store() as store:
-        report = invite(store, rows, post, actor=acting(), dry_run=dry_run)
+        report = invite(store, rows, post, actor=current_actor(), dry_run=dry_run)
     refused = sum(row.state == "refused" for row in report)
     if json_:
         print_json([vars(row) for row in report])
@@ -157,7 +157,7 @@ def adopt(name: Name, json_: Json = False) -> None:
     from app.features.people.service import find_person
 
     with opened_store() as store:
-        found = give(store, find_person(store, name).id, actor=acting())
+        found = give(store, find_person(store, name).id, actor=current_actor())
     print_values({"name": found, "shown as theirs": "what was done until now as local"}, json_)
 
 
@@ -179,8 +179,8 @@ def reset(
     with opened_store() as store:
         found = find_person(store, name)
         if second_factor:
-            SecondFactors(store).clear(found.id, actor=acting())
-        _, row = renew_one(store, found.id, email, post, actor=acting())
+            SecondFactors(store).clear(found.id, actor=current_actor())
+        _, row = renew_one(store, found.id, email, post, actor=current_actor())
     _print_link(row, json_)
 
 
@@ -192,7 +192,7 @@ def unlink(name: Name, json_: Json = False) -> None:
 
     with opened_store() as store:
         found = find_person(store, name)
-        unlink_person(store, found.id, actor=acting())
+        unlink_person(store, found.id, actor=current_actor())
         person = find_person(store, name)
     print_values(_person_values(person), json_)
 
@@ -202,7 +202,7 @@ def _give_role(name: str, dataset: str, role: Role | None, json_: bool) -> None:
 
     with opened_store() as store:
         found = find_person(store, name)
-        one = give_role(store, dataset, found.id, role, actor=acting())
+        one = give_role(store, dataset, found.id, role, actor=current_actor())
     print_values({"name": one.name, "dataset": dataset, "role": str(one.role)}, json_)
 
 
@@ -221,7 +221,7 @@ def require_second_factor(
     from app.features.people.second_factor import SecondFactors
 
     with opened_store() as store:
-        SecondFactors(store).require(switch is Switch.ON, actor=acting())
+        SecondFactors(store).require(switch is Switch.ON, actor=current_actor())
     print_values({"second_factor_required": switch is Switch.ON}, json_)
 
 
@@ -243,7 +243,7 @@ def tokens(
         found = (
             access_tokens.of_person(person)
             if end is None
-            else [access_tokens.end(end, person, actor=acting())]
+            else [access_tokens.end(end, person, actor=current_actor())]
         )
     _print_tokens(found, json_, ended=end is not None)
 
@@ -266,7 +266,7 @@ def _change_person(name: str, json_: bool, **change: Any) -> None:
 
     with opened_store() as store:
         found = find_person(store, name)
-        person = change_person(store, found.id, actor=acting(), **change)
+        person = change_person(store, found.id, actor=current_actor(), **change)
     print_values(_person_values(person), json_)
 
 

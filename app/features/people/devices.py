@@ -19,7 +19,7 @@ from typing import Protocol
 import pyotp
 from cryptography.fernet import Fernet
 
-from app.db.ephemeral_state import note_attempt, oldest_attempt, put_begun, take_pending
+from app.db.ephemeral_state import note_attempt, oldest_attempt, store_pending, take_pending
 from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, installation_key
 from app.db.session import Session, text_of
 from app.db.store import Store
@@ -183,7 +183,7 @@ class StoredPending:
         at = self._clock()
         closed, ends = self._encryption_key().encrypt(value), text_of(at + self._lasts)
         with self._store.write(lasting=False) as session:
-            put_begun(session, self._hashed_name(asker), closed, ends, text_of(at), MOST)
+            store_pending(session, self._hashed_name(asker), closed, ends, text_of(at), MOST)
 
     def take(self, asker: str) -> bytes | None:
         """See ``PendingActions``."""

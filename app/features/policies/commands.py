@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.terminal.options import POLICY_OR_FILE, Dataset, Json, acting, read_text
-from app.terminal.server import connected, given_server, opened_store
+from app.terminal.options import POLICY_OR_FILE, Dataset, Json, current_actor, read_text
+from app.terminal.server import connect_to_server, current_server, opened_store
 from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -26,11 +26,11 @@ def show(
     json_: Json = False,
 ) -> None:
     """Print the policy of a dataset as YAML, ready for `policy set`."""
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote
 
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             text, values = remote.policy_values(client, dataset)
     else:
         text, values = _read_local_policy(dataset)
@@ -58,16 +58,16 @@ def set_(
     from app.features.solutions.service import stale_groups
 
     chosen = read_policy_option(policy)
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote
 
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             job = remote.set_policy(client, dataset, chosen)
         print_values(remote.policy_change(job), json_)
         return
     with opened_store() as store:
-        state = change_policy(store, dataset, chosen, if_match=None, actor=acting())
+        state = change_policy(store, dataset, chosen, if_match=None, actor=current_actor())
         stale = len(stale_groups(store, state.dataset_id))
     values = {
         **_policy_header(state.dataset, state.policy),

@@ -10,7 +10,7 @@ import typer
 
 from app.durable import keep_private
 from app.sample.order import GROUPS, RECORDING_SECONDS, SEED, SHORTEST_RECORDING, SampleOrder
-from app.terminal.options import Json, Workers, acting, read_settings
+from app.terminal.options import Json, Workers, current_actor, read_settings
 from app.terminal.server import opened_store
 from app.terminal.terminal import print_values, show_progress
 
@@ -56,7 +56,7 @@ def sample(
     folder, pool = out or settings.home / SAMPLE, partial(executor_of, settings, workers)
     with opened_store(settings) as store, show_progress("Making the sample") as progress:
         made = make_sample_dataset(
-            store, dataset, folder, order, pool, progress, workers=workers, actor=acting()
+            store, dataset, folder, order, pool, progress, workers=workers, actor=current_actor()
         )
     written = vars(made.written) if made.written else {}
     values = {"dataset": made.dataset, "groups": made.groups, "solved": made.solved}
@@ -93,5 +93,5 @@ def practice(
     keep_private()
     settings = read_settings()
     with opened_store(settings) as store, show_progress("Making the practice groups") as progress:
-        made = make_practice_dataset(store, settings, progress, again=again, actor=acting())
+        made = make_practice_dataset(store, settings, progress, again=again, actor=current_actor())
     print_values(made, json_)

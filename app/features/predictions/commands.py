@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from app.plural import plural
-from app.terminal.options import Dataset, Json, Workers, acting, read_settings
+from app.terminal.options import Dataset, Json, Workers, current_actor, read_settings
 from app.terminal.server import opened_store
 from app.terminal.terminal import (
     print_error,
@@ -74,7 +74,7 @@ def accept(
             plan = plan_accept(store, dataset, request)
             values = {"views": len(plan.changes), "groups": plan.groups, "refused": plan.refused}
         else:
-            report = run_accept(store, dataset, request, actor=acting(), progress=progress)
+            report = run_accept(store, dataset, request, actor=current_actor(), progress=progress)
             values = vars(report)
     print_values(values, json_)
 
@@ -115,7 +115,9 @@ def detect(
     )
     with opened_store() as store, show_progress("Detecting") as progress:
         request = DetectRequest(name or model.stem, query, missing, min_score)
-        found = run_detect(store, dataset, opened, request, actor=acting(), progress=progress)
+        found = run_detect(
+            store, dataset, opened, request, actor=current_actor(), progress=progress
+        )
     if json_:
         print_json(vars(found))
         return

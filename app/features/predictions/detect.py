@@ -15,7 +15,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ImageError, InputError, NotFoundError, StorageError, TooLargeError
 from app.evaluation.frame import Detection
-from app.evaluation.yolo import Letterbox, Picture, ball_category, decode
+from app.evaluation.yolo import Letterbox, Picture, ball_category, decode_output
 from app.features.datasets.service import read_dataset_head, require_name
 from app.features.groups.view_queries import StoredView, dataset_views
 from app.features.predictions.queries import PredictionSet
@@ -98,7 +98,7 @@ class OnnxModel:
             raise InputError(
                 f"{self.path.name} does not run on a picture ({_first(error)})"
             ) from error
-        return decode(np.asarray(output), box, self.category, min_score, most)
+        return decode_output(np.asarray(output), box, self.category, min_score, most)
 
 
 def _session(path: Path, threads: int) -> Any:

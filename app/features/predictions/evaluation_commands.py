@@ -12,8 +12,8 @@ from app.features.predictions.commands import print_set
 from app.progress import ReportProgress
 from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
 from app.soccer.frames import ImageSize
-from app.terminal.options import Dataset, Json, acting, parse_size
-from app.terminal.server import ServerPlace, connected, given_server, opened_store
+from app.terminal.options import Dataset, Json, current_actor, parse_size
+from app.terminal.server import ServerPlace, connect_to_server, current_server, opened_store
 from app.terminal.terminal import print_json, say, show_progress
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def evaluate(
         version,
     )
     request.check()
-    server = given_server()
+    server = current_server()
     run = _evaluate if server is None else partial(_evaluate_at, server)
     with show_progress("Evaluating") as progress:
         values, sets = run(dataset, request, out, progress)
@@ -186,7 +186,7 @@ def _evaluate(
     from app.features.predictions.sources import evaluate_sources
 
     with opened_store() as store:
-        done = evaluate_sources(store, dataset, request, actor=acting(), progress=progress)
+        done = evaluate_sources(store, dataset, request, actor=current_actor(), progress=progress)
         if out is not None:
             write_evaluation(store, done.evaluation, out)
     return evaluation_values(done.evaluation), [vars(item) for item in done.sets]
@@ -202,7 +202,7 @@ def _evaluate_at(
     """As ``_evaluate``, by a server."""
     from app.terminal import remote_files
 
-    with connected(server) as client:
+    with connect_to_server(server) as client:
         values, sets = remote_files.evaluate(client, dataset, request, progress)
         if out is not None:
             remote_files.write_evaluation(client, values, out)

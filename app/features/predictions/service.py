@@ -20,7 +20,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.frame import Detection
 from app.evaluation.frame_names import FrameNames, NamedFrame
 from app.evaluation.prediction_files import ReadPredictedCameras
-from app.evaluation.prediction_run import ReadPredictions, listed
+from app.evaluation.prediction_run import ReadPredictions, list_unknown_frames
 from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.service import read_dataset_head, require_name
 from app.features.groups.view_queries import dataset_views
@@ -41,7 +41,7 @@ from app.finite import quoted
 from app.formats.file_tree import Limits
 from app.formats.report import Report
 from app.geometry.camera import Camera
-from app.object_store.address import unseal
+from app.object_store.address import unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
 
@@ -308,7 +308,7 @@ def _picture(media: Media | None) -> str:
     """Name of the file of a picture with its last folder; empty where a view has none of its own."""
     if media is None or media.frame is not None:
         return ""
-    return "/".join(PurePosixPath(media.member or unseal(media.path)[0]).parts[-2:])
+    return "/".join(PurePosixPath(media.member or unseal_address(media.path)[0]).parts[-2:])
 
 
 def _report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
@@ -317,8 +317,8 @@ def _report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
         "without_score": boxes.without_score,
         "other_classes": boxes.report.counts["other classes"],
         "unknown_boxes": sum(boxes.unknown.values()),
-        "unknown_frames": list(listed(boxes.unknown, boxes.reasons, LISTED)),
-        "unknown_cameras": list(listed(cameras.unknown, cameras.reasons, LISTED)),
+        "unknown_frames": list(list_unknown_frames(boxes.unknown, boxes.reasons, LISTED)),
+        "unknown_cameras": list(list_unknown_frames(cameras.unknown, cameras.reasons, LISTED)),
         **_problems(boxes.report, cameras.report),
     }
 

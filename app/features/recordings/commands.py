@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from app.terminal.options import acting
-from app.terminal.remote import follow, some
-from app.terminal.server import connected, given_server, opened_store
+from app.terminal.options import current_actor
+from app.terminal.remote import follow_job, select_values
+from app.terminal.server import connect_to_server, current_server, opened_store
 from app.terminal.terminal import print_json, print_values, show_progress
 
 TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "damaged", "shots", "sha256")
@@ -16,18 +16,18 @@ TOLD = ("id", "name", "frames", "fps", "seconds", "width", "height", "damaged", 
 
 def import_videos(paths: Sequence[Path], dataset: str, as_json: bool) -> None:
     """Bring recordings into a dataset, index them and find their shots; print what they are."""
-    server = given_server()
+    server = current_server()
     if server is None:
         found = _import_here(paths, dataset)
     else:
         found = []
-        with connected(server) as client, show_progress("Indexing") as progress:
+        with connect_to_server(server) as client, show_progress("Indexing") as progress:
             for path in paths:
                 upload = client.upload(path, in_parts=True, sent=progress)
                 body = {"dataset": dataset, "source": {"upload": upload}}
-                job = follow(client, client.post("recordings", body), progress)
+                job = follow_job(client, client.post("recordings", body), progress)
                 found.append(client.get(f"recordings/{job['result']['recording']}"))
-    rows = [some(one, *TOLD) for one in found]
+    rows = [select_values(one, *TOLD) for one in found]
     if as_json:
         print_json(rows)
         return
@@ -43,7 +43,7 @@ def _import_here(paths: Sequence[Path], dataset: str) -> list[dict[str, Any]]:
     found = []
     with opened_store() as store, show_progress("Indexing") as progress:
         for file in files:
-            recording = add_recording(store, dataset, file, actor=acting())
+            recording = add_recording(store, dataset, file, actor=current_actor())
             indexed = index_now(store, recording.id, progress=progress, stop=lambda: None)
             found.append(vars(indexed))
     return found

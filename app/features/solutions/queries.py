@@ -24,7 +24,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.statements import insert
-from app.db.json_columns import as_written, inflate, parse
+from app.db.json_columns import as_written, decompress, parse
 from app.db.session import Base, Session
 from app.errors import ConflictError
 from app.features.datasets.tables import DatasetModel, GroupModel
@@ -187,13 +187,13 @@ def encode_calibration(calibration: Calibration) -> bytes:
 @lru_cache(maxsize=256)
 def decode_calibration(body: bytes) -> Calibration:
     """Back from ``encode_calibration``; one value for the same bytes, however often asked."""
-    return value_codec.from_json(Calibration, parse(inflate(body)))
+    return value_codec.from_json(Calibration, parse(decompress(body)))
 
 
 @lru_cache(maxsize=256)
 def decode_camera(body: bytes) -> Calibration:
     """``decode_calibration`` without its markings, which are nine tenths of it."""
-    text = inflate(body)
+    text = decompress(body)
     # Quotes within a text are escaped, so these are the names of members.
     before, begins, rest = text.partition(b'"markings":[')
     _, ends, after = rest.partition(b'],"suspects":')
@@ -305,7 +305,7 @@ def with_calibrations(solution: Solution, calibrations: Mapping[str, Calibration
 
 @lru_cache(maxsize=128)
 def _solution_without_calibrations(body: bytes) -> Solution:
-    return value_codec.from_json(Solution, parse(inflate(body)))
+    return value_codec.from_json(Solution, parse(decompress(body)))
 
 
 def read_calibrations(session: Session, keys: Iterable[str]) -> dict[str, Calibration]:
@@ -339,7 +339,7 @@ def list_undetermined_calibrations(session: Session, keys: Collection[str]) -> s
 
 def _is_undetermined(body: bytes) -> bool:
     """Told from the text: to decode it would take ten times as long."""
-    text = inflate(body)
+    text = decompress(body)
     return b'"camera":null' in text or b'"unobservable":[]' not in text
 
 

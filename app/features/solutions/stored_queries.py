@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import Select, select
 
-from app.db.json_columns import Json, as_written, inflate, parse, unpack
+from app.db.json_columns import Json, as_written, decompress, parse, unpack
 from app.db.session import Session
 from app.errors import StorageError
 from app.features.datasets.tables import DatasetModel, GroupModel, PaintEvidenceModel
@@ -54,7 +54,7 @@ class KeptSolution:
 
     @cached_property
     def _body_json(self) -> Json:
-        return parse(inflate(self.body))
+        return parse(decompress(self.body))
 
     def encode(self, solution: Solution) -> EncodedSolution:
         """A solution that differs from this one in its gates, findings and policy alone.

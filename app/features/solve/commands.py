@@ -9,8 +9,14 @@ import typer
 
 from app.features.policies.commands import read_policy_option
 from app.plural import plural
-from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, acting
-from app.terminal.server import ServerPlace, connected, given_server, opened_store, opened_to_solve
+from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, current_actor
+from app.terminal.server import (
+    ServerPlace,
+    connect_to_server,
+    current_server,
+    opened_store,
+    opened_to_solve,
+)
 from app.terminal.terminal import (
     INTERRUPTED,
     held_interrupts,
@@ -44,7 +50,7 @@ def solve(
 
     A server computes by itself: there it waits, and Ctrl+C leaves the job running.
     """
-    server = given_server()
+    server = current_server()
     if server is not None:
         if workers is not None or cluster is not None:
             raise typer.BadParameter("a server solves with its own processes; leave out --workers")
@@ -57,9 +63,11 @@ def solve(
     chosen = None if policy is None else read_policy_option(policy)
     with opened_to_solve("Solving", workers, cluster) as (store, executor, progress):
         if chosen is not None:
-            change_policy(store, dataset, chosen, if_match=None, actor=acting())
+            change_policy(store, dataset, chosen, if_match=None, actor=current_actor())
         with held_interrupts() as interrupted:
-            report = solve_fully(store, dataset, executor, progress, interrupted, actor=acting())
+            report = solve_fully(
+                store, dataset, executor, progress, interrupted, actor=current_actor()
+            )
             left = pending_work(store, dataset) if interrupted() else None
             if left is not None:
                 print_error(
@@ -75,7 +83,7 @@ def _solve_at(
 ) -> tuple[Mapping[str, Any], str]:
     from app.terminal import remote
 
-    with connected(server) as client, show_progress("Solving") as progress:
+    with connect_to_server(server) as client, show_progress("Solving") as progress:
         return remote.solve_values(client, dataset, policy, progress)
 
 
@@ -91,11 +99,11 @@ def _print_solved(values: Mapping[str, Any], sentence: str, *, json_: bool) -> N
 @commands.command()
 def findings(dataset: Dataset, json_: Json = False) -> None:
     """List what a person should look at."""
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote
 
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             values = list(remote.finding_values(client, dataset))
     else:
         from app.features.findings.service import finding_values

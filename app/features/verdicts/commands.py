@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import VerdictState
-from app.terminal.options import Dataset, Json, acting
-from app.terminal.server import connected, given_server, opened_store
+from app.terminal.options import Dataset, Json, current_actor
+from app.terminal.server import connect_to_server, current_server, opened_store
 from app.terminal.terminal import print_error, print_json, print_values, say
 
 commands = typer.Typer()
@@ -47,12 +47,12 @@ def verdict(
     from app.features.verdicts.service import check_verdict
 
     check_verdict(state, reason, note)
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote
 
         body = {"q": query, "state": state, "reason": reason, "note": note, "expected": expected}
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             plan, report = remote.verdict_values(client, dataset, body, dry_run=dry_run)
     else:
         arguments = (query, state, reason, note)
@@ -93,5 +93,5 @@ def _judge_here(
         plan = plan_verdicts(store, found, *values)
         if dry_run:
             return asdict(plan), None
-        report = give_verdicts(store, found, *values, actor=acting(), expected=expected)
+        report = give_verdicts(store, found, *values, actor=current_actor(), expected=expected)
     return asdict(plan), asdict(report)

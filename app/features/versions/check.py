@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from app.db.check import Check, compared
+from app.db.check import Check, compare_records
 from app.db.dialects.dialect import dialect_in
 from app.db.json_columns import as_written, parse, unpack
 from app.db.log import LogEntry, entries_of_kinds
@@ -42,8 +42,10 @@ def examine_versions(store: Store) -> list[Check]:
         apart = [*_differing_versions(session, versions)]
         count, changed = _check_frozen_contents(session)
         return [
-            compared("frozen versions", f"{len(versions):,}, as frozen", apart, WRONG, restore),
-            compared("frozen content", f"{count:,}, as frozen", changed, WRONG, restore),
+            compare_records(
+                "frozen versions", f"{len(versions):,}, as frozen", apart, WRONG, restore
+            ),
+            compare_records("frozen content", f"{count:,}, as frozen", changed, WRONG, restore),
         ]
 
 

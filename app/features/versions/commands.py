@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.soccer.choices import SplitKind, VersionRule
-from app.terminal.options import Cluster, Dataset, Json, Workers, acting, parse_cameras, read_text
+from app.terminal.options import (
+    Cluster,
+    Dataset,
+    Json,
+    Workers,
+    current_actor,
+    parse_cameras,
+    read_text,
+)
 from app.terminal.remote import VERSION
-from app.terminal.server import connected, given_server, opened_store, opened_to_solve
+from app.terminal.server import connect_to_server, current_server, opened_store, opened_to_solve
 from app.terminal.terminal import (
     print_error,
     print_json,
@@ -67,7 +75,7 @@ def freeze(
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
     chosen = Split(split, seed, test_share, cameras)
     text = licence if licence_file is None else read_text(licence_file, MAX_LICENCE)
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote
 
@@ -78,7 +86,7 @@ def freeze(
             "groups": groups,
             "split": vars(chosen),
         }
-        with connected(server) as client, show_progress("Freezing") as progress:
+        with connect_to_server(server) as client, show_progress("Freezing") as progress:
             found = remote.freeze_values(client, dataset, body, progress, dry_run=dry_run)
         print_values(found, json_)
         return
@@ -87,18 +95,18 @@ def freeze(
         if dry_run:
             print_values(vars(plan_freeze(store, dataset, request)), json_)
             return
-        version = run_freeze(store, dataset, request, actor=acting(), progress=progress)
+        version = run_freeze(store, dataset, request, actor=current_actor(), progress=progress)
     print_values(version_values(version), json_)
 
 
 @commands.command()
 def versions(dataset: Dataset, json_: Json = False) -> None:
     """List the frozen versions of a dataset, newest first."""
-    server = given_server()
+    server = current_server()
     if server is not None:
         from app.terminal import remote
 
-        with connected(server) as client:
+        with connect_to_server(server) as client:
             found = remote.version_values(client, dataset)
     else:
         from app.features.versions.service import list_versions
@@ -155,7 +163,7 @@ def verify(
             chosen = newest_version(store, dataset)
         else:
             chosen = find_version(store, dataset, version)
-        report = verify_and_keep(store, chosen.id, executor, progress, actor=acting())
+        report = verify_and_keep(store, chosen.id, executor, progress, actor=current_actor())
     print_values(report.values(), json_)
     if not report.ok:
         if not json_:

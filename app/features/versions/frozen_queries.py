@@ -11,7 +11,7 @@ from sqlalchemy import ColumnElement, Table, exists, func, insert, or_, select, 
 from zlib_ng import zlib_ng
 
 from app.canonical import canonical, digest_of
-from app.db.json_columns import Json, inflate, look_through, parse
+from app.db.json_columns import Json, decompress, look_through, parse
 from app.db.session import Session
 from app.features.groups.codecs import (
     group_without_views_to_json,
@@ -218,17 +218,17 @@ def fitting_key(key: str, body: bytes) -> str:
     if prefix == CALIBRATION:
         return key
     # A solution is frozen as it was stored, everything else under the digest of its text.
-    return prefix + digest_of(body if prefix == SOLUTION else inflate(body))
+    return prefix + digest_of(body if prefix == SOLUTION else decompress(body))
 
 
 def read_text(body: bytes) -> str:
     """The text of frozen JSON."""
-    return inflate(body).decode()
+    return decompress(body).decode()
 
 
 def read_json(body: bytes) -> Json:
     """The value of frozen JSON."""
-    return parse(inflate(body))
+    return parse(decompress(body))
 
 
 def compress_text(text: str) -> bytes:

@@ -10,7 +10,7 @@ from itertools import count
 from typing import Any
 
 from app.canonical import canonical
-from app.db.json_columns import Json, inflate, parse, parse_as
+from app.db.json_columns import Json, decompress, parse, parse_as
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, StorageError
@@ -231,12 +231,12 @@ def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGrou
         StorageError: Content is missing.
     """
     bodies = _frozen(session, version, {row.said or "" for row in rows})
-    outlines = [parse_as(inflate(bodies[row.said or ""]), FrozenOutline) for row in rows]
+    outlines = [parse_as(decompress(bodies[row.said or ""]), FrozenOutline) for row in rows]
     shared = {
         view.station for one in outlines for view in one.views if isinstance(view.station, str)
     }
     more = _frozen(session, version, shared)
-    stations = {key: parse_as(inflate(more[key]), OutlineStation) for key in shared}
+    stations = {key: parse_as(decompress(more[key]), OutlineStation) for key in shared}
     return [
         thaw_outline(one, stations, row.frames) for row, one in zip(rows, outlines, strict=True)
     ]

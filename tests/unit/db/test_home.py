@@ -9,9 +9,9 @@ from app.config import Settings
 from app.db.home import (
     delete_leftovers,
     file_system,
+    find_leftovers,
     is_half_written,
     last_written,
-    leftovers,
     make_home,
     make_private,
     open_to_others,
@@ -173,7 +173,7 @@ class TestLeftovers:
     ) -> None:
         settings.uploads.mkdir(parents=True)
         monkeypatch.setattr("app.db.home.iglob", lambda *_, **__: ["uploads/1.part"])
-        assert list(leftovers(settings)) == []
+        assert list(find_leftovers(settings)) == []
 
     def test_a_file_that_is_gone_has_no_time_of_writing(self, tmp_path: Path) -> None:
         assert last_written(tmp_path / "gone") is None

@@ -11,8 +11,8 @@ from app.evaluation.agreement_limits import (
     AgreementLimits,
     Disagreement,
     Spread,
-    disagreements,
-    spreads,
+    find_disagreements,
+    measure_spreads,
 )
 from app.evaluation.annotation_distance import (
     Ball3DDistance,
@@ -33,7 +33,7 @@ def told(
     verdicts: tuple[str | None, str | None] = (None, None),
     limits: AgreementLimits = LIMITS,
 ) -> list[Disagreement]:
-    return [*disagreements(GroupDistance((view,), ball), verdicts, limits)]
+    return [*find_disagreements(GroupDistance((view,), ball), verdicts, limits)]
 
 
 def balls(**measured: float) -> ViewDistance:
@@ -173,7 +173,7 @@ class TestSpreads:
             )
             for px in range(101)
         )
-        found = spreads([GroupDistance(views, Ball3DDistance(True, True, 0.25))])
+        found = measure_spreads([GroupDistance(views, Ball3DDistance(True, True, 0.25))])
         assert tuple(found) == MEASURES
         for name in ("line_px", "ball_px", "diameter_px", "position_m"):
             assert found[name] == Spread(101, 50.0, 95.0), name
@@ -181,4 +181,4 @@ class TestSpreads:
         assert found["ball_m"] == Spread(1, 0.25, 0.25)
 
     def test_of_nothing_there_is_none(self) -> None:
-        assert set(spreads([]).values()) == {Spread(0)}
+        assert set(measure_spreads([]).values()) == {Spread(0)}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.evaluation.agreement_limits import AgreementLimits, disagreements, spreads
+from app.evaluation.agreement_limits import AgreementLimits, find_disagreements, measure_spreads
 from app.evaluation.annotation_distance import (
     compare_annotations,
     compare_balls,
@@ -95,7 +95,7 @@ class TestCompareAnnotations:
         found = compare_annotations(group, group, solution, solution)
         assert found.ball.distance_m == 0
         assert all(view.largest_px < 1e-9 and view.position_m == 0 for view in found.views)
-        assert disagreements(found, ("accepted", "accepted"), AgreementLimits()) == ()
+        assert find_disagreements(found, ("accepted", "accepted"), AgreementLimits()) == ()
 
     def test_a_moved_ball_is_told_in_pixels_and_in_metres(self, group: Group) -> None:
         view = group.views[0]
@@ -106,7 +106,7 @@ class TestCompareAnnotations:
         solutions = solve(group, Policy()), solve(other, Policy())
         found = compare_annotations(group, other, *solutions)
         assert found.views[0].ball.center_px == pytest.approx(40)
-        said = disagreements(found, ("accepted", "rejected"), AgreementLimits())
+        said = find_disagreements(found, ("accepted", "rejected"), AgreementLimits())
         assert {item.kind for item in said} >= {"verdict", "ball_px"}
         assert said[0].weight == max(item.weight for item in said)
         assert said[0].view == view.key
@@ -127,7 +127,7 @@ class TestCompareAnnotations:
 
 class TestSpreads:
     def test_hold_what_was_measured_and_say_of_how_many(self, group: Group) -> None:
-        found = spreads([compare_annotations(group, group, None, None)])
+        found = measure_spreads([compare_annotations(group, group, None, None)])
         assert (found["ball_m"].count, found["ball_m"].median) == (0, None)
         assert found["ball_px"].median == 0
         assert found["line_px"].tail == pytest.approx(0, abs=1e-9)

@@ -10,12 +10,12 @@ import pytest
 
 from app.evaluation.average_precision import (
     IOUS,
-    area,
+    area_under_curve,
     coco_average_precision,
-    curve,
     find_hits,
-    interpolated,
+    interpolated_precision,
     mean_interpolated,
+    precision_recall_curve,
 )
 from app.evaluation.frame import Detection, JudgedFrame
 from app.soccer.frames import Box
@@ -121,24 +121,26 @@ class TestCurve:
             make_judged(BALL, (BALL, 0.9), (AWAY, 0.8), identity=1),
             make_judged(BALL, (BALL, 0.7), identity=2),
         ]
-        found = curve(find_hits(judged))
+        found = precision_recall_curve(find_hits(judged))
         assert found.recall.tolist() == [0.5, 0.5, 1.0]
         assert found.precision == pytest.approx([1, 0.5, 2 / 3])
         # VOC: half of the recall at precision 1, half at 2/3.
-        assert area(found) == pytest.approx(0.5 + 0.5 * 2 / 3)
+        assert area_under_curve(found) == pytest.approx(0.5 + 0.5 * 2 / 3)
         # COCO: recalls 0 to 0.5 at 1, the 50 others at 2/3.
-        assert interpolated(found) == pytest.approx((51 + 50 * 2 / 3) / 101)
+        assert interpolated_precision(found) == pytest.approx((51 + 50 * 2 / 3) / 101)
 
     def test_a_frame_that_counts_twice_is_a_frame_that_is_there_twice(self, make_judged) -> None:
         one, two = make_judged(BALL, (BALL, 0.9), identity=1), make_judged(BALL, (AWAY, 0.8))
-        twice = curve(find_hits([one, two]), 0, np.array([1.0, 2.0]))
-        written = curve(find_hits([one, two, two]))
-        assert interpolated(twice) == pytest.approx(interpolated(written))
+        twice = precision_recall_curve(find_hits([one, two]), 0, np.array([1.0, 2.0]))
+        written = precision_recall_curve(find_hits([one, two, two]))
+        assert interpolated_precision(twice) == pytest.approx(interpolated_precision(written))
 
     def test_its_means_are_those_of_the_public_evaluator(self, random_judged) -> None:
         hits = find_hits(random_judged)
         ap_50, ap = coco_average_precision(random_judged)
-        assert interpolated(curve(hits)) == pytest.approx(ap_50, abs=1e-12)
+        assert interpolated_precision(precision_recall_curve(hits)) == pytest.approx(
+            ap_50, abs=1e-12
+        )
         assert mean_interpolated(hits) == pytest.approx(ap, abs=1e-12)
 
 
@@ -147,7 +149,10 @@ class TestMeanInterpolated:
     def test_is_that_of_each_threshold_to_the_last_bit(self, random_judged, seed: int) -> None:
         hits = find_hits(random_judged)
         weights = np.random.default_rng(seed).integers(0, 3, len(hits.balls)).astype(float)
-        each = [interpolated(curve(hits, index, weights)) for index in range(len(IOUS))]
+        each = [
+            interpolated_precision(precision_recall_curve(hits, index, weights))
+            for index in range(len(IOUS))
+        ]
         assert mean_interpolated(hits, weights) == np.mean(each)
 
     def test_without_a_ball_there_is_none_and_without_a_detection_it_is_nought(

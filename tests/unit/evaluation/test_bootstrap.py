@@ -3,13 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.evaluation.bootstrap import Resamples, interval
+from app.evaluation.bootstrap import Resamples, percentile_interval
 
 
 class TestInterval:
     def test_holds_the_central_95_percent_of_what_is_finite(self) -> None:
         values = np.append(np.linspace(0, 1, 1001), [np.nan, np.inf])
-        assert interval(values) == pytest.approx((0.025, 0.975))
+        assert percentile_interval(values) == pytest.approx((0.025, 0.975))
 
 
 class TestResamples:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from app.evaluation.sensitivity import (
-    choose,
-    measure,
+    choose_frames,
+    error_slopes,
+    measure_frame_sensitivity,
     sensitivity_figure,
     sensitivity_table,
     shift_places,
     size_places,
-    slopes,
 )
 from app.geometry.sphere import position_from_diameter
 from app.soccer.frames import Box, ImagePoint
@@ -34,7 +34,7 @@ class TestSlopes:
 
         by_size = np.linalg.norm(place(0, step) - place(0, -step)) / (2 * step)
         by_shift = np.linalg.norm(place(step, 0) - place(-step, 0)) / (2 * step)
-        assert slopes(camera, box, DIAMETER) == pytest.approx((by_size, by_shift), rel=1e-5)
+        assert error_slopes(camera, box, DIAMETER) == pytest.approx((by_size, by_shift), rel=1e-5)
 
     @pytest.mark.parametrize("lens", WIDE_LENSES)
     def test_through_a_wide_lens_are_the_difference_quotients(self, lens: str) -> None:
@@ -48,20 +48,20 @@ class TestSlopes:
 
         by_size = np.linalg.norm(place(0, 1e-4) - place(0, -1e-4)) / 2e-4
         by_shift = np.linalg.norm(place(1e-4, 0) - place(-1e-4, 0)) / 2e-4
-        assert slopes(camera, box, DIAMETER) == pytest.approx((by_size, by_shift), rel=1e-3)
+        assert error_slopes(camera, box, DIAMETER) == pytest.approx((by_size, by_shift), rel=1e-3)
 
     def test_a_ball_fifty_metres_away_has_the_slopes_computed_by_hand(self, make_frame) -> None:
         # 50 m away: one per cent of the size is half a metre; a pixel is 50 m / 2000.
         frame = make_frame(distance=50.0)
         box = frame.boxes["optimized"]
-        by_size, by_shift = slopes(frame.camera, box, DIAMETER)
+        by_size, by_shift = error_slopes(frame.camera, box, DIAMETER)
         assert by_size * box.diameter / 100 == pytest.approx(0.5)
         assert by_shift == pytest.approx(0.025)
 
 
 class TestMeasure:
     def test_ten_per_cent_too_small_is_a_ninth_of_the_distance_too_far(self, make_frame) -> None:
-        found = measure(make_frame(distance=50.0), DIAMETER)
+        found = measure_frame_sensitivity(make_frame(distance=50.0), DIAMETER)
         assert found.distance_m == pytest.approx(50)
         assert found.by_size[0] == pytest.approx(50 * (1 / 0.9 - 1))
         assert found.by_size[-1] == pytest.approx(50 * (1 - 1 / 1.1))
@@ -69,11 +69,11 @@ class TestMeasure:
 
     def test_two_per_cent_of_the_diagonal_move_it_across(self, make_frame) -> None:
         frame = make_frame(distance=50.0)
-        found = measure(frame, DIAMETER)
+        found = measure_frame_sensitivity(frame, DIAMETER)
         assert found.by_shift[-1] == pytest.approx(0.02 * frame.size.diagonal / 2000 * 50)
 
     def test_the_derivative_touches_the_curve(self, make_frame) -> None:
-        found = measure(make_frame(distance=70.0, point=POINTS[1]), DIAMETER)
+        found = measure_frame_sensitivity(make_frame(distance=70.0, point=POINTS[1]), DIAMETER)
         for places, curve, slope in (
             (size_places(), found.by_size, found.size_slope),
             (shift_places(), found.by_shift, found.shift_slope),
@@ -85,7 +85,10 @@ class TestMeasure:
             assert measured == pytest.approx(slope, rel=2e-3)
 
     def test_grows_with_the_distance(self, make_frame) -> None:
-        near, far = (measure(make_frame(distance=metres), DIAMETER) for metres in (30.0, 90.0))
+        near, far = (
+            measure_frame_sensitivity(make_frame(distance=metres), DIAMETER)
+            for metres in (30.0, 90.0)
+        )
         assert far.by_size[0] == pytest.approx(3 * near.by_size[0])
 
 
@@ -95,17 +98,17 @@ class TestChoose:
 
         frames = [make_frame(number) for number in range(1, 31)]
         frames[0] = replace(frames[0], point=None)
-        chosen = choose(frames, seed=4, size=10)
+        chosen = choose_frames(frames, seed=4, size=10)
         assert len(chosen) == 10
-        assert frames[0] not in choose(frames, seed=4, size=100)
-        assert chosen == choose(frames[::-1], seed=4, size=10)
-        assert chosen != choose(frames, seed=5, size=10)
+        assert frames[0] not in choose_frames(frames, seed=4, size=100)
+        assert chosen == choose_frames(frames[::-1], seed=4, size=10)
+        assert chosen != choose_frames(frames, seed=5, size=10)
 
 
 class TestTable:
     def test_tells_ends_and_correlation(self, make_frame) -> None:
         frames = [make_frame(number, distance=20.0 + 10 * number) for number in range(1, 5)]
-        samples = [measure(frame, DIAMETER) for frame in frames]
+        samples = [measure_frame_sensitivity(frame, DIAMETER) for frame in frames]
         table = sensitivity_table(samples, able=9)
         assert table.cell("size", "smallest_m").value == pytest.approx(30 / 9)
         assert table.cell("size", "largest_m").value == pytest.approx(60 / 9)
@@ -118,7 +121,9 @@ class TestTable:
 
 class TestFigure:
     def test_shows_curve_and_derivative_of_every_ball(self, make_frame) -> None:
-        figure = sensitivity_figure([measure(make_frame(distance=50.0), DIAMETER)])
+        figure = sensitivity_figure(
+            [measure_frame_sensitivity(make_frame(distance=50.0), DIAMETER)]
+        )
         assert [len(panel.series) for panel in figure.panels] == [2, 2]
         assert [item.kind for item in figure.panels[0].series] == ["line", "dashed"]
         assert figure.panels[0].series[0].color == pytest.approx(50)

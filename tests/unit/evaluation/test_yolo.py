@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.evaluation.yolo import Letterbox, ball_category, decode, suppress
+from app.evaluation.yolo import Letterbox, ball_category, decode_output, suppress_overlapping
 from app.soccer.frames import ImageSize
 
 PICTURE, NETWORK = ImageSize(1280, 720), ImageSize(640, 640)
@@ -46,7 +46,7 @@ class TestLetterbox:
 
 class TestDecode:
     def test_reads_centres_sizes_and_the_scores_of_the_ball(self) -> None:
-        found = decode(
+        found = decode_output(
             output([320, 320, 6, 8, 0.1, 0.9], [100, 300, 6, 6, 0.9, 0.3]), BOX, 1, 0.25, 20
         )
         assert [round(item.score, 3) for item in found] == [0.9, 0.3]
@@ -55,34 +55,34 @@ class TestDecode:
 
     def test_leaves_out_what_is_not_sure_and_what_overlaps(self) -> None:
         same = [[320, 320, 8, 8, 0.9], [320, 320.5, 8, 8, 0.8], [320, 340, 8, 8, 0.7]]
-        found = decode(output(*same, [100, 300, 6, 6, 0.2]), BOX, 0, 0.25, 20)
+        found = decode_output(output(*same, [100, 300, 6, 6, 0.2]), BOX, 0, 0.25, 20)
         assert [round(item.score, 3) for item in found] == [0.9, 0.7]
 
     def test_keeps_no_more_than_asked_for(self) -> None:
         many = [[50.0 * place, 320, 6, 6, 0.5 + place / 100] for place in range(1, 9)]
-        found = decode(output(*many), BOX, 0, 0.1, 3)
+        found = decode_output(output(*many), BOX, 0, 0.1, 3)
         assert [round(item.score, 2) for item in found] == [0.58, 0.57, 0.56]
 
     def test_reads_an_export_that_suppresses_itself(self) -> None:
         rows = np.zeros((1, 300, 6), np.float32)
         rows[0, 0] = [317, 316, 323, 324, 0.8, 0]
         rows[0, 1] = [100, 300, 106, 306, 0.7, 2]
-        (found,) = decode(rows, BOX, 0, 0.25, 20)
+        (found,) = decode_output(rows, BOX, 0, 0.25, 20)
         assert found.box.center == (640, 360)
 
     def test_refuses_another_shape_and_a_class_that_is_not_there(self) -> None:
         with pytest.raises(InputError, match="shape"):
-            decode(np.zeros((3, 4)), BOX, 0, 0.25, 20)
+            decode_output(np.zeros((3, 4)), BOX, 0, 0.25, 20)
         with pytest.raises(InputError, match="has 1 classes"):
-            decode(output([1, 1, 1, 1, 0.5]), BOX, 3, 0.25, 20)
+            decode_output(output([1, 1, 1, 1, 0.5]), BOX, 3, 0.25, 20)
 
 
 class TestSuppress:
     def test_keeps_the_surer_of_two_that_overlap(self) -> None:
         corners = np.array([[0, 0, 10, 10], [1, 0, 11, 10], [0, 5, 10, 15]], dtype=float)
         # IoU 0.82 with the second, a third with the last.
-        assert suppress(corners, 0.7, 9) == [0, 2]
-        assert suppress(corners, 0.9, 9) == [0, 1, 2]
+        assert suppress_overlapping(corners, 0.7, 9) == [0, 2]
+        assert suppress_overlapping(corners, 0.9, 9) == [0, 1, 2]
 
 
 class TestBallCategory:

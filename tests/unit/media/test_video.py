@@ -14,7 +14,7 @@ from app.media import files as media_module
 from app.media import video as video_index
 from app.media.files import decode_frame, has_index, read_frame, video_times
 from app.media.frames import Frames
-from app.media.neighbours import neighbours
+from app.media.neighbours import neighbouring_frames
 from app.soccer.group import Media
 from tests.videos import delay_start, number_of, vary_times, write_video
 
@@ -275,5 +275,5 @@ class TestFramesOfTheServer:
 
     def test_neighbours_end_with_the_last_frame(self, tmp_path: Path, settings: Settings) -> None:
         path = write_video(tmp_path / "cam1.mp4", "mp4v", 20)
-        found = neighbours(Media(str(path), frame=18), "18", True, settings)
+        found = neighbouring_frames(Media(str(path), frame=18), "18", True, settings)
         assert max(found) == 1

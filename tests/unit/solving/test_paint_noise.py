@@ -17,7 +17,7 @@ from app.solving.lone_frame import (
     PAINT_SIZE_SIGMA_M,
 )
 from app.solving.observations import observations_of_lines
-from app.solving.paint_camera import PaintProblem, offsets_of
+from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import painted_terms, size_terms
 from app.solving.resect import ResectionProblem
 from tests.cameras import SIZE
@@ -33,7 +33,7 @@ def seen_by(camera, pitch=PITCH):
     grass = {name: at for name, at in click(camera, pitch=pitch).items() if name[:4] != "Goal"}
     observed = observations_of_lines(grass, pitch, SIZE)
     curve_points = CurvePoints(observed.pixels, observed.marking, np.ones(len(observed.pixels)))
-    seen = offsets_of(PROBLEM, TRUE, curve_points, np.full(len(observed.pixels), 0.1), PITCH)
+    seen = measure_offsets(PROBLEM, TRUE, curve_points, np.full(len(observed.pixels), 0.1), PITCH)
     places = MAIN.on_ground(observed.pixels + np.array(MAIN.principal_point))
     return seen, places
 

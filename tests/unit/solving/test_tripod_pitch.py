@@ -20,10 +20,15 @@ from app.geometry.resection import (
 from app.soccer.pitch import GOAL_PARTS, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.lone_frame import CROWN_SIGMA_M, INWARD_SIGMA_M
-from app.solving.paint_camera import PaintProblem, offsets_of
+from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import CROWN, INWARD, TERMS, painted_shift
 from app.solving.resect import ResectionProblem
-from app.solving.tripod_pitch import PaintedFrame, TripodPitch, about_plan, find_tripod_pitch
+from app.solving.tripod_pitch import (
+    PaintedFrame,
+    TripodPitch,
+    find_tripod_pitch,
+    second_moment_about_plan,
+)
 from tests.cameras import SIZE
 from tests.unit.solving.conftest import MAIN
 
@@ -68,7 +73,7 @@ def painted(
     problem = PaintProblem.of(ResectionProblem.of(SIZE, POLICY), truth, None)
     parameters = truth
     for at in range(ROUNDS):
-        offsets = offsets_of(problem, parameters, curves, sigmas, PLAN)
+        offsets = measure_offsets(problem, parameters, curves, sigmas, PLAN)
         parameters = parameters + problem.step(parameters, offsets, strict=at >= ROUNDS - STRICT)
     return PaintedFrame(parameters, curves, sigmas)
 
@@ -115,7 +120,7 @@ def test_cameras_on_the_plan_know_how_far_off_they_are():
     for truth, frame in zip(truths, frames, strict=True):
         parameters, covariance = found.camera(frame)
         off = (frame.parameters - truth)[position]
-        about = about_plan(frame.parameters, parameters, covariance)
+        about = second_moment_about_plan(frame.parameters, parameters, covariance)
         assert off @ np.linalg.solve(about[position, position], off) < WITHIN**2
         assert np.linalg.eigvalsh(about)[0] > 0
         off_plan.append(np.linalg.norm(off))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import UnsafePathError
-from app.terminal.remote_files import as_one_file, unpack
+from app.terminal.remote_files import unpack_zip, zip_folder
 
 
 @pytest.fixture
@@ -23,12 +23,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_file_is_sent_as_it_is(folder: Path) -> None:
-    with as_one_file(folder / "a.json") as file:
+    with zip_folder(folder / "a.json") as file:
         assert file == folder / "a.json"
 
 
 def test_a_folder_is_a_zip_of_its_name_that_is_gone_afterwards(folder: Path) -> None:
-    with as_one_file(folder) as file:
+    with zip_folder(folder) as file:
         assert file.name == "frames of May.zip"
         with zipfile.ZipFile(file) as archive:
             packed = {one.filename: one.compress_type for one in archive.infolist()}
@@ -38,16 +38,16 @@ def test_a_folder_is_a_zip_of_its_name_that_is_gone_afterwards(folder: Path) -> 
 
 
 def test_the_same_files_make_the_same_zip_whenever_they_were_written(folder: Path) -> None:
-    with as_one_file(folder) as file:
+    with zip_folder(folder) as file:
         first = file.read_bytes()
     os.utime(folder / "a.json", (1e9, 1e9))
-    with as_one_file(folder) as file:
+    with zip_folder(folder) as file:
         assert file.read_bytes() == first
 
 
 def test_what_was_packed_is_unpacked(folder: Path, tmp_path: Path) -> None:
-    with as_one_file(folder) as file:
-        unpack(file, tmp_path / "again")
+    with zip_folder(folder) as file:
+        unpack_zip(file, tmp_path / "again")
     again = tmp_path / "again"
     files = {path.relative_to(again).as_posix() for path in again.rglob("*") if path.is_file()}
     assert files == {"a.json", "b/2.JPG"}
@@ -60,5 +60,5 @@ def test_a_zip_that_leads_out_of_the_folder_is_refused_and_writes_nothing_there(
     with zipfile.ZipFile(tmp_path / "bad.zip", "w") as archive:
         archive.writestr("../out.txt", "x")
     with pytest.raises(UnsafePathError):
-        unpack(tmp_path / "bad.zip", tmp_path / "folder")
+        unpack_zip(tmp_path / "bad.zip", tmp_path / "folder")
     assert not (tmp_path / "out.txt").exists()

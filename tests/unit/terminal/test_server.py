@@ -42,7 +42,7 @@ from app.log import log_to_stderr
 from app.main import create_app
 from app.soccer.policy import PAPER
 from app.terminal.remote_files import write_evaluation
-from app.terminal.server import ABLE, ServerPlace, _command_error, connected, read_token
+from app.terminal.server import ABLE, ServerPlace, _command_error, connect_to_server, read_token
 from app.terminal.terminal import INTERRUPTED
 from tests.scenes import make_scenes
 from tests.waiting import SECONDS
@@ -399,7 +399,7 @@ class TestRefusals:
         path.chmod(mode)
         with (
             pytest.raises(InputError, match="other users can read"),
-            connected(ServerPlace(place.url, path)),
+            connect_to_server(ServerPlace(place.url, path)),
         ):
             pass
 

@@ -13,7 +13,14 @@ import pytest
 
 from app.errors import ClusterError, InputError, NotFoundError
 from app.workers import cluster
-from app.workers.cluster import Cluster, SchedulerPlace, build, carry_out, read_place, require_same
+from app.workers.cluster import (
+    Cluster,
+    SchedulerPlace,
+    carry_out,
+    read_place,
+    require_same,
+    software_versions,
+)
 from app.workers.executors import fan_out
 from tests.certificates import write_keys
 from tests.waiting import SECONDS
@@ -102,10 +109,10 @@ class TestReadPlace:
 
 class TestRequireSame:
     def test_each_difference_is_named(self) -> None:
-        other = {**build(), "solver": "4", "numpy": "1.0"}
+        other = {**software_versions(), "solver": "4", "numpy": "1.0"}
         del other["numba"]
         with pytest.raises(ClusterError) as refused:
-            require_same(build(), other, "far")
+            require_same(software_versions(), other, "far")
         said = refused.value.message
         assert "the worker at far has solver 4 instead of" in said
         assert "numba missing instead of" in said
@@ -179,11 +186,11 @@ class TestCluster:
     ) -> None:
         with Cluster(place) as executor:
             asked: Future[int] = executor.submit(
-                carry_out, {**build(), "solver": "4"}, double, (1,)
+                carry_out, {**software_versions(), "solver": "4"}, double, (1,)
             )
             with pytest.raises(ClusterError, match="instead of 4"):
                 asked.result(SECONDS)
-        monkeypatch.setattr(cluster, "build", of_another_version)
+        monkeypatch.setattr(cluster, "software_versions", of_another_version)
         with pytest.raises(ClusterError, match="has solver 4 instead of 5"):
             Cluster(place)
 
