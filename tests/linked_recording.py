@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from app.db.store import Store
-from app.features.recordings.ball_run_queries import insert_run, update_run
 from app.features.recordings.ball_run_values import run_columns
 from app.features.recordings.camera_tracking import Tracked, save_cameras
 from app.features.recordings.links import add_link, set_instants
+from app.features.recordings.queries import insert_run, update_run
 from app.features.recordings.service import get_recording
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 from tests.bench.link import Filmed, at_times, film, made_ball

@@ -21,18 +21,18 @@ from app.features.groups.edit import Edit, SetBalls
 from app.features.groups.queries import read_groups
 from app.features.groups.state import read_etags, require_etag
 from app.features.groups.view_paint import PaintFollower
-from app.features.recordings.ball_run_queries import (
+from app.features.recordings.ball_run_values import StoredRun as StoredRun
+from app.features.recordings.ball_run_values import run_columns, run_of_row
+from app.features.recordings.follow_hints import follow_hints
+from app.features.recordings.index import read_index
+from app.features.recordings.queries import (
     delete_run,
     find_run,
     insert_run,
     list_run_rows,
     update_run,
+    views_of_video,
 )
-from app.features.recordings.ball_run_values import StoredRun as StoredRun
-from app.features.recordings.ball_run_values import run_columns, run_of_row
-from app.features.recordings.camera_queries import views_of_video
-from app.features.recordings.follow_hints import follow_hints
-from app.features.recordings.index import read_index
 from app.features.recordings.service import Recording, get_recording, need_recording
 from app.features.recordings.shots import get_shots
 from app.media.frames import refused_picture

@@ -10,7 +10,6 @@ from app.errors import NotFoundError
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import by_job, job_answer
 from app.features.recordings.camera_jobs import request_cameras, request_turn
-from app.features.recordings.camera_output import MEDIA_TYPES, camera_output
 from app.features.recordings.camera_schemas import (
     CameraFormat,
     CamerasChange,
@@ -19,7 +18,14 @@ from app.features.recordings.camera_schemas import (
     CamerasRequest,
     FrameCamerasDocument,
 )
-from app.features.recordings.cameras import get_cameras, list_cameras, pitch_of, read_cameras
+from app.features.recordings.cameras import (
+    MEDIA_TYPES,
+    camera_output,
+    get_cameras,
+    list_cameras,
+    pitch_of,
+    read_cameras,
+)
 from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, etag_matches

@@ -20,22 +20,23 @@ from app.features.audit.audit_events import add_audit_event
 from app.features.datasets.service import get_dataset_head
 from app.features.file_tools.track import count_outcomes, pitch_row
 from app.features.pitches.queries import edited_pitches
-from app.features.recordings.camera_groups import give_cameras, views_of_stretch
-from app.features.recordings.camera_queries import (
-    delete_overlapping,
-    digests_of,
-    insert_cameras,
-)
 from app.features.recordings.cameras import (
     CameraSummary,
     ShotCameras,
     camera_place,
     cameras_at,
     get_cameras,
+    give_cameras,
     list_cameras,
     read_cameras,
+    views_of_stretch,
 )
 from app.features.recordings.index import in_worker, read_index
+from app.features.recordings.queries import (
+    delete_overlapping,
+    digests_of,
+    insert_cameras,
+)
 from app.features.recordings.service import Recording, get_recording, need_recording
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines

@@ -1,26 +1,35 @@
 """Cameras over time: a camera for each frame of a stretch of a recording, as the tracker finds them.
 
-A row counts them and one file holds them.
+A row counts them and one file holds them. Groups of its frames get them, and other tools their files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from app.config import Settings
 from app.db.json_columns import parse
+from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
+from app.features.file_tools.camera_export import export_cameras
+from app.features.file_tools.track import frame_row, write_cameras
+from app.features.groups.queries import StoredGroup, read_groups
+from app.features.imports.cameras import GivenCamera, NamedStation, attach_cameras
+from app.features.imports.ingest import IngestReport
 from app.features.pitches.queries import edited_pitches
-from app.features.recordings.camera_queries import (
+from app.features.recordings.queries import (
     list_cameras_rows,
     views_of_video,
 )
-from app.features.recordings.service import Recording, need_recording
+from app.features.recordings.service import Recording, get_recording, need_recording
 from app.soccer.pitch import Pitch
 from app.tracking.camera_file import frames_from_bytes
 from app.tracking.track import FrameCamera
@@ -170,3 +179,105 @@ def cameras_at(
                 frames = read_cameras(store.settings, stretch.digest)
                 found.update({each.number: each for each in frames if each.number in inside})
     return found
+
+
+SOURCE = "track"
+"""Where given cameras come from, for the log and for the metadata of views."""
+_BATCH = 100
+
+ShownFrame = tuple[int, StoredGroup, str]
+"""Number of a frame, a group with a view that shows it, and the key of that view."""
+
+
+def views_of_stretch(
+    session: Session, recording: Recording, first: int, last: int, *, with_lines: bool = False
+) -> list[ShownFrame]:
+    """The views that show a frame of a stretch; those of drawn lines alone where asked."""
+    shown = views_of_video(session, recording.dataset_id, recording.require_readable())
+    wanted = [one for one in shown if first <= one.number <= last]
+    wanted = [one for one in wanted if one.has_lines or not with_lines]
+    ids, groups = sorted({one.group for one in wanted}), dict[int, StoredGroup]()
+    for start in range(0, len(ids), _BATCH):
+        groups |= read_groups(session, ids[start : start + _BATCH])
+    return [(one.number, groups[one.group], one.key) for one in wanted if one.group in groups]
+
+
+def give_cameras(
+    session: Session,
+    recording: Recording,
+    frames: Sequence[FrameCamera],
+    views: Sequence[ShownFrame],
+    before: Mapping[int, FrameCamera],
+    actor: str,
+) -> int:
+    """Give views the cameras of their frames, unless somebody gave or drew another; returns how many have another one now.
+
+    Args:
+        session: The caller's write transaction.
+        recording: Whose frames they are.
+        frames: The cameras, of all frames that the views show.
+        views: Views of those frames.
+        before: The cameras that these take the place of, by number of their frame.
+        actor: Who wants it.
+    """
+    found, batch = {frame.number: frame for frame in frames}, []
+    for number, stored, key in views:
+        kept, frame = stored.stations[key], found[number]
+        station = kept.station
+        by_track = station.given is not None and number in before
+        by_track = by_track and station.given == before[number].camera
+        free = station.given is None and not station.lines and frame.camera is not None
+        if by_track or free:
+            place = NamedStation(kept.id, stored.id, stored.group.match, station.size)
+            batch.append((place, GivenCamera(frame.camera, frame.covariance)))
+    report = IngestReport()
+    attach_cameras(session, recording.dataset_id, batch, SOURCE, actor, report)
+    return report.changed
+
+
+MEDIA_TYPES = {
+    "soccernet": "application/zip",
+    "npz": "application/octet-stream",
+    "opentrackio": "application/zip",
+}
+"""By format."""
+
+
+def camera_output(store: Store, found: ShotCameras, form: str) -> tuple[str, bytes]:
+    """Name and content of a file of cameras.
+
+    Args:
+        store: The database.
+        found: The cameras.
+        form: ``soccernet``, ``npz`` or ``opentrackio``.
+
+    Raises:
+        ConflictError: The cameras are gone, or no frame has one.
+    """
+    frames = read_cameras(store.settings, found.digest)
+    if all(frame.camera is None for frame in frames):
+        raise ConflictError("no frame of this shot has a camera")
+    title = f"{get_recording(store, found.recording).name}_{found.first}-{found.last}"
+    with TemporaryDirectory() as place:
+        # Samples carry the name of their folder.
+        folder, out = Path(place) / title, Path(place) / "out"
+        write_cameras(
+            folder,
+            frames,
+            {"frames": [frame_row(frame) for frame in frames], "pitch": found.summary.pitch},
+        )
+        if form == "npz":
+            export_cameras(folder, out, form)
+            return f"{title}.npz", out.read_bytes()
+        if form == "opentrackio":
+            export_cameras(folder, out, form, frames[0].size)
+            folder = out
+        return f"{title}-{form}.zip", _zipped(folder)
+
+
+def _zipped(folder: Path) -> bytes:
+    content = BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted(folder.iterdir()):
+            archive.writestr(zipfile.ZipInfo(file.name), file.read_bytes(), zipfile.ZIP_DEFLATED)
+    return content.getvalue()

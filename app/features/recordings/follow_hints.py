@@ -9,13 +9,12 @@ import numpy as np
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.recordings.ball_run_queries import list_run_rows, predicted_in
 from app.features.recordings.ball_run_values import run_of_row
-from app.features.recordings.camera_queries import views_of_video
 from app.features.recordings.cameras import cameras_at
 from app.features.recordings.link_frames import unsound_frames
 from app.features.recordings.link_values import LinkedShot, ShotLink
 from app.features.recordings.links import list_links, shot_seconds, step_of
+from app.features.recordings.queries import list_run_rows, predicted_in, views_of_video
 from app.features.recordings.service import Recording, get_recording
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera

@@ -15,8 +15,7 @@ from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ConflictError, ImageError, InputError, NotFoundError, StorageError
 from app.features.audit.audit_events import add_audit_event
-from app.features.recordings.link_queries import delete_links
-from app.features.recordings.queries import update_recording
+from app.features.recordings.queries import delete_links, update_recording
 from app.features.recordings.service import (
     Details,
     Recording,

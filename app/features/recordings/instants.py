@@ -21,13 +21,12 @@ from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_row
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
-from app.features.recordings.camera_groups import SOURCE
-from app.features.recordings.camera_queries import views_of_video
-from app.features.recordings.cameras import cameras_at
+from app.features.recordings.cameras import SOURCE, cameras_at
 from app.features.recordings.index import read_index
 from app.features.recordings.link_frames import linked_frames
 from app.features.recordings.links import list_links
 from app.features.recordings.match_clock import match_time
+from app.features.recordings.queries import views_of_video
 from app.features.recordings.service import Recording, get_recording, groups_taken
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras

@@ -22,13 +22,6 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.audit_events import add_audit_event
 from app.features.groups.state import require_etag
 from app.features.recordings.index import frame_seconds
-from app.features.recordings.link_queries import (
-    delete_link,
-    find_link,
-    insert_link,
-    list_link_rows,
-    update_link,
-)
 from app.features.recordings.link_values import (
     LinkedShot,
     LinkMap,
@@ -38,7 +31,14 @@ from app.features.recordings.link_values import (
     link_of,
     shots_of_link,
 )
-from app.features.recordings.queries import RecordingRow
+from app.features.recordings.queries import (
+    RecordingRow,
+    delete_link,
+    find_link,
+    insert_link,
+    list_link_rows,
+    update_link,
+)
 from app.features.recordings.service import need_recording
 from app.geometry.arrays import FloatArray
 from app.plural import plural

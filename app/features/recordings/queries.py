@@ -1,17 +1,25 @@
-"""Recordings in the database."""
+"""Recordings, their cameras, balls and links in the database."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol, cast
+from pathlib import PurePath
+from typing import Any, NamedTuple, Protocol, cast
 
-from sqlalchemy import Select, delete, func, insert, select, update
+from sqlalchemy import Select, delete, func, insert, or_, select, update
+from sqlalchemy.orm import aliased
 
 from app.db.session import Session, now
-from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
+from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.groups.insert_queries import next_id
-from app.features.people.visibility_queries import shown_actor
-from app.features.recordings.tables import RecordingModel
+from app.features.people.visibility_queries import columns_shown, shown_actor
+from app.features.predictions.tables import PredictionModel
+from app.features.recordings.tables import (
+    BallRunModel,
+    RecordingModel,
+    ShotCamerasModel,
+    ShotLinkModel,
+)
 
 
 class RecordingRow(Protocol):
@@ -120,3 +128,166 @@ def update_recording(session: Session, recording_id: int, **values: Any) -> None
 def delete_recording(session: Session, recording_id: int) -> None:
     """Delete a recording; the groups that were taken from it stay."""
     session.execute(delete(RecordingModel).where(RecordingModel.id == recording_id))
+
+
+class FrameView(NamedTuple):
+    """A view that shows a frame of a recording: number of the frame, id of its group, and its key."""
+
+    number: int
+    group: int
+    key: str
+    has_lines: bool
+
+
+def list_cameras_rows(session: Session, recording_id: int) -> Sequence[Any]:
+    """The stretches of a recording that have cameras, in their order."""
+    model = ShotCamerasModel
+    columns = [column for column in model.__table__.columns if column.name != "actor"]
+    actor = shown_actor(model.actor, model.created).label("actor")
+    statement = select(*columns, actor).where(model.recording_id == recording_id)
+    return session.execute(statement.order_by(model.first)).all()
+
+
+def views_of_video(session: Session, dataset_id: int, sha256: str) -> list[FrameView]:
+    """The views of a dataset that show a frame of a video, in any group: their pictures are kept below its sha256."""
+    kept = ViewModel.media_path
+    statement = (
+        select(kept, ViewModel.group_id, ViewModel.key, StationModel.lines != "{}")
+        .join(GroupModel, GroupModel.id == ViewModel.group_id)
+        .join(StationModel, StationModel.id == ViewModel.station_id)
+        .where(GroupModel.dataset_id == dataset_id, kept.contains(f"/{sha256}/"))
+        .order_by(ViewModel.id)
+    )
+    found = []
+    for path, group, key, has_lines in session.execute(statement):
+        number = PurePath(path or "").stem
+        if number.isascii() and number.isdigit():
+            found.append(FrameView(int(number), group, key, has_lines))
+    return found
+
+
+def delete_overlapping(session: Session, recording_id: int, first: int, last: int) -> Sequence[Any]:
+    """Delete what shares a frame with a stretch; returns its rows."""
+    rows = list_cameras_rows(session, recording_id)
+    gone = [row for row in rows if row.first <= last and first <= row.last]
+    ids = [row.id for row in gone]
+    session.execute(delete(ShotCamerasModel).where(ShotCamerasModel.id.in_(ids)))
+    return gone
+
+
+def insert_cameras(session: Session, **values: Any) -> None:
+    """Insert the cameras of a stretch."""
+    row = {"id": next_id(session, ShotCamerasModel), "created": now(), **values}
+    session.execute(insert(ShotCamerasModel), [row])
+
+
+def digests_of(session: Session) -> set[str]:
+    """The digests of all files of cameras that are in use."""
+    rows = session.execute(select(ShotCamerasModel.digest, ShotCamerasModel.before))
+    return {digest for row in rows for digest in row if digest is not None}
+
+
+def list_run_rows(session: Session, recording_id: int) -> Sequence[Any]:
+    """The runs of a recording by their first frames."""
+    model = BallRunModel
+    statement = select(*columns_shown(model)).where(model.recording_id == recording_id)
+    return session.execute(statement.order_by(model.first, model.id)).all()
+
+
+def find_run(session: Session, run_id: int) -> Any | None:
+    """A run by its id."""
+    statement = select(*columns_shown(BallRunModel)).where(BallRunModel.id == run_id)
+    return session.execute(statement).one_or_none()
+
+
+def insert_run(session: Session, actor: str, **values: Any) -> int:
+    """Insert a run; returns its id."""
+    identity = next_id(session, BallRunModel)
+    new = {"groups": "{}", "confirmed": "[]", "accepted_by": None, "revision": 0}
+    row = {"id": identity, **values, **new, "actor": actor, "created": now()}
+    session.execute(insert(BallRunModel), [row])
+    return identity
+
+
+def update_run(session: Session, run_id: int, **values: Any) -> None:
+    """Change columns of a run."""
+    session.execute(update(BallRunModel).where(BallRunModel.id == run_id).values(values))
+
+
+def delete_run(session: Session, run_id: int) -> None:
+    """Delete a run."""
+    session.execute(delete(BallRunModel).where(BallRunModel.id == run_id))
+
+
+def predicted_in(session: Session, views: Sequence[FrameView]) -> dict[int, list[Any]]:
+    """Boxes that detectors predicted in views, by number of the frame that a view shows."""
+    numbers = {(view.group, view.key): view.number for view in views}
+    model = PredictionModel
+    statement = (
+        select(
+            ViewModel.group_id, ViewModel.key, model.x, model.y, model.width, model.height, model.score
+        )
+        .join(ViewModel, ViewModel.id == model.view_id)
+        .where(ViewModel.group_id.in_(sorted({view.group for view in views})))
+        .order_by(model.id)
+    )  # fmt: skip
+    found: dict[int, list[Any]] = {}
+    for row in session.execute(statement):
+        if (row.group_id, row.key) in numbers:
+            found.setdefault(numbers[row.group_id, row.key], []).append(row)
+    return found
+
+
+_LIVE, _REPLAY = aliased(RecordingModel), aliased(RecordingModel)
+
+
+def _links() -> Select[Any]:
+    columns = (column for column in ShotLinkModel.__table__.columns if column.name != "actor")
+    actor = shown_actor(ShotLinkModel.actor, ShotLinkModel.created).label("actor")
+    sides = (
+        column.label(f"{side}_{word}")
+        for side, table in (("live", _LIVE), ("replay", _REPLAY))
+        for word, column in (("name", table.name), ("sha256", table.sha256))
+    )
+    return (
+        select(*columns, actor, *sides)
+        .join_from(ShotLinkModel, _LIVE, _LIVE.id == ShotLinkModel.live_id)
+        .join(_REPLAY, _REPLAY.id == ShotLinkModel.replay_id)
+    )
+
+
+def list_link_rows(session: Session, recording_id: int) -> Sequence[Any]:
+    """The links whose live shot or whose replay is of a recording, by their live frames."""
+    mine = or_(ShotLinkModel.live_id == recording_id, ShotLinkModel.replay_id == recording_id)
+    order = (ShotLinkModel.live_id, ShotLinkModel.live_first, ShotLinkModel.id)
+    return session.execute(_links().where(mine).order_by(*order)).all()
+
+
+def find_link(session: Session, link_id: int) -> Any | None:
+    """A link by its id."""
+    return session.execute(_links().where(ShotLinkModel.id == link_id)).one_or_none()
+
+
+def insert_link(session: Session, actor: str, **values: Any) -> int:
+    """Insert a link; returns its id."""
+    identity = next_id(session, ShotLinkModel)
+    row = {"id": identity, **values, "revision": 0, "actor": actor, "created": now()}
+    session.execute(insert(ShotLinkModel), [row])
+    return identity
+
+
+def update_link(session: Session, link_id: int, **values: Any) -> None:
+    """Change columns of a link."""
+    session.execute(update(ShotLinkModel).where(ShotLinkModel.id == link_id).values(values))
+
+
+def delete_link(session: Session, link_id: int) -> None:
+    """Delete a link."""
+    session.execute(delete(ShotLinkModel).where(ShotLinkModel.id == link_id))
+
+
+def delete_links(session: Session, recording_id: int) -> int:
+    """Delete all links of a recording; returns how many there were."""
+    mine = or_(ShotLinkModel.live_id == recording_id, ShotLinkModel.replay_id == recording_id)
+    gone = delete(ShotLinkModel).where(mine).returning(ShotLinkModel.id)
+    return len(session.scalars(gone).all())

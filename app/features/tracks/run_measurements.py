@@ -16,15 +16,18 @@ import numpy as np
 from app.config import Settings
 from app.db.session import Session
 from app.errors import ConflictError
-from app.features.recordings.ball_run_queries import find_run
 from app.features.recordings.ball_run_values import run_of_row
-from app.features.recordings.camera_queries import list_cameras_rows, views_of_video
 from app.features.recordings.cameras import read_cameras
 from app.features.recordings.index import frame_seconds
 from app.features.recordings.link_frames import unsound_frames
-from app.features.recordings.link_queries import list_link_rows
 from app.features.recordings.link_values import ShotLink, link_of
 from app.features.recordings.links import link_seconds
+from app.features.recordings.queries import (
+    find_run,
+    list_cameras_rows,
+    list_link_rows,
+    views_of_video,
+)
 from app.features.tracks.queries import accepted_run_rows, recording_shots
 from app.soccer.frames import ImagePoint
 from app.soccer.policy import Policy

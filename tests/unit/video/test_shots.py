@@ -8,8 +8,7 @@ import pytest
 
 from app.config import Settings
 from app.video.indexing import index_recording
-from app.video.kinds import LookedAt, frames_that_tell_kind, kind_of, look_at
-from app.video.shots import find_shots
+from app.video.shots import LookedAt, find_shots, frames_that_tell_kind, kind_of, look_at
 from tests.films import Join, freeze, join, rendered, write_film
 from tests.videos import vary_times
 

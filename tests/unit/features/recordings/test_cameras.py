@@ -22,9 +22,14 @@ from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.imports.cameras import ingest_cameras
 from app.features.recordings import camera_tracking as module
-from app.features.recordings.camera_groups import SOURCE
 from app.features.recordings.camera_tracking import Tracked, track_now, track_stretch
-from app.features.recordings.cameras import cameras_at, get_cameras, list_cameras, read_cameras
+from app.features.recordings.cameras import (
+    SOURCE,
+    cameras_at,
+    get_cameras,
+    list_cameras,
+    read_cameras,
+)
 from app.features.recordings.links import add_link, set_instants
 from app.features.recordings.queries import update_recording
 from app.features.recordings.service import Recording, get_recording, groups_taken
