@@ -220,11 +220,6 @@ def test_the_pitch_that_a_shot_shows_is_taken_for_its_match(
 ) -> None:
     page = tracked(open_page, recording)
     here = f"/api/v1/recordings/{recording}"
-    taken = page.request.post(f"{here}/groups", data={"frames": [0], "propose": False})
-    until(
-        page,
-        lambda: page.request.get(f"/api/v1/jobs/{taken.json()['id']}").json()["state"] == "done",
-    )
 
     def other_pitch(route: Route) -> None:
         """The film is drawn on 105 x 68 m: as if it was not."""
@@ -244,8 +239,14 @@ def test_the_pitch_that_a_shot_shows_is_taken_for_its_match(
     page.reload()
     card = page.get_by_role("region", name="Cameras", exact=True)
     expect(card).to_contain_text("length 101.2 ± 0.2 m, width unknown")
+    button = card.get_by_role("button", name="Use 101.2 × 68 m for this match")
+    expect(button).to_have_attribute("aria-disabled", "true")
+    expect(card).to_contain_text("A match gets a pitch with its first group")
+    page.keyboard.press("i")
+    page.get_by_role("button", name="Make 1 group").click()
+    expect(button).to_have_attribute("aria-disabled", "false")
     runs = page.request.get(f"{here}/cameras").json()["items"][0]["revision"]
-    card.get_by_role("button", name="Use 101.2 × 68 m for this match").click()
+    button.click()
 
     def tracked_again() -> bool:
         return page.request.get(f"{here}/cameras").json()["items"][0]["revision"] > runs

@@ -39,16 +39,19 @@ export function CameraCard({ one, cameras }) {
 	const fresh = stretch ? stretch.drawn.filter((frame) => !stretch.summary.annotated.includes(frame)) : [];
 	const useless = stretch?.summary.unusable ?? [];
 	const shown = stretch?.summary.pitch;
+	const noGroup = one.groups ? '' : 'A match gets a pitch with its first group: press I at a frame and make a group of it';
 	return html`
 		<section class="card camera" aria-label="Cameras">
 			<h2>Cameras${stretch ? html`<span class="card__aside">frames ${stretch.first} to ${stretch.last}</span>` : null}</h2>
 			${stretch ? html`<${Counts} stretch=${stretch} old=${before} />` : html`<p>A camera for each frame of this shot is found from its paint. Groups of its frames then need no proposal.</p>`}
+			${error ? html`<${FormError} error=${error} />` : null}
+			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
 			${stretch?.stale ? html`<p class="form__error">The video is another one since: track the shot again.</p>` : null}
 			${fresh.length ? html`<p role="status">${fresh.length === 1 ? `Frame ${fresh[0]} has` : `${plural(fresh.length, 'frame')} have`} lines since. Track again, and the shot follows them.</p>` : null}
 			${useless.length ? html`<p class="form__error">Frame ${useless.join(', ')} has too few lines for a camera, and was not used.</p>` : null}
 			${shown?.other ? html`
-				<p role="status">Its frames show another pitch than its match has${frames ? ` (${pitchSize({ length: frames.pitch[0], width: frames.pitch[1] })})` : ''}: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}. With that size groups of the match are solved again, and the shot is tracked again.</p>
-				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Statistics restores the size before'} onClick=${cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
+				<p role="status">Its frames show another pitch than its match has${frames ? ` (${pitchSize({ length: frames.pitch[0], width: frames.pitch[1] })})` : ''}: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}. With that size groups of the match are solved again, and the shot is tracked again.${noGroup ? ` ${noGroup}.` : ''}</p>
+				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== '' || noGroup !== ''} title=${busy || noGroup || 'Statistics restores the size before'} onClick=${noGroup ? undefined : cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
 			<p class="buttons">
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens its lines'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>
@@ -56,8 +59,6 @@ export function CameraCard({ one, cameras }) {
 			</p>
 			${stretch ? html`
 				<p class="camera__files">Save as ${FILES.map(([format, label], index) => html`${index ? ', ' : ''}<a key=${format} class="link" href=${camerasFile(one.id, stretch.first, format)} download>${label}</a>`)}</p>` : null}
-			${error ? html`<${FormError} error=${error} />` : null}
-			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
 		</section>
 	`;
 }
