@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ipaddress
 import json
 import os
 import re
+import socket
 from pathlib import Path
 from typing import Annotated, Literal
 from urllib.parse import unquote, urlsplit
@@ -323,3 +325,29 @@ class Settings(BaseSettings):
     def exports(self) -> Path:
         """Exports made over REST."""
         return self.home / "exports"
+
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def own_folder(name: str) -> Path:
+    """Where ``static`` or ``migrations`` lies: inside the package when it was installed from a
+    wheel, beside it in a checkout."""
+    installed = _PACKAGE / name
+    return installed if installed.is_dir() else _PACKAGE.parent / name
+
+
+_SHORT = re.compile(r"[0-9a-fA-FxX.]+")
+"""IPv4 addresses as the system takes them, ``127.1`` for one."""
+
+
+def is_local(host: str) -> bool:
+    """Whether nobody but this machine can reach an address."""
+    if host == "localhost":
+        return True
+    try:
+        if _SHORT.fullmatch(host):
+            host = socket.inet_ntoa(socket.inet_aton(host))
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except (OSError, ValueError):
+        return False

@@ -18,11 +18,10 @@ from urllib.parse import urlsplit
 
 import structlog
 
-from app.config import Settings
+from app.config import Settings, is_local
 from app.durable import read_private
 from app.errors import InputError
 from app.finite import quoted
-from app.hosts import is_local
 
 log = structlog.get_logger("touchline.mail")
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.paint.view_paint import paint_of
-from app.paint.view_proposal import proposal_of
+from app.paint.view_paint import read_paint_of_image
+from app.paint.view_proposal import propose_lines_in_image
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.policy import PAPER
@@ -31,11 +31,11 @@ def compile_all() -> None:
     solving.start()
     view, pitch, policy = scene.group.views[0], scene.group.pitch, PAPER.calibration
     image = np.ascontiguousarray(render(scene, view.key)[:, :, ::-1])
-    assert proposal_of(image, view.size, (), pitch, policy).lines
+    assert propose_lines_in_image(image, view.size, (), pitch, policy).lines
     solving.join()
     assert solving.exitcode == 0
     first = solve(scene.group, PAPER).views[0].calibration
-    assert paint_of(image, view.size, first, pitch, policy).outcome == "snapped"
+    assert read_paint_of_image(image, view.size, first, pitch, policy).outcome == "snapped"
 
 
 def compile_tests() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection, Engine, inspect, text
 
-from app.config import Settings
+from app.config import Settings, own_folder
 from app.db.backup import write_backup
 from app.db.dialects.dialect import WRITE, Dialect, dialect_of
 from app.db.engine import make_engine, report_storage_errors
@@ -16,7 +16,6 @@ from app.db.locks import DatabaseInUse
 from app.db.recovery.anchor import renew_anchor, require_own_database
 from app.db.recovery.preopen_check import require_sound
 from app.errors import StorageError
-from app.folders import own_folder
 
 KNOWN_REVISIONS = tuple(
     sorted(script.name[:4] for script in (own_folder("migrations") / "versions").glob("[0-9]*.py"))

@@ -18,8 +18,7 @@ from app.formats.file_tree import DEFAULT_LIMITS, Limits, Root
 from app.formats.json_text import read_json
 from app.formats.report import Report
 from app.formats.safe_path import read_regular_file, require_safe_path
-from app.object_store.address import is_address, seal_address
-from app.object_store.path import StoredPath, find_path, target_path
+from app.object_store.path import StoredPath, find_path, is_address, seal_address, target_path
 from app.plural import plural
 from app.soccer.group import Group, Media, View
 

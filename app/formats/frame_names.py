@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 
 from app.errors import InputError
-from app.object_store.address import unseal_address
+from app.object_store.path import unseal_address
 from app.soccer.annotation import Extras
 from app.soccer.group import Group, View
 

@@ -21,8 +21,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
 from app.canonical import digest_of
+from app.config import own_folder
 from app.errors import StorageError
-from app.folders import own_folder
 from app.http import request_limits
 from app.http.headers import content_security_policy
 from app.http.permissions import open_to_all

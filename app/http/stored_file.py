@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse, StreamingResponse
 from app.config import Settings
 from app.http.deps import etag_matches
 from app.http.headers import content_disposition
-from app.object_store.address import split_address, unseal_address
+from app.object_store.path import split_address, unseal_address
 from app.object_store.store import ChangedObjectError, ObjectStore, Stored, open_store
 
 SECONDS = 60

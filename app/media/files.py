@@ -22,7 +22,7 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.media.object_frames import Archives, is_stored, read_object
 from app.media.video import Times, frame_at, kept_index, make_index, open_video
-from app.object_store.address import unseal_address
+from app.object_store.path import unseal_address
 from app.plural import plural
 from app.soccer.group import Media
 

@@ -20,8 +20,7 @@ from app.config import Settings
 from app.db.locks import lock_within
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
-from app.object_store.address import is_address, split_address, unseal_address
-from app.object_store.path import StoredPath
+from app.object_store.path import StoredPath, is_address, split_address, unseal_address
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
 from app.soccer.group import Media
 from app.zip_file import nested_name, open_nested, open_zip

@@ -17,11 +17,12 @@ from typing import IO, TYPE_CHECKING, Any, cast
 
 from app.durable import is_open_to_others
 from app.errors import InputError, NotFoundError, StorageError, TooLargeError
-from app.object_store.address import SCHEME
 
 if TYPE_CHECKING:
     from app.config import Settings, StoreSettings
 
+SCHEME = "s3://"
+"""What addresses begin with."""
 PART = 8 * 1024**2
 """Bytes of a part of an upload, of which a few are on their way at once."""
 PARTS_AT_ONCE = 4

@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray
 from app.geometry.camera import Camera
-from app.paint.ridges import Strength
-from app.paint.ridges import line_like as find_line_like
+from app.paint.ridges import Strength, find_line_like
 from app.paint.tracing import trace_places
 from app.soccer.pitch import Pitch
 
@@ -49,7 +48,7 @@ class PaintAgreement:
         return self.supported * self.explained
 
 
-def agreement(
+def measure_agreement(
     camera: Camera,
     field: BoolArray,
     paint: npt.NDArray[np.bool_] | npt.NDArray[np.uint8],
@@ -60,14 +59,14 @@ def agreement(
     Args:
         camera: In pixels of the picture.
         field: The field of play, shape (H, W).
-        paint: What ``ridges.line_like`` found, shape (H, W), or the picture itself, red green
+        paint: What ``ridges.find_line_like`` found, shape (H, W), or the picture itself, red green
             blue, shape (H, W, 3).
         pitch: The pitch.
     """
     lines = find_line_like(np.asarray(paint, np.uint8), field) if paint.ndim == 3 else paint
     width = field.shape[1]
-    (columns, rows), model = _near_model(camera, field, pitch or Pitch())
-    supported = _widened(lines.astype(np.uint8), _near_px(width))[rows, columns] > 0
+    (columns, rows), model = _pixels_near_markings(camera, field, pitch or Pitch())
+    supported = _dilate_mask(lines.astype(np.uint8), _near_px(width))[rows, columns] > 0
     explained = model[lines.astype(np.bool_)]
     return PaintAgreement(
         supported=float(supported.mean()) if len(supported) else 0.0,
@@ -76,10 +75,10 @@ def agreement(
     )
 
 
-def clear_agreement(
+def measure_clear_agreement(
     camera: Camera, field: BoolArray, strength: Strength, pitch: Pitch, paint_strength: float
 ) -> PaintAgreement:
-    """As ``agreement``, with what is no paint of a pitch left out of *explained*.
+    """As ``measure_agreement``, with what is no paint of a pitch left out of *explained*.
 
     Noise of a compressed picture and mowing stripes are fainter than the paint that is followed;
     seats that are as green as grass lie beyond the pitch.
@@ -98,18 +97,18 @@ def clear_agreement(
     on_pitch = np.isfinite(ground).all(axis=1) & (beyond < MARGIN_M).all(axis=1)
     clear = np.zeros(field.shape, np.bool_)
     clear[rows[on_pitch], columns[on_pitch]] = True
-    explained = agreement(camera, field, clear, pitch).explained
-    return replace(agreement(camera, field, strength > 0, pitch), explained=explained)
+    explained = measure_agreement(camera, field, clear, pitch).explained
+    return replace(measure_agreement(camera, field, strength > 0, pitch), explained=explained)
 
 
 def explained_strength(camera: Camera, field: BoolArray, strength: Strength, pitch: Pitch) -> float:
     """Median strength of the line-like paint that lies near a camera's markings; 0 without any."""
     lines = strength > 0
-    near = _near_model(camera, field, pitch)[1] & lines
+    near = _pixels_near_markings(camera, field, pitch)[1] & lines
     return float(np.median(strength[near])) if near.any() else 0.0
 
 
-def _widened(mask: npt.NDArray[np.uint8], radius: float) -> npt.NDArray[np.uint8]:
+def _dilate_mask(mask: npt.NDArray[np.uint8], radius: float) -> npt.NDArray[np.uint8]:
     """A mask (0 and 1) and all that lies within a radius of it, pixels."""
     size = 2 * round(radius) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
@@ -120,18 +119,18 @@ def _near_px(width: int) -> float:
     return max(NEAR_PX * width / REFERENCE_WIDTH, 1.5)
 
 
-def _near_model(
+def _pixels_near_markings(
     camera: Camera, field: BoolArray, pitch: Pitch
 ) -> tuple[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]], BoolArray]:
-    """``_marked``, and which pixels lie near a marking, shape (H, W)."""
-    columns, rows = _marked(camera, field, pitch)
+    """``_marking_points``, and which pixels lie near a marking, shape (H, W)."""
+    columns, rows = _marking_points(camera, field, pitch)
     model = np.zeros(field.shape, np.uint8)
     model[rows, columns] = 1
-    near = _widened(model, _near_px(field.shape[1]) + SPACING_PX / 2)
+    near = _dilate_mask(model, _near_px(field.shape[1]) + SPACING_PX / 2)
     return (columns, rows), np.asarray(near > 0)
 
 
-def _marked(
+def _marking_points(
     camera: Camera, field: BoolArray, pitch: Pitch
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Columns and rows of points along the visible markings on the field."""

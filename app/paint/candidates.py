@@ -61,13 +61,13 @@ class Library:
         return focals
 
 
-def _grid(*axes: tuple[float, ...]) -> FloatArray:
+def _orientation_grid(*axes: tuple[float, ...]) -> FloatArray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 MAIN = Library(
     "main stand",
-    _grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
+    _orientation_grid((-7.0, 0.0, 7.0), (47.0, 57.0, 69.0, 84.0), (-9.0, -13.0, -18.0, -25.0)),
     (0.6, 5.0),
     np.array([6.0, 12.0, 6.0]),
 )
@@ -78,14 +78,16 @@ WIDE = Library(
     np.vstack(
         [
             # Beside the penalty areas and towards the corners, high and low.
-            _grid(
+            _orientation_grid(
                 (-52.0, -38.0, -24.0, 24.0, 38.0, 52.0), (44.0, 56.0, 74.0), (-6.0, -12.0, -20.0)
             ),
             # At the touchline.
-            _grid((-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0), (37.5,), (-2.0, -5.0)),
+            _orientation_grid((-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0), (37.5,), (-2.0, -5.0)),
             # Behind the goals.
-            _grid((-96.0, -78.0, -62.0, 62.0, 78.0, 96.0), (0.0, 14.0), (-5.0, -11.0, -20.0)),
-            _grid((-58.0, 58.0), (0.0, 8.0, 16.0), (-2.5,)),
+            _orientation_grid(
+                (-96.0, -78.0, -62.0, 62.0, 78.0, 96.0), (0.0, 14.0), (-5.0, -11.0, -20.0)
+            ),
+            _orientation_grid((-58.0, 58.0), (0.0, 8.0, 16.0), (-2.5,)),
         ]
     ),
     (0.45, 3.6),
@@ -118,7 +120,9 @@ def known_library(known: Sequence[Camera]) -> Library:
     )
 
 
-def candidates(pieces: FloatArray, library: Library, pitch: Pitch, width: float) -> FloatArray:
+def candidate_cameras(
+    pieces: FloatArray, library: Library, pitch: Pitch, width: float
+) -> FloatArray:
     """The cameras of a library that lay a marking on one of the pieces.
 
     Args:
@@ -133,7 +137,7 @@ def candidates(pieces: FloatArray, library: Library, pitch: Pitch, width: float)
     """
     low, high = np.radians(TILT_DEGREES)
     return np.asarray(
-        anchor_all(
+        level_cameras_on_pieces(
             np.ascontiguousarray(library.stands),
             library.focals(width),
             np.ascontiguousarray(pieces, dtype=np.float64),
@@ -157,7 +161,7 @@ compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @compiled
-def anchor_all(stands, focals, pieces, markings, slack, low, high):
+def level_cameras_on_pieces(stands, focals, pieces, markings, slack, low, high):
     """Every camera that lays a marking on a piece; shape (N, 8)."""
     most = 2 * len(stands) * len(focals) * len(pieces) * len(markings)
     found = np.empty((most, 8))
@@ -166,7 +170,7 @@ def anchor_all(stands, focals, pieces, markings, slack, low, high):
         for m in range(len(markings)):
             for f in range(len(focals)):
                 for piece in range(len(pieces)):
-                    count = anchor(
+                    count = write_level_cameras(
                         stands[s], markings[m], focals[f], pieces[piece], slack, low, high,
                         found, count,
                     )  # fmt: skip
@@ -174,7 +178,7 @@ def anchor_all(stands, focals, pieces, markings, slack, low, high):
 
 
 @compiled
-def anchor(stand, marking, focal, piece, slack, low, high, found, count):
+def write_level_cameras(stand, marking, focal, piece, slack, low, high, found, count):
     """Writes the level cameras at a stand that see the marking along the piece.
 
     The plane through camera and marking has a normal n in the pitch frame and m in the camera's,
@@ -206,7 +210,7 @@ def anchor(stand, marking, focal, piece, slack, low, high, found, count):
             if not low <= tilt <= high:
                 continue
             st, ct = np.sin(tilt), np.cos(tilt)
-            if not within(stand, marking, focal, piece, slack, sp, cp, st, ct):
+            if not piece_lies_on_marking(stand, marking, focal, piece, slack, sp, cp, st, ct):
                 continue
             if count == len(found):
                 return count
@@ -220,7 +224,7 @@ def anchor(stand, marking, focal, piece, slack, low, high, found, count):
 
 
 @compiled
-def within(stand, marking, focal, piece, slack, sp, cp, st, ct):
+def piece_lies_on_marking(stand, marking, focal, piece, slack, sp, cp, st, ct):
     """Whether both ends of the piece lie in front and on the marking, not beyond its ends."""
     dx, dy = marking[2] - marking[0], marking[3] - marking[1]
     length = np.sqrt(dx * dx + dy * dy)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
-from app.paint.grass import grass_colour
+from app.paint.grass import mark_grass_colour
 from app.paint.profile_kernels import BEYOND_PX, SIDE_PX, drop_strays, find_stripes
 from app.paint.tracing import TracedPlaces, trace_places
 from app.soccer.frames import Box
@@ -133,11 +133,11 @@ def read_picture(image: Image, field: BoolArray, hidden: Sequence[Box] = ()) -> 
     red, green, blue = cv2.split(image)
     least = cv2.min(red, cv2.min(green, blue)).astype(np.float32)
     level = np.asarray(cv2.GaussianBlur(least, (5, 5), SMOOTH_PX), np.float32)
-    covered = np.logical_not(seen_field(field, hidden)).astype(np.uint8)
-    return Reading(image, level, covered, _noise(level, field))
+    covered = np.logical_not(visible_field(field, hidden)).astype(np.uint8)
+    return Reading(image, level, covered, _estimate_noise(level, field))
 
 
-def seen_field(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
+def visible_field(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
     """The field of play, shape (H, W), without boxes in which nothing is believed, pixels."""
     seen = field.copy()
     for box in hidden:
@@ -147,7 +147,7 @@ def seen_field(field: BoolArray, hidden: Sequence[Box]) -> BoolArray:
     return seen
 
 
-def trace(
+def trace_visible_markings(
     reading: Reading, camera: Camera, pitch: Pitch, spacing_px: float = SPACING_PX
 ) -> TracedPlaces:
     """Places along the markings as the camera shows them, on the field of play.
@@ -157,12 +157,12 @@ def trace(
     """
     spacing = spacing_px * max(reading.width / PLACES_WIDTH, 1.0)
     traced = trace_places(camera, pitch, reading.width, reading.height, spacing, MOST_PLACES)
-    on_field = _on_field(reading.hidden, traced.pixels)
+    on_field = _is_unhidden(reading.hidden, traced.pixels)
     found = np.flatnonzero(on_field & (traced.widths >= THINNEST_PX))
     return traced.only(found, int(on_field.sum()))
 
 
-def seek(reading: Reading, traced: TracedPlaces, window_px: float | FloatArray) -> Evidence:
+def find_paint(reading: Reading, traced: TracedPlaces, window_px: float | FloatArray) -> Evidence:
     """Paint across each place, sought up to a distance.
 
     Args:
@@ -214,7 +214,7 @@ def shows_grass_beside(reading: Reading, traced: TracedPlaces, window_px: float)
         beside = traced.pixels[rows] + sign * side[rows, None] * traced.normals[rows]
         x, y = (beside + 0.5).astype(np.int64).T
         grass = np.empty((1, len(rows)), np.uint8)
-        grass_colour(np.ascontiguousarray(reading.image[y, x][None]), grass)
+        mark_grass_colour(np.ascontiguousarray(reading.image[y, x][None]), grass)
         seen[rows] &= (grass[0] > 0) & (reading.hidden[y, x] == 0)
     return seen
 
@@ -230,14 +230,14 @@ def _bright_as_paint(strengths: FloatArray, widths: FloatArray) -> BoolArray:
     return bright & (strengths >= PALER * paint * full)
 
 
-def _on_field(hidden: npt.NDArray[np.uint8], pixels: FloatArray) -> BoolArray:
+def _is_unhidden(hidden: npt.NDArray[np.uint8], pixels: FloatArray) -> BoolArray:
     columns, rows = (pixels + 0.5).astype(np.int64).T
     height, width = hidden.shape
     seen: BoolArray = hidden[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] == 0
     return seen
 
 
-def _noise(level: FloatImage, field: BoolArray) -> float:
+def _estimate_noise(level: FloatImage, field: BoolArray) -> float:
     """From the median difference of pixels that are two apart."""
     here, beside = level[::3, :-2:3], level[::3, 2::3]
     both = field[::3, :-2:3] & field[::3, 2::3]

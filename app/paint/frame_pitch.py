@@ -10,7 +10,13 @@ from app.errors import GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import CurvePoints, parameters_from_camera
-from app.paint.evidence import Image, read_picture, seek, to_paint_evidence, trace
+from app.paint.evidence import (
+    Image,
+    find_paint,
+    read_picture,
+    to_paint_evidence,
+    trace_visible_markings,
+)
 from app.paint.grass import field_of_play
 from app.paint.snap import SnappedCamera
 from app.soccer.frames import ImageSize
@@ -32,7 +38,7 @@ NEAR_M = 3.0
 """Cameras that stand so near each other, in pictures of one size, may be one."""
 
 
-def pitch_frame(image: Image, camera: Camera, pitch: Pitch) -> PitchFrame:
+def make_pitch_frame(image: Image, camera: Camera, pitch: Pitch) -> PitchFrame:
     """Places of paint on and beside the markings of a proposed camera.
 
     Args:
@@ -43,11 +49,13 @@ def pitch_frame(image: Image, camera: Camera, pitch: Pitch) -> PitchFrame:
     height, width = image.shape[:2]
     reading = read_picture(image, field_of_play(image))
     window = WINDOW_PX * max(width / 960, 0.6)
-    evidence = seek(reading, trace(reading, camera, pitch), window)
+    evidence = find_paint(reading, trace_visible_markings(reading, camera, pitch), window)
     return PitchFrame(to_paint_evidence(evidence, camera).some_points(), ImageSize(width, height))
 
 
-def films(cameras: Sequence[Camera | None], sizes: Sequence[ImageSize | None]) -> list[list[int]]:
+def group_by_position(
+    cameras: Sequence[Camera | None], sizes: Sequence[ImageSize | None]
+) -> list[list[int]]:
     """Indices of frames that one main camera may have taken, by where it stands, shape as told."""
     found: list[list[int]] = []
     for index, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
@@ -63,7 +71,7 @@ def films(cameras: Sequence[Camera | None], sizes: Sequence[ImageSize | None]) -
     return found
 
 
-def pitch_of(frames: Sequence[PitchFrame], pitch: Pitch) -> Pitch | None:
+def agreed_pitch(frames: Sequence[PitchFrame], pitch: Pitch) -> Pitch | None:
     """The size that all frames certainly show where it is another one; None otherwise.
 
     Args:
@@ -82,7 +90,7 @@ def _is_near(camera: Camera, other: Camera | None) -> bool:
     return other is not None and bool(np.linalg.norm(camera.position - other.position) < NEAR_M)
 
 
-def painted_frame(snapped: SnappedCamera) -> PaintedFrame:
+def make_painted_frame(snapped: SnappedCamera) -> PaintedFrame:
     """A camera on its paint, as frames are solved together."""
     evidence, camera = snapped.evidence, snapped.camera
     traced = evidence.traced
@@ -93,7 +101,7 @@ def painted_frame(snapped: SnappedCamera) -> PaintedFrame:
     return PaintedFrame(parameters_from_camera(camera, half), sightings, evidence.sigmas)
 
 
-def share_tripod(
+def find_shared_pitch(
     frames: Sequence[SnappedCamera], pitch: Pitch, policy: CalibrationPolicy
 ) -> tuple[TripodPitch, list[FloatArray]] | None:
     """The pitch that frames of one camera on a tripod show, and what each camera is known to with it.
@@ -110,7 +118,7 @@ def share_tripod(
     if len({frame.size for frame in frames}) != 1:
         return None
     height, width = frames[0].size
-    painted = [painted_frame(frame) for frame in frames]
+    painted = [make_painted_frame(frame) for frame in frames]
     shown = find_tripod_pitch(painted, ImageSize(width, height), pitch, policy)
     if shown is None:
         return None

@@ -87,7 +87,7 @@ def goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
         pitch: The pitch; the middle of the frame of its goals is sought.
     """
     height, width = image.shape[:2]
-    level, unit = _level(image)
+    level, unit = _smooth_darkest_channel(image)
     found, frame = {}, pitch.with_goal("middle")
     for name in GOAL_PARTS:
         places = frame.sample(name, 0.02, 0.02)
@@ -96,7 +96,7 @@ def goal_lines(image: Image, camera: Camera, pitch: Pitch) -> Lines:
         if np.count_nonzero(inside) < 2:
             continue
         thick = POST_M * camera.focal_length[0] / camera.pitch_to_camera(places[inside])[:, 2]
-        points = _stripe(level, pixels[inside], float(np.median(thick)), unit)
+        points = _bright_stripe(level, pixels[inside], float(np.median(thick)), unit)
         if points is not None:
             found[name] = [ImagePoint(x, y) for x, y in points.tolist()]
     return make_lines(found)
@@ -113,29 +113,29 @@ def goal_height(image: Image, camera: Camera, pitch: Pitch) -> GoalHeight | None
         camera: On the paint of the picture.
         pitch: The pitch.
     """
-    level, unit = _level(image)
+    level, unit = _smooth_darkest_channel(image)
     found = [
         height
         for side in ("left", "right")
-        if (height := _height(level, unit, camera, pitch, side)) is not None
+        if (height := _height_of_side(level, unit, camera, pitch, side)) is not None
     ]
     return max(found, key=lambda item: item.contrast, default=None)
 
 
-def _height(
+def _height_of_side(
     level: npt.NDArray[np.float32], unit: float, camera: Camera, pitch: Pitch, side: str
 ) -> GoalHeight | None:
     bar = pitch.with_goal("middle").shapes[f"Goal {side} crossbar"]
     assert isinstance(bar, Segment)
     ends = np.array([bar.start, bar.end])
-    bars = [_seen(level, unit, camera, *(ends * (1.0, 1.0, share))) for share in HEIGHTS]
+    bars = [_bright_share(level, unit, camera, *(ends * (1.0, 1.0, share))) for share in HEIGHTS]
     contrasts = np.array([0.0 if seen is None else seen[1] for seen in bars])
     best = int(contrasts.argmax())
     crossbar = bars[best]
     if crossbar is None or crossbar[0] < LEAST_SHARE:
         return None
     posts = [
-        _seen(level, unit, camera, end * (1.0, 1.0, HEIGHTS[best]), end * (1.0, 1.0, 0.0))
+        _bright_share(level, unit, camera, end * (1.0, 1.0, HEIGHTS[best]), end * (1.0, 1.0, 0.0))
         for end in ends
     ]
     near = np.abs(np.log(HEIGHTS)) < np.log(MOST_SQUARE)
@@ -148,7 +148,7 @@ def _height(
     )
 
 
-def _seen(
+def _bright_share(
     level: npt.NDArray[np.float32], unit: float, camera: Camera, start: FloatArray, end: FloatArray
 ) -> tuple[float, float] | None:
     """Share of a straight part's places that are brighter than both sides, and by how much in the
@@ -170,12 +170,12 @@ def _seen(
     depth = camera.pitch_to_camera(places[inside])[:, 2]
     thick = float(np.median(POST_M * camera.focal_length[0] / depth))
     offsets = np.arange(-ON_LINE_PX, ON_LINE_PX + STEP_PX, STEP_PX) * unit
-    contrast = _contrast(level, middles, offsets, normal, thick, unit).max(axis=1)
+    contrast = _stripe_contrast(level, middles, offsets, normal, thick, unit).max(axis=1)
     mean = float(np.clip(contrast, 0.0, MOST_CONTRAST).mean())
     return float((contrast >= LEAST_CONTRAST).mean()), mean
 
 
-def _contrast(
+def _stripe_contrast(
     level: npt.NDArray[np.float32],
     middles: FloatArray,
     offsets: FloatArray,
@@ -186,21 +186,21 @@ def _contrast(
     """How much brighter than both its sides each place is, grey levels, shape (N, offsets)."""
     side = 0.5 * thick + BESIDE_PX * unit
     here, one, other = (
-        _read(level, middles[:, None] + (offsets + shift)[:, None] * normal)
+        _interpolate_levels(level, middles[:, None] + (offsets + shift)[:, None] * normal)
         for shift in (0.0, -side, side)
     )
     contrast: FloatArray = here - np.maximum(one, other)
     return contrast
 
 
-def _level(image: Image) -> tuple[npt.NDArray[np.float32], float]:
+def _smooth_darkest_channel(image: Image) -> tuple[npt.NDArray[np.float32], float]:
     """The smallest channel, smoothed, grey levels, shape (H, W); pixels for one at ``WORK_WIDTH``."""
     unit = max(image.shape[1] / WORK_WIDTH, 1.0)
     least = image.min(axis=2).astype(np.float32)
     return np.asarray(cv2.GaussianBlur(least, (0, 0), SMOOTH_PX * unit), np.float32), unit
 
 
-def _stripe(
+def _bright_stripe(
     level: npt.NDArray[np.float32], pixels: FloatArray, thick: float, unit: float
 ) -> FloatArray | None:
     """Points of a bright stripe near a projected part, shape (N, 2); None where none is seen."""
@@ -214,12 +214,12 @@ def _stripe(
     shares = np.linspace(0.0, 1.0, count)
     middles = start + shares[:, None] * (end - start)
     offsets = np.arange(-WINDOW_PX, WINDOW_PX + STEP_PX, STEP_PX) * unit
-    contrast = _contrast(level, middles, offsets, normal, thick, unit)
+    contrast = _stripe_contrast(level, middles, offsets, normal, thick, unit)
     best = contrast.argmax(axis=1)
     bright = contrast[np.arange(count), best] >= LEAST_CONTRAST
     if np.count_nonzero(bright) < LEAST_SHARE * count:
         return None
-    line = _line(shares[bright], offsets[best[bright]], ON_LINE_PX * unit)
+    line = _fit_line(shares[bright], offsets[best[bright]], ON_LINE_PX * unit)
     near = np.abs(offsets[best] - np.polyval(line, shares)) <= ON_LINE_PX * unit
     on = np.flatnonzero(bright & near)
     if len(on) < LEAST_SHARE * count:
@@ -230,7 +230,7 @@ def _stripe(
     return points
 
 
-def _line(shares: FloatArray, offsets: FloatArray, near: float) -> FloatArray:
+def _fit_line(shares: FloatArray, offsets: FloatArray, near: float) -> FloatArray:
     """The line, as of ``polyfit``, near which most offsets lie: through two of them."""
     first, second = np.triu_indices(len(shares), max(len(shares) // 3, 1))
     slopes = (offsets[second] - offsets[first]) / (shares[second] - shares[first])
@@ -240,7 +240,7 @@ def _line(shares: FloatArray, offsets: FloatArray, near: float) -> FloatArray:
     return np.array([slopes[best], bases[best]])
 
 
-def _read(level: npt.NDArray[np.float32], places: FloatArray) -> FloatArray:
+def _interpolate_levels(level: npt.NDArray[np.float32], places: FloatArray) -> FloatArray:
     """Grey levels between pixels, of places of shape (..., 2)."""
     x, y = places.astype(np.float32).transpose(2, 0, 1)
     read = cv2.remap(level, x.copy(), y.copy(), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -38,7 +38,7 @@ def is_grass(red, green, blue):
 
 
 @compiled
-def grass_colour(image, grass):
+def mark_grass_colour(image, grass):
     """Writes 1 where the picture (H, W, 3; red green blue) is the colour of grass, else 0."""
     for row in range(image.shape[0]):
         for column in range(image.shape[1]):
@@ -69,12 +69,12 @@ def field_of_play(image: Image) -> BoolArray:
         Shape (H, W); nowhere true where there is too little grass, see ``why_no_field``.
     """
     height, width = image.shape[:2]
-    small = _small(image)
+    small = _downscale(image)
     grass: Mask = np.empty(small.shape[:2], np.uint8)
-    grass_colour(small, grass)
+    mark_grass_colour(small, grass)
     # Lines and blades divide the grass, specks of green in the stands are none.
-    grass = _morphed(grass, cv2.MORPH_OPEN, 3)
-    grass = _morphed(grass, cv2.MORPH_CLOSE, 5)
+    grass = _apply_morphology(grass, cv2.MORPH_OPEN, 3)
+    grass = _apply_morphology(grass, cv2.MORPH_CLOSE, 5)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(grass, connectivity=4)
     areas = stats[1:count, cv2.CC_STAT_AREA]
     if not len(areas) or areas.max() < LEAST_SHARE * grass.size:
@@ -82,7 +82,7 @@ def field_of_play(image: Image) -> BoolArray:
     kept = np.flatnonzero(np.append(False, areas >= PIECE_SHARE * areas.max()))
     chosen: Mask = np.isin(labels, kept).astype(np.uint8)
     # A near line is broader than the kernel above.
-    chosen = _morphed(chosen, cv2.MORPH_CLOSE, 9)
+    chosen = _apply_morphology(chosen, cv2.MORPH_CLOSE, 9)
     outlines, _ = cv2.findContours(chosen, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     cv2.drawContours(chosen, outlines, -1, 1, cv2.FILLED)
     if chosen.shape != (height, width):
@@ -100,7 +100,7 @@ def why_no_field(image: Image, field: BoolArray) -> str | None:
     """
     if field.any():
         return None
-    small = _small(image).astype(np.float64)
+    small = _downscale(image).astype(np.float64)
     levels = small.mean(axis=2)
     if float(np.ptp(small, axis=2).mean()) < GREY_SPREAD:
         if levels.mean() > PALE_LEVEL:
@@ -111,11 +111,11 @@ def why_no_field(image: Image, field: BoolArray) -> str | None:
     return "no field of play is seen: too little of the picture is grass"
 
 
-def _morphed(mask: Mask, operation: int, size: int) -> Mask:
+def _apply_morphology(mask: Mask, operation: int, size: int) -> Mask:
     return np.asarray(cv2.morphologyEx(mask, operation, np.ones((size, size), np.uint8)), np.uint8)
 
 
-def _small(image: Image) -> Image:
+def _downscale(image: Image) -> Image:
     height, width = image.shape[:2]
     if width <= WORK_WIDTH:
         return np.ascontiguousarray(image)

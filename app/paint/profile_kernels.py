@@ -59,18 +59,20 @@ def find_stripes(
         if 2 * half + 1 > LONGEST:
             continue
         x, y, nx, ny = pixels[n, 0], pixels[n, 1], normals[n, 0], normals[n, 1]
-        if not _profile(level, x, y, nx, ny, half, profile):
+        if not _write_profile(level, x, y, nx, ny, half, profile):
             continue
-        peak = _best(image, hidden, profile, x, y, nx, ny, half, window, side, least)
+        peak = _most_prominent_stripe(
+            image, hidden, profile, x, y, nx, ny, half, window, side, least
+        )
         if peak < 0:
             continue
-        _measure(profile, peak, half, side, widths[n], noise, n, offsets, sigmas, strengths)
+        _measure_stripe(profile, peak, half, side, widths[n], noise, n, offsets, sigmas, strengths)
         if abs(offsets[n]) > window:
             offsets[n], strengths[n] = np.nan, 0.0
 
 
 @compiled
-def _profile(level, x, y, nx, ny, half, profile):
+def _write_profile(level, x, y, nx, ny, half, profile):
     """Writes the mean brightness along the normal; False where it leaves the picture."""
     height, width = level.shape
     far = half * STEP
@@ -94,7 +96,7 @@ def _profile(level, x, y, nx, ny, half, profile):
 
 
 @compiled
-def _best(image, hidden, profile, x, y, nx, ny, half, window, side, least):
+def _most_prominent_stripe(image, hidden, profile, x, y, nx, ny, half, window, side, least):
     """Index of the most prominent stripe within the window; -1 where there is none."""
     apart = int(side / STEP + 0.5)
     inner = int(window / STEP)
@@ -130,7 +132,7 @@ def _grass_at(image, hidden, x, y):
 
 
 @compiled
-def _measure(profile, peak, half, side, width, noise, n, offsets, sigmas, strengths):
+def _measure_stripe(profile, peak, half, side, width, noise, n, offsets, sigmas, strengths):
     """Writes place, sigma and strength of the stripe at a peak."""
     apart = int(side / STEP + 0.5)
     low, high = profile[peak - apart], profile[peak + apart]

@@ -32,24 +32,24 @@ from app.geometry.resection import (
 )
 from app.paint.agreement import (
     PaintAgreement,
-    agreement,
-    clear_agreement,
     explained_strength,
+    measure_agreement,
+    measure_clear_agreement,
 )
 from app.paint.candidates import KNOWN, MAIN, WIDE, Library, known_library
-from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace
+from app.paint.evidence import Reading, read_picture, shows_grass_beside, trace_visible_markings
 from app.paint.goal import goal_height
 from app.paint.grass import field_of_play, why_no_field
-from app.paint.ridges import Strength, line_strength, straight_pieces
+from app.paint.ridges import Strength, find_straight_pieces, measure_line_strength
 from app.paint.search import (
     KAPPA_MEAN,
     SCOUTED,
     SEARCHED,
     ScoredPicture,
     VisiblePaint,
-    search,
-    shown_by,
-    shows_the_same,
+    find_visible_paint,
+    is_same_view,
+    search_cameras,
 )
 from app.paint.snap import SnappedCamera, snap_reading
 from app.soccer.choices import ProposalOutcome
@@ -180,7 +180,7 @@ class RankedCamera:
         return self.agreement.product * (0.5 if self.is_contradicted else 1.0)
 
 
-def propose(
+def propose_camera(
     image: Image,
     pitch: Pitch | None = None,
     known: Sequence[Camera] = (),
@@ -202,20 +202,20 @@ def propose(
     ranked: list[RankedCamera] = []
     match = known_library(known) if known else None
     for library in [*([match] if match else []), MAIN, WIDE]:
-        found = rank(frame, library, pitch, policy)
+        found = rank_cameras(frame, library, pitch, policy)
         if match is not None and library is not match:
-            found = [_where_known(frame, item, match, pitch) for item in found]
-        ranked = merged(frame, ranked, found)
+            found = [_move_to_known_position(frame, item, match, pitch) for item in found]
+        ranked = merge_ranked(frame, ranked, found)
         if why_unsure(ranked) is None:
             break
     else:
-        closer = _looked_closer(image, frame, ranked, pitch)
+        closer = _rank_in_own_size(image, frame, ranked, pitch)
         if why_unsure(closer) is None:
-            return _answer(image, frame, closer, pitch)
-    return _answer(image, frame, ranked, pitch)
+            return _choose_proposal(image, frame, closer, pitch)
+    return _choose_proposal(image, frame, ranked, pitch)
 
 
-def enlarged(image: Image) -> Image:
+def enlarge_small_picture(image: Image) -> Image:
     """A small picture as it is read."""
     cubic = cv2.INTER_CUBIC
     return np.asarray(cv2.resize(image, None, fx=ENLARGED, fy=ENLARGED, interpolation=cubic))
@@ -235,7 +235,7 @@ def read_frame(image: Image) -> SearchedFrame | str:
         return small
     height, width = image.shape[:2]
     if width < ENLARGED_WIDTH:
-        image = enlarged(image)
+        image = enlarge_small_picture(image)
     elif width > WORK_WIDTH:
         size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
@@ -243,8 +243,8 @@ def read_frame(image: Image) -> SearchedFrame | str:
     reason = why_no_field(image, field)
     if reason is not None:
         return reason
-    strength = _strength(image, field)
-    pieces = straight_pieces(strength > 0, MOST_PIECES)
+    strength = _line_strength(image, field)
+    pieces = find_straight_pieces(strength > 0, MOST_PIECES)
     if not len(pieces):
         return "no straight line is seen on the grass"
     center = principal_point(ImageSize(image.shape[1], image.shape[0]))
@@ -252,14 +252,14 @@ def read_frame(image: Image) -> SearchedFrame | str:
     return SearchedFrame(image, field, strength, pieces, picture, read_picture(image, field))
 
 
-def _strength(image: Image, field: BoolArray) -> Strength:
-    strength = line_strength(image, field)
+def _line_strength(image: Image, field: BoolArray) -> Strength:
+    strength = measure_line_strength(image, field)
     for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
         strength[border] = strength[:, border] = 0.0
     return strength
 
 
-def _looked_closer(
+def _rank_in_own_size(
     image: Image, frame: SearchedFrame, ranked: Sequence[RankedCamera], pitch: Pitch
 ) -> list[RankedCamera]:
     """The best cameras of a frame once more, in the picture's own size and by clear paint alone.
@@ -273,54 +273,58 @@ def _looked_closer(
     factor = width / frame.field.shape[1]
     looked, again = frame, [*ranked[:CLOSER]]
     if factor > 1:
-        field = _field_at(frame, width, height)
+        field = _resize_field(frame, width, height)
         looked = replace(
             frame,
             image=image,
             field=field,
-            strength=_strength(image, field),
+            strength=_line_strength(image, field),
             reading=read_picture(image, field),
         )
-        drawn = threads().map(lambda item: _closer(looked, item, factor, pitch), again)
+        drawn = kernel_threads().map(
+            lambda item: _snap_in_own_size(looked, item, factor, pitch), again
+        )
         again = [item for item in drawn if item is not None]
     if not again:
         return []
     best = max(again, key=lambda item: item.score).snapped.camera
     paint = explained_strength(best, looked.field, looked.strength, pitch)
-    seen = threads().map(
-        lambda item: clear_agreement(
+    seen = kernel_threads().map(
+        lambda item: measure_clear_agreement(
             item.snapped.camera, looked.field, looked.strength, pitch, paint
         ),
         again,
     )
     clear = [replace(item, agreement=one) for item, one in zip(again, seen, strict=True)]
-    return merged(frame, [], clear)
+    return merge_ranked(frame, [], clear)
 
 
-def _closer(
+def _snap_in_own_size(
     looked: SearchedFrame, item: RankedCamera, factor: float, pitch: Pitch
 ) -> RankedCamera | None:
     """A camera drawn onto the paint of the picture in its own size, from near and from afar; the
     better of both."""
     height, width = looked.field.shape
-    start = scaled(item.snapped, height, width).camera
+    start = scale_snapped(item.snapped, height, width).camera
     found = []
     for windows in (LAST_WINDOWS, WINDOWS):
-        snapped = _snap(looked.reading, start, pitch, windows, item.policy, item.known)
+        snapped = _snap_with_known_position(
+            looked.reading, start, pitch, windows, item.policy, item.known
+        )
         if snapped.reason is None:
-            seen = agreement(snapped.camera, looked.field, looked.paint, pitch)
+            seen = measure_agreement(snapped.camera, looked.field, looked.paint, pitch)
             weakest = weakest_marking(looked.reading, snapped, pitch, VISIBLE_PX * factor)
             found.append(replace(item, snapped=snapped, agreement=seen, weakest=weakest))
     return max(found, key=lambda item: item.score, default=None)
 
 
-def _field_at(frame: SearchedFrame, width: int, height: int) -> BoolArray:
+def _resize_field(frame: SearchedFrame, width: int, height: int) -> BoolArray:
     """The field of play in the picture as it is."""
     size, small = (width, height), frame.field.astype(np.uint8)
     return cv2.resize(small, size, interpolation=cv2.INTER_NEAREST).astype(np.bool_)
 
 
-def rank(
+def rank_cameras(
     frame: SearchedFrame, library: Library, pitch: Pitch, policy: CalibrationPolicy
 ) -> list[RankedCamera]:
     """The cameras of a library that lie on the paint of a frame, best first."""
@@ -333,48 +337,54 @@ def rank(
         kappa = library.kappa
         sigma = min(KNOWN_KAPPA_SIGMA, policy.distortion_sigma)
         policy = replace(policy, distortion_mean=kappa, distortion_sigma=sigma)
-    found = search(frame.picture, frame.pieces, library, pitch, threads(), *amount, kappa)
+    found = search_cameras(
+        frame.picture, frame.pieces, library, pitch, kernel_threads(), *amount, kappa
+    )
     if not found:
         return []
-    drawn = threads().map(lambda item: _drawn(frame, item.camera, library, pitch, policy), found)
-    known = _spread(library) if library.name == KNOWN else None
-    ranked = [_ranked(frame, item, pitch, policy, known) for item in drawn if item.reason is None]
+    drawn = kernel_threads().map(
+        lambda item: _snap_from_search(frame, item.camera, library, pitch, policy), found
+    )
+    known = _start_covariance(library) if library.name == KNOWN else None
+    ranked = [
+        _rank_snapped(frame, item, pitch, policy, known) for item in drawn if item.reason is None
+    ]
     if known is not None:
-        ranked = [_where_known(frame, item, library, pitch) for item in ranked]
-    return merged(frame, [], ranked)
+        ranked = [_move_to_known_position(frame, item, library, pitch) for item in ranked]
+    return merge_ranked(frame, [], ranked)
 
 
-def _ranked(
+def _rank_snapped(
     frame: SearchedFrame,
     snapped: SnappedCamera,
     pitch: Pitch,
     policy: CalibrationPolicy,
     known: FloatArray | None,
 ) -> RankedCamera:
-    seen = agreement(snapped.camera, frame.field, frame.paint, pitch)
+    seen = measure_agreement(snapped.camera, frame.field, frame.paint, pitch)
     return RankedCamera(
         snapped, seen, weakest_marking(frame.reading, snapped, pitch), policy, known
     )
 
 
-def _drawn(
+def _snap_from_search(
     frame: SearchedFrame, start: Camera, library: Library, pitch: Pitch, policy: CalibrationPolicy
 ) -> SnappedCamera:
     """A camera drawn onto the paint; where the paint leaves a number open or would move it far,
     once more with what is known of cameras, or at the position that the match knows."""
-    alone = _snap(frame.reading, start, pitch, WINDOWS, policy)
+    alone = _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy)
     if alone.reason is None:
         return alone
-    known = _spread(library)
+    known = _start_covariance(library)
     if library.name == KNOWN:
-        start = _at_stand(frame.reading, start, library, pitch)
-        return _snap(frame.reading, start, pitch, WINDOWS, policy, known)
+        start = _move_to_nearest_stand(frame.reading, start, library, pitch)
+        return _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy, known)
     return snap_reading(
         frame.reading, start, pitch, WINDOWS, policy, known, circles_count_twice=True
     )
 
 
-def _where_known(
+def _move_to_known_position(
     frame: SearchedFrame, item: RankedCamera, match: Library, pitch: Pitch
 ) -> RankedCamera:
     """A camera at the position that the match knows, where the paint alone leaves that open and shows
@@ -386,19 +396,24 @@ def _where_known(
     if away.min() > max(NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS * item.uncertain_m):
         return replace(item, known=None)
     policy = replace(item.policy, distortion_mean=match.kappa or item.policy.distortion_mean)
-    start, known = _at_stand(frame.reading, camera, match, pitch), _spread(match)
-    snapped = _snap(frame.reading, start, pitch, WINDOWS, policy, known)
+    start, known = (
+        _move_to_nearest_stand(frame.reading, camera, match, pitch),
+        _start_covariance(match),
+    )
+    snapped = _snap_with_known_position(frame.reading, start, pitch, WINDOWS, policy, known)
     if snapped.reason is not None:
         return replace(item, known=None)
-    there = _ranked(frame, snapped, pitch, policy, known)
+    there = _rank_snapped(frame, snapped, pitch, policy, known)
     return there if there.score >= KEPT_AT_KNOWN * item.score else replace(item, known=None)
 
 
-def _at_stand(reading: Reading, camera: Camera, library: Library, pitch: Pitch) -> Camera:
+def _move_to_nearest_stand(
+    reading: Reading, camera: Camera, library: Library, pitch: Pitch
+) -> Camera:
     """The camera at the nearest stand of a library, turned and zoomed so that it shows the same."""
     away = np.linalg.norm(library.stands - camera.position, axis=1)
     moved = library.stands[away.argmin()] - camera.position
-    rows = trace(reading, camera, pitch).jacobian
+    rows = trace_visible_markings(reading, camera, pitch).jacobian
     if len(rows) < len(AIM):
         return camera
     turned = np.linalg.lstsq(rows[:, AIM], -rows[:, X : Z + 1] @ moved, rcond=None)[0]
@@ -410,13 +425,13 @@ def _at_stand(reading: Reading, camera: Camera, library: Library, pitch: Pitch) 
     return camera_from_parameters(parameters, camera.principal_point, reading.half_diagonal)
 
 
-def _spread(library: Library) -> FloatArray:
+def _start_covariance(library: Library) -> FloatArray:
     """Covariance of a start of the search, shape (8, 8)."""
     sigma = np.concatenate([AIM_SIGMA, library.position_sigma, LENS_SIGMA])
     return np.diag(sigma**2)
 
 
-def _snap(
+def _snap_with_known_position(
     reading: Reading,
     start: Camera,
     pitch: Pitch,
@@ -439,7 +454,7 @@ def weakest_marking(
     A camera that lays some markings on paint that is there by chance shows others where none is.
     Nothing is asked of places behind people and along the border of the picture.
     """
-    traced, paint = trace(reading, snapped.camera, pitch), snapped.evidence.traced
+    traced, paint = trace_visible_markings(reading, snapped.camera, pitch), snapped.evidence.traced
     usable = shows_grass_beside(reading, traced, WINDOWS[-1] * reading.width / WORK_WIDTH)
     usable &= traced.widths > visible_px
     shown = np.bincount(traced.marking[usable], minlength=len(MARKINGS))
@@ -449,7 +464,7 @@ def weakest_marking(
     return float((seen[long] / shown[long]).min()) if long.any() else 1.0
 
 
-def merged(
+def merge_ranked(
     frame: SearchedFrame, one: Sequence[RankedCamera], other: Sequence[RankedCamera]
 ) -> list[RankedCamera]:
     """Both lists in one, best first, each camera once."""
@@ -461,13 +476,13 @@ def merged(
         camera = item.snapped.camera
         if (height, width) != (rows, columns):
             camera = camera.scaled(columns / width, rows / height)
-        if not any(shows_the_same(old, camera, frame.picture) for old in shown):
+        if not any(is_same_view(old, camera, frame.picture) for old in shown):
             kept.append(item)
-            shown.append(shown_by(camera, frame.picture))
+            shown.append(find_visible_paint(camera, frame.picture))
     return kept
 
 
-def runner_up(ranked: Sequence[RankedCamera]) -> float | None:
+def lead_over_second(ranked: Sequence[RankedCamera]) -> float | None:
     """How far the second camera lies behind the first, in supported x explained."""
     if len(ranked) < 2:
         return None
@@ -478,7 +493,7 @@ def why_unsure(ranked: Sequence[RankedCamera]) -> str | None:
     """Why the best camera cannot be proposed; None where it can."""
     if not ranked:
         return "no camera was found that lies on the paint"
-    best, lead = ranked[0], runner_up(ranked)
+    best, lead = ranked[0], lead_over_second(ranked)
     if best.is_contradicted:
         return "a marking that the best camera shows has no paint"
     supported = best.agreement.supported
@@ -524,13 +539,13 @@ def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
     return None
 
 
-def _answer(
+def _choose_proposal(
     image: Image, frame: SearchedFrame, ranked: list[RankedCamera], pitch: Pitch
 ) -> FrameProposal:
     reason = why_unsure(ranked)
     if not ranked:
         return FrameProposal("unsure", reason)
-    best, lead = ranked[0], runner_up(ranked)
+    best, lead = ranked[0], lead_over_second(ranked)
     snapped = best.snapped
     height, width = image.shape[:2]
     rows, columns = frame.field.shape
@@ -539,9 +554,9 @@ def _answer(
         small = small.scaled(columns / width, rows / height)
     reason = reason or why_not_square(frame.image, small, pitch)
     if width < ENLARGED_WIDTH:
-        snapped = scaled(snapped, height, width)
+        snapped = scale_snapped(snapped, height, width)
     elif (height, width) != snapped.size:
-        snapped = _at_full_size(image, frame, best, pitch)
+        snapped = _snap_at_full_size(image, frame, best, pitch)
     return FrameProposal(
         "unsure" if reason else "proposed",
         reason,
@@ -553,19 +568,21 @@ def _answer(
     )
 
 
-def _at_full_size(
+def _snap_at_full_size(
     image: Image, frame: SearchedFrame, best: RankedCamera, pitch: Pitch
 ) -> SnappedCamera:
     """A camera drawn once more onto the paint of the picture as it is; where that says otherwise,
     as it was found in the small one."""
     height, width = image.shape[:2]
-    reading = read_picture(image, _field_at(frame, width, height))
-    found = scaled(best.snapped, height, width)
-    last = _snap(reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known)
+    reading = read_picture(image, _resize_field(frame, width, height))
+    found = scale_snapped(best.snapped, height, width)
+    last = _snap_with_known_position(
+        reading, found.camera, pitch, LAST_WINDOWS, best.policy, best.known
+    )
     return last if last.reason is None else found
 
 
-def scaled(snapped: SnappedCamera, height: int, width: int) -> SnappedCamera:
+def scale_snapped(snapped: SnappedCamera, height: int, width: int) -> SnappedCamera:
     """A camera on the paint, and that paint, in the pixels of the picture at another size."""
     factor = width / snapped.size[1]
     return replace(
@@ -579,6 +596,6 @@ def scaled(snapped: SnappedCamera, height: int, width: int) -> SnappedCamera:
 
 
 @cache
-def threads() -> Executor:
+def kernel_threads() -> Executor:
     """Threads for the compiled kernels, which let go of the GIL."""
     return ThreadPoolExecutor(os.cpu_count() or 1, "propose")

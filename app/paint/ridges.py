@@ -27,7 +27,7 @@ SIDE_PX = 5.0
 """Where grass is looked for to both sides."""
 
 
-def line_like(image: Image, field: BoolArray) -> BoolArray:
+def find_line_like(image: Image, field: BoolArray) -> BoolArray:
     """The thin pixels of everything on the field that looks like a painted line.
 
     Args:
@@ -38,10 +38,10 @@ def line_like(image: Image, field: BoolArray) -> BoolArray:
         Shape (H, W). In a picture wider than ``WORK_WIDTH`` the pixels do not touch: there is
         one for each pixel of the smaller picture.
     """
-    return np.asarray(line_strength(image, field) > 0)
+    return np.asarray(measure_line_strength(image, field) > 0)
 
 
-def line_strength(image: Image, field: BoolArray) -> Strength:
+def measure_line_strength(image: Image, field: BoolArray) -> Strength:
     """The same with the strength of each pixel, grey levels per square pixel; 0 elsewhere."""
     height, width = field.shape
     full = np.zeros((height, width), np.float32)
@@ -52,7 +52,10 @@ def line_strength(image: Image, field: BoolArray) -> Strength:
     if small.shape[:2] == (height, width):
         return thin
     rows, columns = np.nonzero(thin)
-    to = _scaled(rows, height, len(small)), _scaled(columns, width, small.shape[1])
+    to = (
+        _full_size_pixels(rows, height, len(small)),
+        _full_size_pixels(columns, width, small.shape[1]),
+    )
     full[to] = thin[rows, columns]
     return full
 
@@ -68,13 +71,15 @@ def _work_size(image: Image, field: BoolArray) -> tuple[Image, npt.NDArray[np.ui
     return np.asarray(small, np.uint8), np.asarray(near, np.uint8)
 
 
-def _scaled(places: npt.NDArray[np.int64], size: int, small: int) -> npt.NDArray[np.int64]:
+def _full_size_pixels(
+    places: npt.NDArray[np.int64], size: int, small: int
+) -> npt.NDArray[np.int64]:
     """Pixels of the full picture at the centres of those of the small one."""
     return np.asarray(((places + 0.5) * size / small).astype(np.int64))
 
 
 def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Strength:
-    """As ``line_strength``, for a picture in which lengths are ``unit`` times those above."""
+    """As ``measure_line_strength``, for a picture in which lengths are ``unit`` times those above."""
     # Paint is bright in all channels; shirts and boards rarely are.
     red, green, blue = cv2.split(image)
     level = cv2.GaussianBlur(cv2.min(red, cv2.min(green, blue)).astype(np.float32), (0, 0), BLUR_PX)
@@ -82,7 +87,7 @@ def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Str
     across = np.empty(inside.shape, np.uint8)
     side = max(SIDE_PX * unit, 3.0)
     ridge_strength(level, image, inside, side, LEAST_STRENGTH, strength, across)
-    limit = max(_percentile(strength, inside), LEAST_STRENGTH)
+    limit = max(_strength_percentile(strength, inside), LEAST_STRENGTH)
     strong = strength > limit
     thin = np.empty(inside.shape, np.bool_)
     thin_ridges(strength, across, strong, thin)
@@ -99,7 +104,7 @@ def _thin_lines(image: Image, inside: npt.NDArray[np.uint8], unit: float) -> Str
     return lines
 
 
-def _percentile(strength: npt.NDArray[np.float32], inside: npt.NDArray[np.uint8]) -> float:
+def _strength_percentile(strength: npt.NDArray[np.float32], inside: npt.NDArray[np.uint8]) -> float:
     """Of the strength on the field, from every third pixel."""
     values = strength[::3, ::3][inside[::3, ::3] > 0]
     return float(np.percentile(values, STRONGEST_PERCENT)) if len(values) else np.inf
@@ -113,7 +118,7 @@ LEAST_PIXELS = 3
 """Fewer points have no direction."""
 
 
-def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
+def find_straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
     """The pieces with the most paint, longest first: their ends in pixels, shape (L, 4)."""
     unit = line_like.shape[1] / 960
     rest = line_like.astype(np.uint8)
@@ -128,18 +133,20 @@ def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
     ends = found.reshape(-1, 4).astype(np.float64)
     pieces: list[FloatArray] = []
     for _ in range(most):
-        support = np.array([np.count_nonzero(free & _along(paint, end, unit)) for end in ends])
+        support = np.array(
+            [np.count_nonzero(free & _paint_beside_piece(paint, end, unit)) for end in ends]
+        )
         best = int(np.argmax(support))
         if support[best] < LEAST_PIXELS or support[best] < 0.6 * SHORTEST_PX * unit:
             break
-        taken = free & _along(paint, ends[best], unit)
+        taken = free & _paint_beside_piece(paint, ends[best], unit)
         for _ in range(2):
-            taken = free & _grown(paint, _fitted(paint[taken]), unit)
+            taken = free & _extend_piece(paint, _fit_segment(paint[taken]), unit)
             if np.count_nonzero(taken) < LEAST_PIXELS:
                 break
         if np.count_nonzero(taken) < LEAST_PIXELS:
             break
-        pieces.append(_fitted(paint[taken]))
+        pieces.append(_fit_segment(paint[taken]))
         free &= ~taken
         ends = ends[support >= 0.4 * SHORTEST_PX * unit]
         if len(ends) == 0:
@@ -147,7 +154,9 @@ def straight_pieces(line_like: npt.NDArray[np.bool_], most: int) -> FloatArray:
     return np.array(pieces).reshape(-1, 4)
 
 
-def _along_and_off(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _coordinates_along_piece(
+    paint: FloatArray, end: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
     """Where paint lies along a piece from its start, and how far from it, shapes (N,); its length."""
     start, stop = end[:2], end[2:]
     length = float(np.hypot(*(stop - start)))
@@ -157,16 +166,16 @@ def _along_and_off(paint: FloatArray, end: FloatArray) -> tuple[FloatArray, Floa
     return offset @ direction, across, length
 
 
-def _along(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
+def _paint_beside_piece(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint beside a piece, between its ends."""
-    along, across, length = _along_and_off(paint, end)
+    along, across, length = _coordinates_along_piece(paint, end)
     near: npt.NDArray[np.bool_] = (across < NEAR_PX * unit) & (along > -2) & (along < length + 2)
     return near
 
 
-def _grown(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
+def _extend_piece(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bool_]:
     """The paint along a piece and, on both sides, as far as it goes on without a long gap."""
-    along, across, length = _along_and_off(paint, end)
+    along, across, length = _coordinates_along_piece(paint, end)
     near = across < NEAR_PX * unit
     places = np.sort(along[near])
     gaps = np.flatnonzero(np.diff(places) > GAP_PX * unit)
@@ -178,7 +187,7 @@ def _grown(paint: FloatArray, end: FloatArray, unit: float) -> npt.NDArray[np.bo
     return grown
 
 
-def _fitted(points: FloatArray) -> FloatArray:
+def _fit_segment(points: FloatArray) -> FloatArray:
     """Ends of the line through points, by its principal axis, shape (4,)."""
     middle = points.mean(axis=0)
     _, vectors = np.linalg.eigh(np.cov((points - middle).T))

@@ -78,7 +78,9 @@ def offset_from(camera, place, inside, px, py):
 
 
 @compiled
-def unexplained(parameters, points, shapes, nearest, origin, cell, reach, half_diagonal, cost):
+def write_unexplained_paint(
+    parameters, points, shapes, nearest, origin, cell, reach, half_diagonal, cost
+):
     """Writes the mean truncated distance of the paint to the nearest marking, 0 to 1."""
     for b in range(len(parameters)):
         camera = unpack_camera(parameters[b], half_diagonal)
@@ -97,7 +99,7 @@ def unexplained(parameters, points, shapes, nearest, origin, cell, reach, half_d
 
 
 @compiled
-def unsupported(
+def write_unsupported_markings(
     parameters, samples, spacing, distance, field, center, reach, half_diagonal, result
 ):  # fmt: skip
     """Writes mean truncated distance of visible markings to paint, their length, and off grass.
@@ -141,7 +143,7 @@ def unsupported(
 
 
 @compiled
-def refine(
+def refine_rows(
     parameters, points, shapes, nearest, origin, cell, scales, mean, sigma, half_diagonal
 ):  # fmt: skip
     """Moves each camera so that the paint comes to lie on the nearest markings.
@@ -178,11 +180,11 @@ def refine(
                         g[i] += wj * offset[0, row]
                         for k in range(8):
                             H[i, k] += wj * jacobian[0, row, k]
-            descend(H, g, parameters[b])
+            take_damped_step(H, g, parameters[b])
 
 
 @compiled
-def descend(H, g, parameters):
+def take_damped_step(H, g, parameters):
     """Adds the damped step -H^-1 g, by Cholesky decomposition of H's lower half."""
     L = np.zeros((8, 8))
     step = np.empty(8)

@@ -20,7 +20,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import KAPPA, PARAMETERS, ROLL, X, Z, camera_from_parameters
 from app.paint import scoring_kernels as kernels
-from app.paint.candidates import Library, candidates
+from app.paint.candidates import Library, candidate_cameras
 from app.soccer.pitch import MARKINGS, Arc, Pitch
 
 CELL_M = 0.25
@@ -52,7 +52,7 @@ class Markings:
 def markings_of(pitch: Pitch) -> Markings:
     """The painted markings of a pitch; goals are not painted."""
     names = [name for name in MARKINGS if not name.startswith("Goal")]
-    shapes = np.array([_row(pitch, name) for name in names])
+    shapes = np.array([_marking_row(pitch, name) for name in names])
     half = np.array([pitch.length / 2 + RIM_M, pitch.width / 2 + RIM_M])
     columns, rows = (np.ceil(2 * half / CELL_M)).astype(int)
     x = -half[0] + (np.arange(columns) + 0.5) * CELL_M
@@ -63,11 +63,11 @@ def markings_of(pitch: Pitch) -> Markings:
         dense.append(points)
         owner.append(np.full(len(points), index))
         samples.append(_with_tangents(pitch.sample(name, SPACING_M, SPACING_M)[:, :2]))
-    nearest = _nearest(np.vstack(dense), np.concatenate(owner), x, y)
+    nearest = _nearest_points_of_cells(np.vstack(dense), np.concatenate(owner), x, y)
     return Markings(shapes, nearest, np.vstack(samples), -half)
 
 
-def _nearest(
+def _nearest_points_of_cells(
     points: FloatArray, owner: npt.NDArray[np.int64], x: FloatArray, y: FloatArray
 ) -> npt.NDArray[np.uint8]:
     """Of the points, to the centre of each cell, shape (rows, columns)."""
@@ -78,7 +78,7 @@ def _nearest(
     return np.asarray(owner[index].reshape(len(y), len(x)), np.uint8)
 
 
-def _row(pitch: Pitch, name: str) -> tuple[float, ...]:
+def _marking_row(pitch: Pitch, name: str) -> tuple[float, ...]:
     shape = pitch.shapes[name]
     if isinstance(shape, Arc):
         return (1.0, *shape.center, shape.radius, 0.0)
@@ -127,7 +127,7 @@ class ScoredPicture:
         distance = np.asarray(cv2.distanceTransform(missing, cv2.DIST_L2, 3), np.float32)
         rows, columns = np.nonzero(line_like)
         pixels = np.column_stack([columns - center[0], rows - center[1]]).astype(np.float64)
-        spread = _spread(pixels, POINTS)
+        spread = _sample_evenly(pixels, POINTS)
         return ScoredPicture(
             spread[:POINTS], spread[:SOME], spread[:FEW], distance, field, np.array(center)
         )
@@ -136,20 +136,20 @@ class ScoredPicture:
 POINTS, SOME, FEW = 400, 140, 64
 
 
-def _spread(pixels: FloatArray, count: int) -> FloatArray:
+def _sample_evenly(pixels: FloatArray, count: int) -> FloatArray:
     """So many of the pixels, the same for the same picture, in no order of place."""
     chosen = np.random.default_rng(0).permutation(len(pixels))[:count]
     return np.ascontiguousarray(pixels[chosen])
 
 
-def first_look(
+def score_coarsely(
     parameters: FloatArray, picture: ScoredPicture, pitch: Pitch, reach: float, executor: Executor
 ) -> FloatArray:
     """Mean truncated distance of some of the paint to the markings, 0 to 1, shape (B,)."""
-    return _unexplained(parameters, picture.few, picture, pitch, reach, executor)
+    return _unexplained_share(parameters, picture.few, picture, pitch, reach, executor)
 
 
-def _unexplained(
+def _unexplained_share(
     parameters: FloatArray,
     points: FloatArray,
     picture: ScoredPicture,
@@ -161,16 +161,16 @@ def _unexplained(
     cost = np.empty(len(parameters))
 
     def run(part: slice) -> None:
-        kernels.unexplained(
+        kernels.write_unexplained_paint(
             parameters[part], points, m.shapes, m.nearest, m.origin, CELL_M,
             reach * picture.unit, picture.half_diagonal, cost[part],
         )  # fmt: skip
 
-    list(executor.map(run, _parts(len(parameters))))
+    list(executor.map(run, _split_range(len(parameters))))
     return cost
 
 
-def second_look(
+def score_fully(
     parameters: FloatArray, picture: ScoredPicture, pitch: Pitch, reach: float, executor: Executor
 ) -> FloatArray:
     """Unexplained paint, unsupported markings (0 to 1), length on and off the field, pixels.
@@ -181,17 +181,17 @@ def second_look(
     result = np.empty((len(parameters), 3))
 
     def run(part: slice) -> None:
-        kernels.unsupported(
+        kernels.write_unsupported_markings(
             parameters[part], m.samples, SPACING_M, picture.distance, picture.field,
             picture.center, reach * picture.unit, picture.half_diagonal, result[part],
         )  # fmt: skip
 
-    list(executor.map(run, _parts(len(parameters))))
-    cost = _unexplained(parameters, picture.points, picture, pitch, reach, executor)
+    list(executor.map(run, _split_range(len(parameters))))
+    cost = _unexplained_share(parameters, picture.points, picture, pitch, reach, executor)
     return np.column_stack([cost, result])
 
 
-def refine(
+def refine_cameras(
     parameters: FloatArray,
     mean: FloatArray,
     sigma: FloatArray,
@@ -221,16 +221,16 @@ def refine(
     pixels = np.asarray(scales) * picture.unit
 
     def run(part: slice) -> None:
-        kernels.refine(
+        kernels.refine_rows(
             moved[part], points, m.shapes, m.nearest, m.origin, CELL_M,
             pixels, mean[part], sigma, picture.half_diagonal,
         )  # fmt: skip
 
-    list(executor.map(run, _parts(len(parameters), 32)))
+    list(executor.map(run, _split_range(len(parameters), 32)))
     return moved
 
 
-def _parts(count: int, most: int = 4096) -> list[slice]:
+def _split_range(count: int, most: int = 4096) -> list[slice]:
     return [slice(first, min(first + most, count)) for first in range(0, count, most)]
 
 
@@ -251,7 +251,7 @@ SAME_PX = 12.0
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundCamera:
     """A camera of the search and how well it agrees with the paint, 0 to 1."""
 
     parameters: FloatArray
@@ -259,7 +259,7 @@ class Found:
     score: float
 
 
-def search(
+def search_cameras(
     picture: ScoredPicture,
     pieces: FloatArray,
     library: Library,
@@ -269,7 +269,7 @@ def search(
     scouted: int = SCOUTED,
     searched: int = SEARCHED,
     kappa: float = KAPPA_MEAN,
-) -> list[Found]:
+) -> list[FoundCamera]:
     """The best cameras of a library, none like another.
 
     Args:
@@ -284,32 +284,34 @@ def search(
         kappa: The lens's distortion to start with.
     """
     width = float(picture.field.shape[1])
-    rows = candidates(pieces - np.tile(picture.center, 2), library, pitch, width)
+    rows = candidate_cameras(pieces - np.tile(picture.center, 2), library, pitch, width)
     if not len(rows):
         return []
-    cost = first_look(rows, picture, pitch, FIRST_REACH_PX, executor)
-    rows = rows[_smallest(cost, scouted)]
+    cost = score_coarsely(rows, picture, pitch, FIRST_REACH_PX, executor)
+    rows = rows[_smallest_indices(cost, scouted)]
     rows[:, KAPPA] = kappa
-    sigma = _sigma(library)
+    sigma = _library_sigma(library)
     start = rows.copy()
     start[:, ROLL] = 0.0
-    rows = refine(rows, start, sigma, picture, picture.some, pitch, SCOUT_SCALES, executor)
-    score = _score(second_look(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
-    chosen = _smallest(-score, searched)
+    rows = refine_cameras(rows, start, sigma, picture, picture.some, pitch, SCOUT_SCALES, executor)
+    score = _combined_score(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
+    chosen = _smallest_indices(-score, searched)
     rows, start = rows[chosen], start[chosen]
-    rows = refine(rows, start, sigma, picture, picture.points, pitch, SEARCH_SCALES, executor)
-    score = _score(second_look(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
-    return _distinct(rows, score, picture, most)
+    rows = refine_cameras(
+        rows, start, sigma, picture, picture.points, pitch, SEARCH_SCALES, executor
+    )
+    score = _combined_score(score_fully(rows, picture, pitch, SECOND_REACH_PX, executor), picture)
+    return _distinct_cameras(rows, score, picture, most)
 
 
-def _sigma(library: Library) -> FloatArray:
+def _library_sigma(library: Library) -> FloatArray:
     sigma = np.full(PARAMETERS, np.inf)
     sigma[ROLL], sigma[X : Z + 1] = ROLL_SIGMA, library.position_sigma
     sigma[Z + 1], sigma[KAPPA] = FOCAL_SIGMA, KAPPA_SIGMA
     return sigma
 
 
-def _score(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
+def _combined_score(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
     """Explained times supported; markings drawn where no grass is count half."""
     unexplained, unsupported, on, off = looked.T
     score = (1 - unexplained) * (1 - unsupported) * (1 - 0.5 * off / (on + off + 1))
@@ -317,23 +319,23 @@ def _score(looked: FloatArray, picture: ScoredPicture) -> FloatArray:
     return np.where(np.isfinite(score), score, 0.0)
 
 
-def _smallest(cost: FloatArray, count: int) -> npt.NDArray[np.int64]:
+def _smallest_indices(cost: FloatArray, count: int) -> npt.NDArray[np.int64]:
     return np.asarray(np.argsort(cost, kind="stable")[:count], np.int64)
 
 
-def _distinct(
+def _distinct_cameras(
     rows: FloatArray, score: FloatArray, picture: ScoredPicture, most: int
-) -> list[Found]:
-    found: list[Found] = []
+) -> list[FoundCamera]:
+    found: list[FoundCamera] = []
     shown: list[VisiblePaint] = []
     x0, y0 = picture.center
     for index in np.argsort(-score, kind="stable"):
         if len(found) == most or score[index] <= 0 or not np.isfinite(rows[index]).all():
             break
         camera = camera_from_parameters(rows[index], (x0, y0), picture.half_diagonal)
-        if not any(shows_the_same(other, camera, picture) for other in shown):
-            found.append(Found(rows[index], camera, float(score[index])))
-            shown.append(shown_by(camera, picture))
+        if not any(is_same_view(other, camera, picture) for other in shown):
+            found.append(FoundCamera(rows[index], camera, float(score[index])))
+            shown.append(find_visible_paint(camera, picture))
     return found
 
 
@@ -350,7 +352,7 @@ class VisiblePaint:
     pixels: FloatArray
 
 
-def shown_by(camera: Camera, picture: ScoredPicture) -> VisiblePaint:
+def find_visible_paint(camera: Camera, picture: ScoredPicture) -> VisiblePaint:
     """Where a camera sees some of the paint; what it sees above the horizon is left out."""
     pixels = picture.few[:COMPARED] + picture.center
     rays = camera.rays(pixels)
@@ -359,7 +361,7 @@ def shown_by(camera: Camera, picture: ScoredPicture) -> VisiblePaint:
     return VisiblePaint(camera.position - camera.position[2] / rays[:, 2:] * rays, pixels)
 
 
-def shows_the_same(shown: VisiblePaint, other: Camera, picture: ScoredPicture) -> bool:
+def is_same_view(shown: VisiblePaint, other: Camera, picture: ScoredPicture) -> bool:
     """Whether another camera sees the same places, or those of the pitch turned by half a turn."""
     if len(shown.pixels) < len(picture.few[:COMPARED]) / 2:
         return False

@@ -15,7 +15,15 @@ import numpy as np
 from app.geometry.arrays import BoolArray, FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import camera_from_parameters, parameters_from_camera
-from app.paint.evidence import SPACING_PX, Evidence, Image, Reading, read_picture, seek, trace
+from app.paint.evidence import (
+    SPACING_PX,
+    Evidence,
+    Image,
+    Reading,
+    find_paint,
+    read_picture,
+    trace_visible_markings,
+)
 from app.soccer.frames import Box, ImageSize
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES
 from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
@@ -76,7 +84,7 @@ class SnappedCamera:
         return len(self.evidence.offsets)
 
 
-def snap(
+def snap_camera(
     image: Image,
     field: BoolArray,
     start: Camera,
@@ -114,7 +122,7 @@ def snap_reading(
     position_is_known: bool = False,
     most_surprising: float = MOST_SURPRISING,
 ) -> SnappedCamera:
-    """As ``snap``, for a picture that is prepared already.
+    """As ``snap_camera``, for a picture that is prepared already.
 
     Args:
         windows: How far to either side paint is sought, round by round, pixels at 960 x 540.
@@ -133,27 +141,30 @@ def snap_reading(
         strict = index >= len(windows) - STRICT_ROUNDS
         spacing = SPACING_PX if strict else COARSE_PX
         evidence = rounds.seek(parameters, window, spacing)
-        if not _suffices(evidence, twice, spacing, least):
-            return _unchanged(rounds, evidence, NO_PAINT)
+        if not _has_enough_paint(evidence, twice, spacing, least):
+            return _keep_start(rounds, evidence, NO_PAINT)
         parameters = parameters + rounds.problem.step(parameters, rounds.seen(evidence), strict)
         if not np.isfinite(parameters).all():
-            return _unchanged(rounds, evidence, PAINT_DISAGREES)
+            return _keep_start(rounds, evidence, PAINT_DISAGREES)
     evidence = rounds.seek(parameters, windows[-1])
-    if not _suffices(evidence, twice, least=least) or evidence.share < LEAST_SEEN:
-        return _unchanged(rounds, evidence, NO_PAINT)
+    if not _has_enough_paint(evidence, twice, least=least) or evidence.share < LEAST_SEEN:
+        return _keep_start(rounds, evidence, NO_PAINT)
     places = evidence.traced.places[:, :2]
     noise = rounds.problem.noise(parameters, rounds.seen(evidence), places, pitch)
     if noise is None:
-        return _unchanged(rounds, evidence, NO_PAINT)
+        return _keep_start(rounds, evidence, NO_PAINT)
     camera, before = rounds.camera(parameters), rounds.seek(rounds.first, windows[-1])
-    error, moved = float(np.median(np.abs(evidence.offsets))), _moved_px(start, camera, evidence)
+    error, moved = (
+        float(np.median(np.abs(evidence.offsets))),
+        _median_shift_px(start, camera, evidence),
+    )
     if (
         error > rounds.unit * WORST_PX
         or moved > rounds.unit * (windows[0] if start_covariance is None else np.inf)
         or rounds.problem.mahalanobis_squared(parameters) > most_surprising
         or evidence.share < KEPT_SHARE * before.share
     ):
-        return _unchanged(rounds, evidence, PAINT_DISAGREES, error, moved)
+        return _keep_start(rounds, evidence, PAINT_DISAGREES, error, moved)
     own, size = noise.parameters, rounds.size
     return SnappedCamera(camera, evidence, error, own + noise.pitch, moved, None, size, planned=own)
 
@@ -182,14 +193,16 @@ class _Rounds:
         )
 
     def seek(self, parameters: FloatArray, window: float, spacing: float = SPACING_PX) -> Evidence:
-        traced = trace(self._reading, self.camera(parameters), self._pitch, spacing)
+        traced = trace_visible_markings(
+            self._reading, self.camera(parameters), self._pitch, spacing
+        )
         window *= self.unit
         if self._covariance is None:
-            return seek(self._reading, traced, window)
+            return find_paint(self._reading, traced, window)
         rows = traced.jacobian
         sigma = np.sqrt(np.maximum(((rows @ self._covariance) * rows).sum(axis=1), 0.0))
         known = START_SIGMAS * sigma + START_PX * self.unit
-        return seek(self._reading, traced, np.minimum(window, known))
+        return find_paint(self._reading, traced, np.minimum(window, known))
 
     def seen(self, evidence: Evidence) -> PaintOffsets:
         """The evidence as it is solved with."""
@@ -204,7 +217,7 @@ class _Rounds:
         )
 
 
-def _suffices(
+def _has_enough_paint(
     evidence: Evidence, twice: list[int], spacing: float = SPACING_PX, least: int = LEAST_MARKINGS
 ) -> bool:
     counts = np.bincount(evidence.traced.marking, minlength=len(MARKINGS))
@@ -213,7 +226,7 @@ def _suffices(
     return len(evidence.offsets) >= LEAST_POINTS and markings >= least
 
 
-def _unchanged(
+def _keep_start(
     rounds: _Rounds,
     evidence: Evidence,
     reason: str,
@@ -224,7 +237,7 @@ def _unchanged(
     return SnappedCamera(rounds.start, evidence, error, None, moved, reason, rounds.size)
 
 
-def _moved_px(start: Camera, camera: Camera, evidence: Evidence) -> float:
+def _median_shift_px(start: Camera, camera: Camera, evidence: Evidence) -> float:
     places = evidence.traced.places
     apart = np.hypot(*(camera.project(places) - start.project(places)).T)
     known = apart[np.isfinite(apart)]

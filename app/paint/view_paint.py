@@ -14,12 +14,12 @@ from app.geometry.arrays import BoolArray
 from app.geometry.lens import BROWN_CONRADY
 from app.geometry.resection import PARAMETERS
 from app.media.files import decode_frame
-from app.paint.agreement import agreement
-from app.paint.evidence import Image, seen_field, to_paint_evidence
+from app.paint.agreement import measure_agreement
+from app.paint.evidence import Image, to_paint_evidence, visible_field
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.propose import LEAST_SIDE
-from app.paint.ridges import line_like
-from app.paint.snap import SnappedCamera, snap
+from app.paint.ridges import find_line_like
+from app.paint.snap import SnappedCamera, snap_camera
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Media
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES, PaintEvidence, PaintPoint
@@ -131,11 +131,13 @@ def read_paint(
     policy: CalibrationPolicy,
     people: Sequence[Box] = (),
 ) -> ViewPaint:
-    """``paint_of`` for a frame where it lies; raises what ``decode_frame`` does."""
-    return paint_of(decode_frame(media, flipped, settings), size, start, pitch, policy, people)
+    """``read_paint_of_image`` for a frame where it lies; raises what ``decode_frame`` does."""
+    return read_paint_of_image(
+        decode_frame(media, flipped, settings), size, start, pitch, policy, people
+    )
 
 
-def paint_of(
+def read_paint_of_image(
     image: Image,
     size: ImageSize,
     start: Calibration,
@@ -164,10 +166,10 @@ def paint_of(
         return ViewPaint("nothing", sentence=f"There is nothing to read: {why}.")
     scale = PictureScale.of(image, size)
     hidden = [scale.box(box) for box in hiding_boxes(people, size)]
-    seen_grass = seen_field(grass, hidden)
-    paint = line_like(image, grass) & seen_grass
+    seen_grass = visible_field(grass, hidden)
+    paint = find_line_like(image, grass) & seen_grass
     nothing = ViewPaint("nothing", line_like=scale.line_like(paint))
-    why = _unusable(start)
+    why = _why_unusable(start)
     if why is not None:
         return replace(nothing, sentence=why)
     assert start.camera is not None
@@ -176,12 +178,12 @@ def paint_of(
     if start.covariance is not None and start.source == "lines":
         spread = np.reshape(start.covariance, (PARAMETERS, PARAMETERS))
     try:
-        snapped = snap(
+        snapped = snap_camera(
             image, grass, camera, pitch, hidden=hidden, policy=policy, start_covariance=spread
         )
     except (GeometryError, np.linalg.LinAlgError):
         return replace(nothing, sentence="The camera of the lines cannot be drawn onto the paint.")
-    seen = agreement(snapped.camera, seen_grass, paint, pitch)
+    seen = measure_agreement(snapped.camera, seen_grass, paint, pitch)
     return replace(
         nothing,
         outcome="kept" if snapped.reason else "snapped",
@@ -201,7 +203,7 @@ def hiding_boxes(people: Sequence[Box], size: ImageSize) -> list[Box]:
     return [box for box in people if box.width * box.height <= largest]
 
 
-def _unusable(start: Calibration) -> str | None:
+def _why_unusable(start: Calibration) -> str | None:
     """Why paint cannot be sought with a calibration; None: it can."""
     camera = start.camera
     if camera is None:

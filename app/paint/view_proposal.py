@@ -15,7 +15,7 @@ from app.geometry.camera import Camera
 from app.media.files import decode_frame
 from app.paint.evidence import Image
 from app.paint.goal import goal_lines
-from app.paint.propose import propose
+from app.paint.propose import propose_camera
 from app.paint.view_paint import PictureScale, why_unreadable
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.choices import ProposalOutcome
@@ -61,11 +61,13 @@ def propose_lines(
     pitch: Pitch,
     policy: CalibrationPolicy,
 ) -> ViewProposal:
-    """``proposal_of`` for a frame where it lies; raises what ``decode_frame`` does."""
-    return proposal_of(decode_frame(media, flipped, settings), size, known, pitch, policy)
+    """``propose_lines_in_image`` for a frame where it lies; raises what ``decode_frame`` does."""
+    return propose_lines_in_image(
+        decode_frame(media, flipped, settings), size, known, pitch, policy
+    )
 
 
-def proposal_of(
+def propose_lines_in_image(
     image: Image,
     size: ImageSize,
     known: Sequence[Camera],
@@ -86,7 +88,7 @@ def proposal_of(
     if why is not None:
         return ViewProposal("nothing", why, {})
     try:
-        found = propose(image, pitch, known, policy)
+        found = propose_camera(image, pitch, known, policy)
     except (GeometryError, np.linalg.LinAlgError):
         return ViewProposal("nothing", "The paint of this picture cannot be solved.", {})
     scale, lines, seen, snapped = PictureScale.of(image, size), {}, found.agreement, found.snapped
@@ -114,7 +116,7 @@ NOTHING_NEW = "The paint shows no line that is not drawn here already."
 
 
 @dataclass(frozen=True)
-class _Side:
+class _DrawnLinesFit:
     """Proposed lines, and how far drawn ones lie from where their camera puts them.
 
     Attributes:
@@ -130,7 +132,7 @@ class _Side:
         return float(np.mean([min(distance, far) for distance in self.apart.values()]))
 
 
-def beside_drawn(
+def keep_undrawn_markings(
     found: ViewProposal, drawn: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
 ) -> ViewProposal:
     """What is proposed for a view that has drawn lines: the markings nobody drew.
@@ -149,17 +151,19 @@ def beside_drawn(
     if found.outcome != "proposed" or not drawn:
         return found
     turned = make_lines({opposite_marking(name): points for name, points in found.lines.items()})
-    sides = [_side(lines, drawn, pitch, size, policy) for lines in (found.lines, turned)]
+    sides = [
+        _fit_of_drawn_lines(lines, drawn, pitch, size, policy) for lines in (found.lines, turned)
+    ]
     side = min(sides, key=lambda item: item.cost(FAR_PERCENT / 100 * size.diagonal))
     rest = {name: points for name, points in side.lines.items() if name not in drawn}
-    sentence = _contradiction(side.apart, APART_PERCENT / 100 * size.diagonal)
+    sentence = _describe_contradiction(side.apart, APART_PERCENT / 100 * size.diagonal)
     if not rest:
         sentence = " ".join(filter(None, (NOTHING_NEW, sentence)))
         return replace(found, outcome="unsure", lines={}, sentence=sentence)
     return replace(found, lines=make_lines(rest), sentence=sentence)
 
 
-def propose_beside(
+def propose_undrawn_lines(
     media: Media,
     flipped: bool,
     settings: Settings,
@@ -171,21 +175,21 @@ def propose_beside(
 ) -> ViewProposal:
     """``propose_lines`` beside drawn ones; raises what it does."""
     found = propose_lines(media, flipped, settings, size, known, pitch, policy)
-    return beside_drawn(found, drawn, pitch, size, policy)
+    return keep_undrawn_markings(found, drawn, pitch, size, policy)
 
 
-def _side(
+def _fit_of_drawn_lines(
     lines: Lines, drawn: Lines, pitch: Pitch, size: ImageSize, policy: CalibrationPolicy
-) -> _Side:
+) -> _DrawnLinesFit:
     camera = calibrate(lines, pitch, size, policy).camera
     fits = measure_calibration(
         Calibration("lines", camera), drawn, policy.fitted(pitch), size
     ).markings
     apart = {fit.marking: fit.largest_px for fit in fits if fit.largest_px is not None}
-    return _Side(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})
+    return _DrawnLinesFit(lines, {name: apart.get(name, np.inf) for name in sorted(drawn)})
 
 
-def _contradiction(apart: Mapping[str, float], limit: float) -> str:
+def _describe_contradiction(apart: Mapping[str, float], limit: float) -> str:
     """Which drawn markings contradict; empty where none does."""
     names = [
         f"“{name}” is drawn where the proposed camera does not see it"

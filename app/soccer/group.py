@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 from app.errors import InputError
 from app.geometry.camera import Camera
-from app.object_store.address import is_address
+from app.object_store.path import is_address
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import ImageSize

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from app.errors import InputError, NotFoundError
 from app.formats.output import write_files_to_zip
 from app.formats.safe_path import resolve_inside
-from app.object_store.address import is_address
+from app.object_store.path import is_address
 from app.progress import ReportProgress
 from app.terminal.remote import IMPORT, follow_job, quote_address_part, select_values, time_text
 

@@ -68,7 +68,7 @@ def work_against_server(url: str | None, token_file: Path | None, command: str |
             f"touchline {command} works in a home on this machine, not against a server",
             hint=f"Leave out --server (TOUCHLINE_SERVER). Those that can: {', '.join(ABLE)}.",
         )
-    from app.hosts import is_local
+    from app.config import is_local
 
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.username:

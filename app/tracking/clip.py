@@ -12,7 +12,7 @@ import numpy as np
 from app.errors import ImageError
 from app.geometry.camera import Camera
 from app.paint.evidence import Image
-from app.paint.propose import ENLARGED_WIDTH, WORK_WIDTH, enlarged, why_too_small
+from app.paint.propose import ENLARGED_WIDTH, WORK_WIDTH, enlarge_small_picture, why_too_small
 from app.soccer.frames import ImageSize
 from app.video.frames import read_frames
 from app.video.index import RecordingIndex
@@ -103,7 +103,7 @@ class Clip:
 def _work_size(image: Image) -> Image:
     height, width = image.shape[:2]
     if width < ENLARGED_WIDTH:
-        return enlarged(image)
+        return enlarge_small_picture(image)
     if width <= WORK_WIDTH:
         return image
     size = (WORK_WIDTH, max(round(height * WORK_WIDTH / width), 1))

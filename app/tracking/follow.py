@@ -28,8 +28,8 @@ from app.geometry.resection import (
     parameters_from_camera,
     projection_jacobians,
 )
-from app.paint.agreement import PaintAgreement, agreement
-from app.paint.propose import propose, weakest_marking
+from app.paint.agreement import PaintAgreement, measure_agreement
+from app.paint.propose import propose_camera, weakest_marking
 from app.paint.snap import SnappedCamera, snap_reading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -169,7 +169,7 @@ class Follower:
     ) -> TrackedFrame:
         """The frame of a frame whose camera is given: drawn onto the paint where that agrees."""
         snapped = self._snap(picture, camera, covariance, (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0))
-        seen = agreement(snapped.camera, picture.field, picture.paint, self.pitch)
+        seen = measure_agreement(snapped.camera, picture.field, picture.paint, self.pitch)
         found = TrackedFrame(
             picture.number, picture.time, TRACKED, snapped.camera, snapped, seen, is_key=True
         )  # fmt: skip
@@ -215,7 +215,7 @@ class Follower:
             return None
         self.tried = picture.number
         try:
-            found = propose(picture.image, self.pitch, self.known[-1:], self.policy)
+            found = propose_camera(picture.image, self.pitch, self.known[-1:], self.policy)
         except (GeometryError, np.linalg.LinAlgError):
             return None
         if found.camera is None or found.snapped is None or found.agreement is None:
@@ -272,7 +272,7 @@ class Follower:
             known = predicted_covariance(picture, camera, reach, unit, 1 + self.age)
             try:
                 snapped = self._snap(picture, camera, known, reach.windows)
-                seen = agreement(snapped.camera, picture.field, picture.paint, self.pitch)
+                seen = measure_agreement(snapped.camera, picture.field, picture.paint, self.pitch)
             except (GeometryError, np.linalg.LinAlgError):
                 continue
             weakest = 0.0

@@ -13,8 +13,8 @@ import numpy as np
 from app.geometry.arrays import BoolArray
 from app.paint.evidence import Image, Reading, read_picture
 from app.paint.grass import field_of_play
-from app.paint.propose import BORDER_PX, threads
-from app.paint.ridges import line_like
+from app.paint.propose import BORDER_PX, kernel_threads
+from app.paint.ridges import find_line_like
 from app.tracking.clip import Frame
 from app.tracking.motion import Grey
 
@@ -49,7 +49,7 @@ def read_frame(frame: Frame) -> Picture:
     """All that a frame shows."""
     image = frame.image
     field = field_of_play(image)
-    paint = line_like(image, field)
+    paint = find_line_like(image, field)
     for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
         paint[border] = paint[:, border] = False
     reading = read_picture(image, field)
@@ -65,7 +65,7 @@ def read_frames(frames: Iterable[Frame]) -> Iterator[Picture]:
     """Frames read in threads, in their order, a few ahead."""
     waiting: deque[Future[Picture]] = deque()
     for frame in frames:
-        waiting.append(threads().submit(read_frame, frame))
+        waiting.append(kernel_threads().submit(read_frame, frame))
         if len(waiting) > AHEAD:
             yield waiting.popleft().result()
     while waiting:

@@ -15,7 +15,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.paint.propose import propose
+from app.paint.propose import propose_camera
 from app.paint.snap import WINDOWS, snap_reading
 from app.soccer.paint_evidence import NO_PAINT
 from app.soccer.pitch import Pitch
@@ -139,7 +139,7 @@ def _holds(trial: Shot, number: int, clip: Clip, follower: Follower) -> bool:
         return False
     for frame in sorted(far, key=lambda frame: turns[frame.number])[:: -max(len(far) // ASKED, 1)]:
         image = next(clip.frames(frame.number, frame.number + 1)).image
-        found = propose(image, follower.pitch, [start], follower.policy)
+        found = propose_camera(image, follower.pitch, [start], follower.policy)
         if found.outcome == "proposed" and _shows_the_same(found.camera, frame.camera, 0):
             return True
     return False

@@ -37,7 +37,7 @@ from app.geometry.resection import (
     parameters_from_camera,
     projection_jacobians,
 )
-from app.paint.frame_pitch import painted_frame
+from app.paint.frame_pitch import make_painted_frame
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -222,7 +222,7 @@ class _Shot:
     def _sight(self, frame: TrackedFrame) -> PaintedFrame | None:
         if frame.outcome != TRACKED or frame.snapped is None:
             return None
-        return painted_frame(frame.snapped)
+        return make_painted_frame(frame.snapped)
 
     def _turn(self, place: int, match: BackgroundMatches | None) -> tuple[FloatArray, FloatArray]:
         """How the camera turned and zoomed to the next frame, shape (4,), and its information."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from app.config import Settings
 from app.errors import GeometryError
 from app.paint.grass import field_of_play
-from app.paint.propose import propose
+from app.paint.propose import propose_camera
 from app.progress import ReportProgress
 from app.video.cuts import hard_cuts
 from app.video.frames import Image, RecordingReader
@@ -260,7 +260,7 @@ def look_at(image: npt.NDArray[np.uint8]) -> LookedAt:
     if grass < GRASS_MAIN:
         return LookedAt(grass, False)
     try:
-        return LookedAt(grass, propose(image).outcome == "proposed")
+        return LookedAt(grass, propose_camera(image).outcome == "proposed")
     except (GeometryError, np.linalg.LinAlgError):
         return LookedAt(grass, False)
 

@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
+from app.config import is_local
 from app.durable import is_open_to_others
 from app.errors import ClusterError, InputError
 from app.formats.manifest import software_version
-from app.hosts import is_local
 from app.soccer.solution import SOLVER_VERSION
 
 R = TypeVar("R")

@@ -36,10 +36,10 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS, X, Z, parameters_from_camera, projection_jacobians
 from app.paint.evidence import to_paint_evidence
-from app.paint.frame_pitch import share_tripod
+from app.paint.frame_pitch import find_shared_pitch
 from app.paint.grass import field_of_play
-from app.paint.propose import propose
-from app.paint.snap import SnappedCamera, snap
+from app.paint.propose import propose_camera
+from app.paint.snap import SnappedCamera, snap_camera
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
@@ -149,7 +149,7 @@ def bench_clips(data: Path, frames: int = FRAMES) -> None:
 def share(cameras: list[Known]) -> list[Known]:
     """Frames of one clip with what they show together of their pitch."""
     painted = [known.snapped for known in cameras if known.snapped is not None]
-    shared = share_tripod(painted, PITCH, CalibrationPolicy()) if painted else None
+    shared = find_shared_pitch(painted, PITCH, CalibrationPolicy()) if painted else None
     if shared is None or len(painted) < len(cameras):
         return cameras
     pairs = zip(cameras, shared[1], strict=True)
@@ -279,14 +279,14 @@ def _snapped(image: np.ndarray, lines: Lines | None) -> Known | None:
     if start is None:
         return None
     field = field_of_play(image)
-    found = snap(image, field, start.camera, start_covariance=start.covariance)
+    found = snap_camera(image, field, start.camera, start_covariance=start.covariance)
     if found.reason is not None or found.covariance is None:
         return None
     return Known(found.camera, found.covariance, start.size, found)
 
 
 def _proposed(image: np.ndarray, lines: Lines | None) -> Known | None:
-    found = propose(image)
+    found = propose_camera(image)
     if found.outcome != "proposed" or found.camera is None or found.snapped is None:
         return None
     if found.snapped.covariance is None:

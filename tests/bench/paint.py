@@ -27,11 +27,11 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.paint.agreement import agreement
+from app.paint.agreement import measure_agreement
 from app.paint.grass import field_of_play
-from app.paint.ridges import line_like
-from app.paint.snap import SnappedCamera, snap
-from app.paint.view_paint import paint_of
+from app.paint.ridges import find_line_like
+from app.paint.snap import SnappedCamera, snap_camera
+from app.paint.view_paint import read_paint_of_image
 from app.sample.render import render
 from app.sample.scene import Scene
 from app.soccer.annotation import Lines, make_lines
@@ -157,7 +157,7 @@ def _snap(image: np.ndarray, found: Calibration) -> tuple[np.ndarray, SnappedCam
     known = None if found.covariance is None else np.reshape(found.covariance, (8, 8))
     began = time.thread_time()
     field = field_of_play(image)
-    snapped = snap(image, field, found.camera, start_covariance=known)
+    snapped = snap_camera(image, field, found.camera, start_covariance=known)
     return field, snapped, 1000 * (time.thread_time() - began)
 
 
@@ -285,18 +285,20 @@ def _print_detector(shots: list[Shot]) -> None:
     wrong["a label exchanged, labels trusted"] = []
     for shot in shots:
         began = time.thread_time()
-        paint = line_like(shot.image, shot.field)
+        paint = find_line_like(shot.image, shot.field)
         middle = time.thread_time()
-        right.append(agreement(shot.truth, shot.field, paint).product)
+        right.append(measure_agreement(shot.truth, shot.field, paint).product)
         times.append([1000 * (middle - began), 1000 * (time.thread_time() - middle)])
         for px in SHIFTS_PX:
             camera = _turned(shot.truth, px, rng)
-            wrong[f"turned by {px:g} px"].append(agreement(camera, shot.field, paint).product)
+            wrong[f"turned by {px:g} px"].append(
+                measure_agreement(camera, shot.field, paint).product
+            )
         planted = _mislabelled(shot, rng)
         if planted is not None and planted.camera is not None:
             name = "a label exchanged, labels trusted"
-            wrong[name].append(agreement(planted.camera, shot.field, paint).product)
-            read = paint_of(shot.image, shot.size, planted, PITCH, PAPER.calibration)
+            wrong[name].append(measure_agreement(planted.camera, shot.field, paint).product)
+            read = read_paint_of_image(shot.image, shot.size, planted, PITCH, PAPER.calibration)
             if read.supported is not None:
                 kept_wrong.append(read.supported * (read.explained or 0.0))
     area = [[name, _roc_area(right, values), len(values)] for name, values in wrong.items()]

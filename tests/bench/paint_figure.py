@@ -7,9 +7,9 @@ import sys
 import cv2
 import numpy as np
 
-from app.paint.evidence import read_picture, seek, trace
+from app.paint.evidence import find_paint, read_picture, trace_visible_markings
 from app.paint.grass import field_of_play
-from app.paint.ridges import line_like
+from app.paint.ridges import find_line_like
 from app.sample.render import render
 from app.soccer.pitch import Pitch
 from tests.scenes import make_scenes
@@ -28,9 +28,11 @@ def main(out: str) -> None:
     truth = scene.truth.view(key)
     assert truth is not None
     reading = read_picture(picture, field)
-    evidence = seek(reading, trace(reading, truth.camera, Pitch(), 14.0), 3.0)
+    evidence = find_paint(
+        reading, trace_visible_markings(reading, truth.camera, Pitch(), 14.0), 3.0
+    )
     image[~field] //= 2
-    image[cv2.dilate(line_like(picture, field).astype(np.uint8), np.ones((2, 2))) > 0] = ORANGE
+    image[cv2.dilate(find_line_like(picture, field).astype(np.uint8), np.ones((2, 2))) > 0] = ORANGE
     for x, y in evidence.pixels:
         cv2.circle(image, (round(float(x)), round(float(y))), 4, BLUE, 1, cv2.LINE_AA)
     cv2.imwrite(out, image, [cv2.IMWRITE_JPEG_QUALITY, 80])

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from app.geometry.camera import Camera
 from app.geometry.polyline import distance_to_polyline
-from app.paint.propose import FrameProposal, propose
+from app.paint.propose import FrameProposal, propose_camera
 from app.sample.render import render
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImageSize
@@ -107,7 +107,7 @@ def _rows(name: str, tried: list[Tried]) -> list[list[object]]:
 
 def _try(kind: str, image: Image, known: list[Camera]) -> tuple[FrameProposal, float, float]:
     began, busy = time.perf_counter(), time.process_time()
-    found = propose(image, known=known)
+    found = propose_camera(image, known=known)
     return found, 1000 * (time.process_time() - busy), 1000 * (time.perf_counter() - began)
 
 

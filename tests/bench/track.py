@@ -25,7 +25,7 @@ from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.polyline import distance_to_polyline
 from app.geometry.resection import X, Z
-from app.paint.evidence import seek, trace
+from app.paint.evidence import find_paint, trace_visible_markings
 from app.soccer.annotation import Lines
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.jaccard import project_markings
@@ -165,7 +165,9 @@ def paint_distances(clip: Clip, found: list[FrameCamera]) -> list[float]:
             continue
         camera = clip.as_read(frame.camera)
         unit = picture.reading.width / 960
-        evidence = seek(picture.reading, trace(picture.reading, camera, Pitch()), 3.0 * unit)
+        evidence = find_paint(
+            picture.reading, trace_visible_markings(picture.reading, camera, Pitch()), 3.0 * unit
+        )
         distances.append(float(np.median(np.abs(evidence.offsets))) / unit)
     return distances
 

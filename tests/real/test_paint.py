@@ -10,7 +10,7 @@ import pytest
 from app.config import Settings
 from app.features.file_tools.paint import agree_files, snap_files
 from app.media.files import decode_frame
-from app.paint.view_proposal import proposal_of
+from app.paint.view_proposal import propose_lines_in_image
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
 from app.soccer.pitch import Pitch
@@ -45,7 +45,7 @@ def test_accepted_proposals_qualify_with_the_goals_that_are_seen():
     for path in sorted((DATA / "stills").iterdir()):
         image = decode_frame(Media(str(path)), False, Settings())
         size = ImageSize(image.shape[1], image.shape[0])
-        found = proposal_of(image, size, (), pitch, PAPER.calibration)
+        found = propose_lines_in_image(image, size, (), pitch, PAPER.calibration)
         if found.outcome == "proposed":
             made = calibrate(found.lines, pitch, size, PAPER.calibration)
             assert made.jac is not None and made.jac[0] > PAPER.min_jac, path.name

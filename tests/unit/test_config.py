@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.config import Settings, memory_bytes
+from app.config import Settings, is_local, memory_bytes
 from app.errors import InputError
 
 MB = 2**20
@@ -81,3 +81,29 @@ class TestDatabaseUrlFile:
         file.unlink() if content is None else file.write_bytes(content)
         with pytest.raises(InputError, match=r"is empty|cannot be read"):
             Settings(database_url_file=file)
+
+
+class TestIsLocal:
+    @pytest.mark.parametrize(
+        "host", ["127.0.0.1", "127.8.8.8", "127.1", "0x7f.1", "localhost", "::1", "[::1]"]
+    )
+    def test_this_machine_alone(self, host: str) -> None:
+        assert is_local(host)
+
+    @pytest.mark.parametrize(
+        "host",
+        [
+            "0.0.0.0",
+            "0",
+            "10.1",
+            "::",
+            "10.0.0.1",
+            "example.org",
+            "",
+            "localhost.",
+            "127.0.0.1 x",
+            "127.0.0.300",
+        ],
+    )
+    def test_everything_else_is_reached_by_others(self, host: str) -> None:
+        assert not is_local(host)

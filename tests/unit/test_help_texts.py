@@ -36,20 +36,20 @@ PLAIN_WORDS = """
     evaluate event events executors export exports facets facts faults fields figure figures files
     film filter finder finite first fit fixture folders follow form format formats frozen gestures
     give glossary gold grass grid guess guide guideline guidelines header headers heat help hints
-    histograms history hit home hooks hosts idempotency identity if image images import imports
-    index indexing info init insert insight invitation invitations invite items jaccard join json
-    kept kernels key keys kinds known konva last latest lazy lease leases least legend lens lesson
-    lessons letter limits links list listing live local locks login logins lone loupe mail main
-    maintenance making many map markdown marks match matches matrix me measurements measures
-    membership mentions menu merge messages metrics migrate mini models motion name names navigation
-    needs neighbours notice nudge numbers object on open openapi opentrackio options order other
-    output own ownership packing page pages paint palette panel parquet parse parts patch path pen
-    people permissions pins pitch pitches pixel place places play playback player plural png pointer
-    policies pool popover pose position postgresql preopen preview problem process profile progress
-    projection proof property proposal propose props provider queries query quota rail rater reader
-    reasons record refresh reimport remote render repeats report requests resect resource restore
-    result rethreshold return revert reviewers rights roles rotation router routes row rows rules
-    run runner runs safe save scale scene scene3d scenes schemas score scoring scroll search sender
+    histograms history hit home hooks idempotency identity if image images import imports index
+    indexing info init insert insight invitation invitations invite items jaccard join json kept
+    kernels key keys known konva last latest lazy lease leases least legend lens lesson lessons
+    letter limits links list listing live local locks login logins lone loupe mail main maintenance
+    making many map markdown marks match matches matrix me measurements measures membership mentions
+    menu merge messages metrics migrate mini models motion name names navigation needs neighbours
+    notice nudge numbers object on open openapi opentrackio options order other output own ownership
+    packing page pages paint palette panel parquet parse parts patch path pen people permissions
+    pins pitch pitches pixel place places play playback player plural png pointer policies pool
+    popover pose position postgresql preopen preview problem process profile progress projection
+    proof property proposal propose props provider queries query quota rail rater reader reasons
+    record refresh reimport remote render repeats report requests resect resource restore result
+    rethreshold return revert reviewers rights roles rotation router routes row rows rules run
+    runner runs safe save scale scene scene3d scenes schemas score scoring scroll search sender
     sending serve server service serving session sets shared sharing sheet sign snapshot solve
     solving source sources sphere spread sqlite squares stacks stage staging standpoints state
     statements statistics steps storage store stored stream stretches submit suggested suggestions

@@ -51,7 +51,7 @@ from app.features.tracks.tables import TrackModel
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.features.versions.tables import VersionModel
 from app.finite import MAX_ID
-from app.object_store.address import is_address
+from app.object_store.path import is_address
 from app.soccer.policy import Policy
 
 _DIGITS = 19

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.policies.commands import read_policy_option
-from app.object_store.address import is_address
-from app.object_store.path import StoredPath, find_path, target_path
+from app.object_store.path import StoredPath, find_path, is_address, target_path
 from app.soccer.choices import (
     BoxKind,
     CalibrationChoice,

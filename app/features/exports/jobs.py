@@ -32,8 +32,8 @@ from app.formats.file_tree import Root
 from app.formats.output import require_absent_in_store
 from app.formats.safe_path import require_safe_path
 from app.media.frames import Frames, SentPicture
-from app.object_store.address import SCHEME
 from app.object_store.path import StoredPath, target_path
+from app.object_store.store import SCHEME
 from app.plural import plural
 from app.soccer.group import Media
 

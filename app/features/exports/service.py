@@ -55,8 +55,7 @@ from app.formats.output import output_anywhere
 from app.formats.tracks_writer import TrackRecord
 from app.formats.view_files import PutText, ViewFiles
 from app.media.frames import make_picture
-from app.object_store.address import is_address
-from app.object_store.path import StoredPath
+from app.object_store.path import StoredPath, is_address
 from app.progress import ReportProgress
 from app.soccer.ball_boxes import BOX_KINDS
 from app.soccer.choices import PicturesWritten, TrainingViews

@@ -30,7 +30,7 @@ from app.formats.frame_names import (
 from app.formats.safe_path import resolve_inside
 from app.media.files import media_facts, picture_header
 from app.media.frames import SentPicture
-from app.object_store.address import is_address, unseal_address
+from app.object_store.path import is_address, unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.policy import Policy

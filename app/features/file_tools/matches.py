@@ -24,7 +24,7 @@ from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
-from app.paint.frame_pitch import share_tripod
+from app.paint.frame_pitch import find_shared_pitch
 from app.paint.snap import SnappedCamera
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
@@ -243,7 +243,7 @@ def share_tripods(
     for frames in by_camera.values():
         if len({each.pitch for each in frames}) > 1:
             continue
-        shared = share_tripod(
+        shared = find_shared_pitch(
             [each.snapped for each in frames], frames[0].pitch, CalibrationPolicy()
         )
         if shared is None:

@@ -35,12 +35,12 @@ from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.media.files import decode_picture
 from app.media.frames import LIMITS
-from app.paint.agreement import agreement
+from app.paint.agreement import measure_agreement
 from app.paint.evidence import to_paint_evidence
 from app.paint.grass import field_of_play, why_no_field
 from app.paint.propose import why_too_small
-from app.paint.ridges import line_like
-from app.paint.snap import SnappedCamera, snap
+from app.paint.ridges import find_line_like
+from app.paint.snap import SnappedCamera, snap_camera
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
@@ -297,7 +297,7 @@ def _snap_picture(
         broken = f"the paint cannot be solved ({error}): the camera of the clicks stays"
         return _result_row(frame, UNSURE, reason=broken), kept, None
     spent = 1000 * (time.thread_time() - began)
-    seen = agreement(snapped.camera, field, line_like(picture.image, field))
+    seen = measure_agreement(snapped.camera, field, find_line_like(picture.image, field))
     row = _result_row(
         frame,
         UNSURE if snapped.reason else PROPOSED,
@@ -318,7 +318,7 @@ def _snap_picture(
 def _snap_to_paint(picture: PictureFile, field: Any, clicked: Calibration) -> SnappedCamera:
     assert picture.image is not None and clicked.camera is not None
     known = None if clicked.covariance is None else np.reshape(clicked.covariance, (8, 8))
-    return snap(picture.image, field, clicked.camera, start_covariance=known)
+    return snap_camera(picture.image, field, clicked.camera, start_covariance=known)
 
 
 def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str, Any]:
@@ -332,7 +332,7 @@ def _agree_picture(picture: PictureFile, frame: str, camera: Camera) -> dict[str
     reason = why_no_field(picture.image, field)
     if reason is not None:
         return _result_row(frame, NOTHING, reason=reason)
-    seen = agreement(camera, field, line_like(picture.image, field))
+    seen = measure_agreement(camera, field, find_line_like(picture.image, field))
     return _result_row(
         frame,
         "measured",

@@ -23,8 +23,8 @@ from app.formats.report import Report
 from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
-from app.paint.frame_pitch import films, pitch_frame, pitch_of
-from app.paint.propose import FrameProposal, propose
+from app.paint.frame_pitch import agreed_pitch, group_by_position, make_pitch_frame
+from app.paint.propose import FrameProposal, propose_camera
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
@@ -107,9 +107,9 @@ def _pitches_shown_by_films(seen: Sequence[_ProposedCamera | None]) -> dict[int,
     cameras = [None if one is None else one.camera for one in seen]
     sizes = [None if one is None else one.frame.size for one in seen]
     found = {}
-    for film in films(cameras, sizes):
+    for film in group_by_position(cameras, sizes):
         frames = [one.frame for index in film if (one := seen[index]) is not None]
-        pitch = pitch_of(frames, Pitch())
+        pitch = agreed_pitch(frames, Pitch())
         if pitch is not None:
             found.update(dict.fromkeys(film, pitch))
     return found
@@ -155,7 +155,7 @@ def _propose_one(
         found = FrameProposal("nothing", picture.problem)
     else:
         try:
-            found = propose(picture.image, pitch, known)
+            found = propose_camera(picture.image, pitch, known)
         except (GeometryError, np.linalg.LinAlgError) as error:
             found = FrameProposal("nothing", f"the picture cannot be solved ({error})")
     milliseconds = 1000 * (time.perf_counter() - began)
@@ -177,7 +177,7 @@ def _propose_one(
         covariance = None if spread is None else row_by_row(spread)
         shape = size or ImageSize(width, height)
         _write_camera_file(file, camera_file_text(camera, covariance, shape))
-        known_to = pitch_frame(picture.image, found.camera, pitch)
+        known_to = make_pitch_frame(picture.image, found.camera, pitch)
         drawn = (
             DrawnFrame(frame, found.snapped, camera, shape, pitch)
             if found.snapped is not None and found.snapped.reason is None
@@ -187,7 +187,9 @@ def _propose_one(
     file.unlink(missing_ok=True)
     if found.camera is None or picture.image is None or not _may_fit_another_pitch(found):
         return row, None
-    return row, _ProposedCamera(found.camera, 0.0, pitch_frame(picture.image, found.camera, pitch))
+    return row, _ProposedCamera(
+        found.camera, 0.0, make_pitch_frame(picture.image, found.camera, pitch)
+    )
 
 
 def _may_fit_another_pitch(found: FrameProposal) -> bool:

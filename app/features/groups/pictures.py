@@ -22,8 +22,8 @@ from app.geometry.camera import Camera
 from app.media.files import read_pixels
 from app.media.frames import refused_picture
 from app.paint.evidence import Image
-from app.paint.view_paint import hiding_boxes, paint_of, why_unreadable
-from app.paint.view_proposal import ViewProposal, beside_drawn, proposal_of
+from app.paint.view_paint import hiding_boxes, read_paint_of_image, why_unreadable
+from app.paint.view_proposal import ViewProposal, keep_undrawn_markings, propose_lines_in_image
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, View
@@ -157,7 +157,9 @@ def _read_paint_of_image(task: PaintTask, frame: str, image: Image) -> PaintRead
         return None
     if why_unreadable(image, size) is not None:
         return replace(task.reading_without_frame, frame=frame)
-    seen = paint_of(image, size, clicked, task.group.pitch, policy, task.view.extras.places)
+    seen = read_paint_of_image(
+        image, size, clicked, task.group.pitch, policy, task.view.extras.places
+    )
     reason = NO_PAINT if seen.outcome == "nothing" else seen.reason
     evidence = seen.evidence if reason is None else NOTHING
     return PaintReading(
@@ -240,9 +242,9 @@ def read_proposal(task: ProposalTask, settings: Settings) -> Proposal | None:
         return task.proposal_without_picture(UNREADABLE)
     if image is None:
         return None
-    found = proposal_of(image, task.size, task.known, task.pitch, task.policy)
+    found = propose_lines_in_image(image, task.size, task.known, task.pitch, task.policy)
     return task.proposal_to_keep(
-        beside_drawn(found, task.drawn, task.pitch, task.size, task.policy), digest
+        keep_undrawn_markings(found, task.drawn, task.pitch, task.size, task.policy), digest
     )
 
 

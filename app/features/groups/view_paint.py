@@ -23,7 +23,7 @@ from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
 from app.media.frames import Frames
 from app.paint.view_paint import read_paint
-from app.paint.view_proposal import propose_beside
+from app.paint.view_proposal import propose_undrawn_lines
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, View
@@ -77,7 +77,7 @@ class ViewPaintRequest:
         """Have lines proposed; the result is a ``ViewProposal``."""
         station = self.view.station
         return frames.ask_of(
-            self.media, station.flipped, propose_beside,
+            self.media, station.flipped, propose_undrawn_lines,
             station.size, self.known, self.group.pitch, self.policy, self.drawn,
         )  # fmt: skip
 

@@ -30,8 +30,8 @@ from app.features.people.visibility_queries import Visibility
 from app.formats.file_tree import Root
 from app.formats.guess_format import guess_format, guess_format_of_names
 from app.formats.safe_path import MAX_PART, require_safe_path, resolve_inside
-from app.object_store.address import SCHEME, is_address
-from app.object_store.path import StoredPath, find_path
+from app.object_store.path import StoredPath, find_path, is_address
+from app.object_store.store import SCHEME
 
 MAX_ITEMS = 1000
 """Entries of a folder that are listed."""

@@ -43,7 +43,7 @@ from app.features.pitches.service import give_pitch
 from app.features.policies.service import first_policy
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
-from app.object_store.address import is_address
+from app.object_store.path import is_address
 from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.group import Group, View

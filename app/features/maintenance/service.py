@@ -6,14 +6,13 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from urllib.parse import urlsplit
 
-from app.config import Settings
+from app.config import Settings, is_local
 from app.db.session import now, text_of
 from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.audit_events import add_audit_event
 from app.features.maintenance.queries import find_banner, put_banner
 from app.finite import Moment
-from app.hosts import is_local
 
 LONGEST = 300
 """Characters of a notice."""

@@ -41,7 +41,7 @@ from app.finite import quoted
 from app.formats.file_tree import Limits
 from app.formats.report import Report
 from app.geometry.camera import Camera
-from app.object_store.address import unseal_address
+from app.object_store.path import unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.config import Settings
-from app.object_store.address import SCHEME
+from app.object_store.store import SCHEME
 from tests.moto_server import ClassLimiter, fill_store, moto_server, stored_settings
 
 

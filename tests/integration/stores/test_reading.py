@@ -23,8 +23,7 @@ from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.media.files import content_type, read_frame
 from app.media.object_frames import is_kept
-from app.object_store.address import split_address
-from app.object_store.path import find_path
+from app.object_store.path import find_path, split_address
 from app.object_store.store import open_store
 from app.soccer.group import Group, Media
 from tests.moto_server import ClassLimiter, fill_store, store_settings, stored_settings

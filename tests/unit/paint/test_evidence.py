@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from app.paint.evidence import (
+    find_paint,
     read_picture,
-    seek,
     shows_grass_beside,
     to_paint_evidence,
-    trace,
+    trace_visible_markings,
 )
 from app.paint.profile_kernels import find_stripes
 from app.paint.tracing import TracedPlaces, painted_markings
@@ -71,7 +71,7 @@ class TestFindStripes:
 class TestTrace:
     def test_places_lie_on_the_markings_and_derivatives_match_differences(self, rendered):
         reading = read_picture(rendered.image, rendered.field)
-        traced = trace(reading, rendered.truth, Pitch())
+        traced = trace_visible_markings(reading, rendered.truth, Pitch())
         assert len(traced.pixels) > 300
         assert painted_markings()[traced.marking].all()
         apart = np.hypot(*(rendered.truth.project(traced.places) - traced.pixels).T)
@@ -83,7 +83,7 @@ class TestTrace:
 
         reading = read_picture(rendered.image, rendered.field)
         truth, half = rendered.truth, reading.half_diagonal
-        traced = trace(reading, truth, Pitch())
+        traced = trace_visible_markings(reading, truth, Pitch())
         base = parameters_from_camera(truth, half)
         for index in range(8):
             step = np.zeros(8)
@@ -117,26 +117,35 @@ class TestShowsGrassBeside:
 class TestSeek:
     def test_paint_of_the_true_camera_lies_within_its_sigmas(self, rendered):
         reading = read_picture(rendered.image, rendered.field)
-        found = seek(reading, trace(reading, rendered.truth, Pitch()), 3.0)
+        found = find_paint(reading, trace_visible_markings(reading, rendered.truth, Pitch()), 3.0)
         assert found.share > 0.5
         assert 0.5 < np.median(np.abs(found.offsets / found.sigmas)) / 0.6745 < 1.6
 
     def test_nothing_is_believed_in_a_hidden_box(self, rendered):
         box = Box(400.0, 300.0, 500.0, 300.0)
         reading = read_picture(rendered.image, rendered.field, [box])
-        x, y = seek(reading, trace(reading, rendered.truth, Pitch()), 3.0).pixels.T
+        x, y = find_paint(
+            reading, trace_visible_markings(reading, rendered.truth, Pitch()), 3.0
+        ).pixels.T
         assert not ((x > 401) & (x < 899) & (y > 301) & (y < 599)).any()
 
     def test_grass_alone_gives_no_evidence(self, rendered):
         image = picture(GRASS, 720, 1280)
         reading = read_picture(image, np.ones((720, 1280), np.bool_))
-        assert len(seek(reading, trace(reading, rendered.truth, Pitch()), 5.0).offsets) == 0
+        assert (
+            len(
+                find_paint(
+                    reading, trace_visible_markings(reading, rendered.truth, Pitch()), 5.0
+                ).offsets
+            )
+            == 0
+        )
 
 
 class TestToPaintEvidence:
     def test_every_place_is_kept_under_its_marking(self, rendered):
         reading = read_picture(rendered.image, rendered.field)
-        found = seek(reading, trace(reading, rendered.truth, Pitch()), 3.0)
+        found = find_paint(reading, trace_visible_markings(reading, rendered.truth, Pitch()), 3.0)
         kept = to_paint_evidence(found)
         assert kept.count == len(found.offsets)
         assert set(kept.points) == {MARKINGS[i] for i in np.unique(found.traced.marking)}

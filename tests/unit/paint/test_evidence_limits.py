@@ -14,12 +14,12 @@ from app.paint.evidence import (
     Evidence,
     Reading,
     _bright_as_paint,
+    find_paint,
     read_picture,
-    seek,
-    seen_field,
     shows_grass_beside,
     to_paint_evidence,
-    trace,
+    trace_visible_markings,
+    visible_field,
 )
 from app.paint.profile_kernels import find_stripes
 from app.paint.tracing import TracedPlaces, trace_places
@@ -104,7 +104,7 @@ class TestSeenField:
         expected = np.ones((HEIGHT, WIDTH), np.bool_)
         for row in rows:
             expected[row, list(columns)] = False
-        seen = seen_field(np.ones((HEIGHT, WIDTH), np.bool_), [box])
+        seen = visible_field(np.ones((HEIGHT, WIDTH), np.bool_), [box])
         assert np.array_equal(seen, expected)
 
 
@@ -134,7 +134,7 @@ class TestTrace:
         every = trace_places(camera, Pitch(), size.width, size.height, SPACING_PX, MOST_PLACES)
         columns, rows = np.rint(every.pixels).astype(int).T
         on_field = field[rows, columns]
-        traced = trace(reading, camera, Pitch())
+        traced = trace_visible_markings(reading, camera, Pitch())
         assert traced.visible == on_field.sum()
         assert np.array_equal(traced.pixels, every.pixels[on_field & (every.widths >= 0.25)])
         assert 0 < len(traced.pixels) < traced.visible < len(every.pixels)
@@ -143,13 +143,15 @@ class TestTrace:
     def whole_pitch(width: int) -> TracedPlaces:
         size = ImageSize(width, width * 9 // 16)
         camera = looking((0.0, 20.0, -105.0), (0.0, 2.0, 0.0), 0.8 * width, size=size)
-        return trace(read(picture(GRASS, size.height, size.width)), camera, Pitch())
+        return trace_visible_markings(
+            read(picture(GRASS, size.height, size.width)), camera, Pitch()
+        )
 
 
 class TestSeek:
     @pytest.mark.parametrize(("levels", "found"), [(4, 0), (9, 16)])
     def test_a_stripe_stands_out_from_six_grey_levels_on(self, levels: int, found: int) -> None:
-        evidence = seek(read(stripe(brighter_by(levels))), upright([100.0] * 16), 6.0)
+        evidence = find_paint(read(stripe(brighter_by(levels))), upright([100.0] * 16), 6.0)
         assert len(evidence.offsets) == found
 
     @pytest.mark.parametrize(("times", "few"), [(2, True), (8, False)])
@@ -159,7 +161,7 @@ class TestSeek:
         noise = read(noisy(picture(GRASS, HEIGHT, WIDTH), 8.0)).noise
         reading = read(noisy(stripe(brighter_by(round(times * noise))), 8.0))
         assert 2 * reading.noise > 6.0
-        share = seek(reading, upright([100.0] * 16), 6.0).share
+        share = find_paint(reading, upright([100.0] * 16), 6.0).share
         assert share < 0.2 if few else share > 0.8
 
     @pytest.mark.parametrize(
@@ -174,12 +176,14 @@ class TestSeek:
     def test_paint_is_bright_in_every_channel(
         self, colour: tuple[int, int, int], paint: bool
     ) -> None:
-        evidence = seek(read(stripe(colour)), upright([100.0] * 16), 6.0)
+        evidence = find_paint(read(stripe(colour)), upright([100.0] * 16), 6.0)
         assert len(evidence.offsets) == (16 if paint else 0)
 
     def test_each_place_is_sought_in_its_own_window(self) -> None:
         windows = np.repeat([2.0, 7.0], 20)
-        evidence = seek(read(stripe(WHITE)), upright([96.0] * 40, marking=windows > 4), windows)
+        evidence = find_paint(
+            read(stripe(WHITE)), upright([96.0] * 40, marking=windows > 4), windows
+        )
         assert evidence.traced.marking.tolist() == [1] * 20
         assert evidence.offsets == pytest.approx(4.0, abs=0.1)
 
@@ -192,7 +196,7 @@ class TestSeek:
     ) -> None:
         # Each place lies so much farther to the side of the stripe than the one before it.
         columns = 100.0 + aside * np.arange(-10, 11)
-        found = seek(read(stripe(WHITE)), upright(columns), 8.0).offsets
+        found = find_paint(read(stripe(WHITE)), upright(columns), 8.0).offsets
         assert len(found) > 15 if kept else not len(found)
 
     @pytest.mark.parametrize(("shown", "kept"), [(0.7, True), (0.3, False)])
@@ -206,7 +210,7 @@ class TestSeek:
             image[round(row) - 3 : round(row) + 4, 98:103] = WHITE
         traced = upright([100.0] * count)
         traced.pixels[:, 1] = rows
-        share = seek(read(image), traced, 6.0).share
+        share = find_paint(read(image), traced, 6.0).share
         assert share == pytest.approx(shown, abs=0.15) if kept else share < 0.1
 
     @pytest.mark.parametrize(
@@ -218,7 +222,7 @@ class TestSeek:
         reading, traced = read(striped(100.0, 3.0)), upright([100.0] * 16, 3.0)
         # The floor of 0.04 pixels stands beside the noise.
         noise = np.sqrt(alone**2 - 0.04**2) / _sigma_of_one_level(reading, traced)
-        sigmas = seek(replace(reading, noise=noise), traced, 6.0).sigmas
+        sigmas = find_paint(replace(reading, noise=noise), traced, 6.0).sigmas
         assert sigmas == pytest.approx(told, rel=0.01)
 
 
@@ -262,7 +266,7 @@ class TestShowsGrassBeside:
             shows_grass_beside(read(picture(GRASS, HEIGHT, WIDTH)), traced, window).all() == shown
         )
         painted = striped(x, width)
-        assert (len(seek(read(painted), traced, window).offsets) == 4) == shown
+        assert (len(find_paint(read(painted), traced, window).offsets) == 4) == shown
 
     @pytest.mark.parametrize(
         ("x", "width", "column", "shown"),
@@ -324,7 +328,7 @@ class TestEvidence:
     def test_of_a_camera_that_shows_no_marking_no_share_is_seen(self) -> None:
         reading = read(picture(GRASS, 720, 1280))
         up = looking((0.0, 62.0, -9.0), (0.0, 20.0, -60.0), 1500.0)
-        evidence = seek(reading, trace(reading, up, Pitch()), 3.0)
+        evidence = find_paint(reading, trace_visible_markings(reading, up, Pitch()), 3.0)
         assert (evidence.traced.visible, evidence.share) == (0, 0.0)
 
     @pytest.mark.parametrize("factor", [0.5, 3.0])
@@ -348,7 +352,7 @@ class TestEvidence:
 
 def found_with(rendered, camera: Camera) -> Evidence:
     reading = read_picture(rendered.image, rendered.field)
-    return seek(reading, trace(reading, camera, Pitch()), 6.0)
+    return find_paint(reading, trace_visible_markings(reading, camera, Pitch()), 6.0)
 
 
 def _sigma_of_one_level(reading: Reading, traced: TracedPlaces) -> float:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.frame_pitch import films, pitch_frame, pitch_of
-from app.paint.propose import propose
+from app.paint.frame_pitch import agreed_pitch, group_by_position, make_pitch_frame
+from app.paint.propose import propose_camera
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.solving.pitch_size import PitchFrame
@@ -27,22 +27,22 @@ def camera(x: float, y: float) -> Camera:
 def frames(pitch: Pitch) -> list[PitchFrame]:
     """Frames of one camera, with the places of paint beside those that are found on 105 x 68 m."""
     pictures = [lawn(drawn(camera(*target), 2, pitch)) for target in TARGETS]
-    found = [(picture, propose(picture).camera) for picture in pictures]
-    return [pitch_frame(picture, one, PITCH) for picture, one in found if one is not None]
+    found = [(picture, propose_camera(picture).camera) for picture in pictures]
+    return [make_pitch_frame(picture, one, PITCH) for picture, one in found if one is not None]
 
 
 class TestPitchOf:
     def test_three_frames_show_a_shorter_pitch(self) -> None:
-        found = pitch_of(frames(SHORT), PITCH)
+        found = agreed_pitch(frames(SHORT), PITCH)
         assert found is not None
         assert found.length == pytest.approx(100.5, abs=0.4)
         assert found.width == 68.0
 
     def test_the_pitch_in_use_is_left_alone(self) -> None:
-        assert pitch_of(frames(PITCH), PITCH) is None
+        assert agreed_pitch(frames(PITCH), PITCH) is None
 
     def test_one_frame_decides_nothing(self) -> None:
-        assert pitch_of(frames(SHORT)[:1], PITCH) is None
+        assert agreed_pitch(frames(SHORT)[:1], PITCH) is None
 
 
 class TestFilms:
@@ -51,4 +51,4 @@ class TestFilms:
         far = replace(one, position=one.position + np.array([0.0, 12.0, 0.0]))
         cameras = [one, far, None, camera(-20.0, 0.0), one]
         sizes = [size, size, None, size, ImageSize(1280, 720)]
-        assert films(cameras, sizes) == [[0, 3], [1], [4]]
+        assert group_by_position(cameras, sizes) == [[0, 3], [1], [4]]

@@ -10,13 +10,13 @@ import pytest
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.agreement import PaintAgreement
 from app.paint.candidates import Library
-from app.paint.evidence import read_picture, seek, to_paint_evidence, trace
+from app.paint.evidence import find_paint, read_picture, to_paint_evidence, trace_visible_markings
 from app.paint.propose import (
     RankedCamera,
     SearchedFrame,
-    propose,
+    propose_camera,
     read_frame,
-    scaled,
+    scale_snapped,
     weakest_marking,
     why_not_square,
     why_unsure,
@@ -50,7 +50,7 @@ class TestPropose:
     def test_a_rendered_frame_gets_its_camera(self, scene: Scene, frame: Image):
         true = scene.truth.views[0].camera
         size = ImageSize(frame.shape[1], frame.shape[0])
-        found = propose(frame)
+        found = propose_camera(frame)
         assert (found.outcome, found.reason) == ("proposed", None)
         assert found.camera is not None
         seen = make_lines(
@@ -65,8 +65,8 @@ class TestPropose:
         monkeypatch.setattr("app.paint.propose.MAIN", nowhere)
         monkeypatch.setattr("app.paint.propose.WIDE", nowhere)
         true = scene.truth.views[0].camera
-        assert propose(frame).outcome == "unsure"
-        found = propose(frame, known=[true])
+        assert propose_camera(frame).outcome == "unsure"
+        found = propose_camera(frame, known=[true])
         assert found.outcome == "proposed"
         assert found.camera is not None
         assert np.linalg.norm(found.camera.position - true.position) < 2.0
@@ -79,12 +79,12 @@ class TestPropose:
         for x, y in zip(rng.integers(0, 900, 200), rng.integers(100, 530, 200), strict=True):
             picture[y : y + 2, x : x + rng.integers(30, 60)] += 30
         blocks = np.clip(picture, 0, 255).astype(np.uint8)
-        found = propose(blocks)
+        found = propose_camera(blocks)
         assert found.outcome == "proposed" and found.agreement is not None
         assert found.camera is not None and found.agreement.explained > 0.8
         assert np.linalg.norm(found.camera.position - TRUE.position) < 0.5
         monkeypatch.setattr("app.paint.propose.CLOSER", 0)
-        found = propose(blocks)
+        found = propose_camera(blocks)
         assert found.reason is not None and "looks like paint" in found.reason
 
     def test_a_line_that_is_seen_in_the_picture_as_it_is_tells_the_position(
@@ -102,17 +102,17 @@ class TestPropose:
             cv2.polylines(picture, [points], False, color, broad, cv2.LINE_AA, 4)
         noise = np.random.default_rng(1).normal(0, 2, picture.shape)
         image = (cv2.GaussianBlur(picture, (0, 0), 0.6) + noise).clip(0, 255).astype(np.uint8)
-        found = propose(image)
+        found = propose_camera(image)
         assert (found.outcome, found.reason) == ("proposed", None)
         assert found.camera is not None and found.snapped is not None
         assert found.snapped.size == (size.height, size.width)
         assert np.linalg.norm(found.camera.position - true.position) < 1.0
         monkeypatch.setattr("app.paint.propose.CLOSER", 0)
-        found = propose(image)
+        found = propose_camera(image)
         assert found.reason is not None and "where the camera stands" in found.reason
 
     def test_a_camera_stands_where_y_is_positive(self):
-        found = propose(lawn(drawn(TRUE, 3)))
+        found = propose_camera(lawn(drawn(TRUE, 3)))
         assert found.outcome == "proposed"
         assert found.camera is not None
         assert found.camera.position[1] > 0
@@ -135,7 +135,7 @@ class TestPropose:
         monkeypatch.setattr("app.paint.propose.snap_reading", snap)
         small = lawn(drawn(TRUE, 3))
         picture = np.asarray(cv2.resize(small, (1280, 720), interpolation=cv2.INTER_CUBIC))
-        assert propose(picture, known=[TRUE]).outcome == "proposed"
+        assert propose_camera(picture, known=[TRUE]).outcome == "proposed"
         (found, *_, last) = asked
         assert (found[0], last[0]) == (960, 1280)
         # The lens of the match is known, and a circle counts as two lines.
@@ -146,10 +146,10 @@ class TestPropose:
         reading = read_picture(lawn(drawn(TRUE, 3)), np.ones((540, 960), np.bool_))
         pan, tilt, roll = np.radians(TRUE.pan_tilt_roll_degrees)
         aside = replace(TRUE, rotation=rotation_from_pan_tilt_roll(pan + 0.004, tilt, roll))
-        seen = seek(reading, trace(reading, aside, PITCH), 12.0)
+        seen = find_paint(reading, trace_visible_markings(reading, aside, PITCH), 12.0)
         assert np.median(np.abs(seen.offsets)) > 1.0
         snapped = SnappedCamera(aside, seen, 1.0, None, 0.5, None, (540, 960))
-        large = scaled(snapped, 1080, 1920)
+        large = scale_snapped(snapped, 1080, 1920)
         before, after = (to_paint_evidence(item.evidence, item.camera) for item in (snapped, large))
         for name, places in before.points.items():
             told = np.array(after.points[name])
@@ -160,10 +160,10 @@ class TestPropose:
     def test_what_paint_leaves_open_the_match_tells(self):
         true = looking((-1.0, 60.0, -16.0), (0.0, -4.0, 0.0), 2600.0, size=SMALL)
         picture = lawn(drawn(true, 3))
-        alone = propose(picture)
+        alone = propose_camera(picture)
         assert alone.outcome == "unsure"
         assert alone.reason is not None and "where the camera stands" in alone.reason
-        found = propose(
+        found = propose_camera(
             picture, known=[replace(true, position=true.position + np.array([0.6, -0.3, 0.2]))]
         )
         assert (found.outcome, found.reason) == ("proposed", None)
@@ -171,9 +171,9 @@ class TestPropose:
         assert np.linalg.norm(found.camera.position - true.position) < 1.0
 
     def test_a_position_of_another_match_moves_no_camera_that_paint_determines(self):
-        alone = propose(lawn(drawn(TRUE, 3)))
+        alone = propose_camera(lawn(drawn(TRUE, 3)))
         other = replace(TRUE, position=TRUE.position + np.array([2.5, 1.5, -1.0]))
-        found = propose(lawn(drawn(TRUE, 3)), known=[other])
+        found = propose_camera(lawn(drawn(TRUE, 3)), known=[other])
         assert alone.camera is not None and found.camera is not None
         assert np.linalg.norm(found.camera.position - TRUE.position) < 0.3
 
@@ -193,7 +193,7 @@ class TestPropose:
         small = cv2.resize(frame, (400, 400 * height // width), interpolation=cv2.INTER_AREA)
         read = read_frame(small)
         assert isinstance(read, SearchedFrame) and read.image.shape[1] == 800
-        found = propose(np.asarray(small, np.uint8))
+        found = propose_camera(np.asarray(small, np.uint8))
         assert found.outcome == "proposed"
         assert found.camera is not None and found.snapped is not None
         assert found.snapped.size == small.shape[:2]
@@ -206,7 +206,7 @@ class TestPropose:
 
     def test_a_squeezed_picture_is_not_proposed(self, frame: Image):
         squeezed = np.asarray(cv2.resize(frame, (1024, 1024), interpolation=cv2.INTER_AREA))
-        found = propose(squeezed)
+        found = propose_camera(squeezed)
         assert found.outcome == "unsure"
         assert found.reason is not None
 
@@ -252,7 +252,7 @@ class TestPropose:
         ids=["grass alone", "night", "snow", "tiny"],
     )
     def test_a_picture_without_lines_gets_nothing_and_a_reason(self, picture: Image, reason: str):
-        found = propose(picture)
+        found = propose_camera(picture)
         assert found.outcome == "nothing"
         assert found.camera is None
         assert reason in (found.reason or "")
@@ -261,6 +261,6 @@ class TestPropose:
         mask = np.zeros((SMALL.height, SMALL.width), np.uint8)
         for x in range(100, 900, 90):
             cv2.line(mask, (x, 60), (x - 80, 500), 1, 3)
-        found = propose(lawn(mask.astype(np.bool_)))
+        found = propose_camera(lawn(mask.astype(np.bool_)))
         assert found.outcome == "unsure"
         assert found.reason

@@ -11,7 +11,7 @@ from app.geometry.camera import Camera
 from app.geometry.resection import parameters_from_camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.evidence import Evidence, to_paint_evidence
-from app.paint.snap import CURVED, _suffices, snap
+from app.paint.snap import CURVED, _has_enough_paint, snap_camera
 from app.paint.tracing import TracedPlaces
 from app.soccer.frames import ImageSize
 from app.soccer.group import Station
@@ -42,7 +42,7 @@ class TestSnap:
     ):
         camera = rendered.clicked.camera
         known = np.reshape(rendered.clicked.covariance, (8, 8))
-        found = snap(rendered.image, rendered.field, camera, start_covariance=known)
+        found = snap_camera(rendered.image, rendered.field, camera, start_covariance=known)
         assert found.reason is None
         before, after = (field_error(one, rendered.truth) for one in (camera, found.camera))
         assert after < 0.12 and after < before / 2
@@ -51,7 +51,7 @@ class TestSnap:
         assert found.planned.trace() < min(known.trace(), found.covariance.trace())
 
     def test_eight_pixels_off_it_comes_back(self, rendered):
-        found = snap(rendered.image, rendered.field, panned(rendered.truth, 8.0))
+        found = snap_camera(rendered.image, rendered.field, panned(rendered.truth, 8.0))
         assert found.reason is None
         assert field_error(found.camera, rendered.truth) < 0.12
         assert found.moved_px == pytest.approx(8.0, abs=1.0)
@@ -59,24 +59,24 @@ class TestSnap:
     @pytest.mark.parametrize(("px", "reason"), [(60.0, PAINT_DISAGREES), (120.0, NO_PAINT)])
     def test_too_far_off_it_stays_where_it_was_and_says_why(self, rendered, px, reason):
         start = panned(rendered.truth, px)
-        found = snap(rendered.image, rendered.field, start)
+        found = snap_camera(rendered.image, rendered.field, start)
         assert found.reason == reason
         assert found.camera is start and found.covariance is None
 
     def test_a_start_that_is_surely_elsewhere_is_not_overruled(self, rendered):
         start = panned(rendered.truth, 6.0)
         sure = np.diag(np.array([1e-5, 1e-5, 1e-5, 0.01, 0.01, 0.01, 1e-4, 1e-3]) ** 2)
-        found = snap(rendered.image, rendered.field, start, start_covariance=sure)
+        found = snap_camera(rendered.image, rendered.field, start, start_covariance=sure)
         assert found.reason is not None and found.camera is start
 
     def test_without_paint_the_start_stays(self, rendered):
         image = picture(GRASS, 720, 1280)
-        found = snap(image, np.ones((720, 1280), np.bool_), rendered.truth)
+        found = snap_camera(image, np.ones((720, 1280), np.bool_), rendered.truth)
         assert found.reason == NO_PAINT and found.error_px is None
 
     def test_the_same_picture_gives_the_same_bits(self, rendered):
         start = panned(rendered.truth, 3.0)
-        first, second = (snap(rendered.image, rendered.field, start) for _ in range(2))
+        first, second = (snap_camera(rendered.image, rendered.field, start) for _ in range(2))
         assert first.camera == second.camera
 
 
@@ -92,7 +92,7 @@ class TestCircle:
             none = np.zeros((len(marking), 2))
             traced = TracedPlaces(none, none, none, none[:, 0], marking, none, len(marking))
             seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0])
-            return _suffices(seen, CURVED, spacing)
+            return _has_enough_paint(seen, CURVED, spacing)
 
         assert suffices(places) and not suffices(places - 1)
 
@@ -101,7 +101,7 @@ class TestStored:
     def test_solving_with_what_is_kept_gives_the_camera_that_the_picture_gave(self, rendered):
         clicked = rendered.clicked
         known = np.reshape(clicked.covariance, (8, 8))
-        found = snap(rendered.image, rendered.field, clicked.camera, start_covariance=known)
+        found = snap_camera(rendered.image, rendered.field, clicked.camera, start_covariance=known)
         kept = to_paint_evidence(found.evidence, found.camera)
         size = ImageSize(1280, 720)
         station = Station("main", size)

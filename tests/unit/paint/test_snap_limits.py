@@ -11,8 +11,8 @@ import pytest
 
 from app.geometry.camera import Camera
 from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.paint.evidence import Evidence, Reading, read_picture, trace
-from app.paint.snap import SnappedCamera, _suffices, snap
+from app.paint.evidence import Evidence, Reading, read_picture, trace_visible_markings
+from app.paint.snap import SnappedCamera, _has_enough_paint, snap_camera
 from app.paint.tracing import PAINTED, TracedPlaces
 from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import NO_PAINT, PAINT_DISAGREES
@@ -59,7 +59,7 @@ def drawn(
     size = ImageSize(width, width * 9 // 16)
     grass = np.full((size.height, size.width, 3), (48.0, 120.0, 50.0))
     image = grass if over is None else over
-    traced = trace(read(grass.astype(np.uint8)), camera, Pitch())
+    traced = trace_visible_markings(read(grass.astype(np.uint8)), camera, Pitch())
     for name, line in project_markings(camera, pitch or Pitch(), size).items():
         broad = traced.widths[traced.marking == MARKINGS.index(name)]
         if name not in names or not len(broad):
@@ -90,7 +90,7 @@ def known(camera: Camera, *, pan_px: float = 1e-5, tilt_px: float = 1e-5) -> np.
 
 
 def snapped(image: np.ndarray, start: Camera, **told: object) -> SnappedCamera:
-    return snap(image, np.ones(image.shape[:2], np.bool_), start, **told)
+    return snap_camera(image, np.ones(image.shape[:2], np.bool_), start, **told)
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +127,7 @@ class TestEnough:
         none = np.zeros((len(marking), 2))
         traced = TracedPlaces(none, none, none, none[:, 0], marking, none, 10 * len(marking))
         seen = Evidence(traced, none[:, 0], none[:, 0], none[:, 0])
-        assert _suffices(seen, []) == enough
+        assert _has_enough_paint(seen, []) == enough
 
     @pytest.mark.parametrize(
         ("names", "reason"),
@@ -148,7 +148,7 @@ class TestEnough:
 
     def test_eighty_places_in_a_corner_of_the_field_determine_a_camera(self, whole) -> None:
         x, y = np.meshgrid(np.arange(960), np.arange(540))
-        found = snap(whole, np.hypot(x - 720, y - 270) < 80, panned(camera_of(960), 1.0))
+        found = snap_camera(whole, np.hypot(x - 720, y - 270) < 80, panned(camera_of(960), 1.0))
         assert found.reason is None and found.points < 90
 
 
@@ -158,7 +158,7 @@ class TestReach:
         self, rendered, px: float, reason: str | None
     ) -> None:
         # Ten pixels at 960 x 540 are 13.3 of this picture.
-        found = snap(rendered.image, rendered.field, panned(rendered.truth, px))
+        found = snap_camera(rendered.image, rendered.field, panned(rendered.truth, px))
         assert found.reason == reason
         # What snapping did, or would have done.
         assert found.moved_px == pytest.approx(px, abs=0.3)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.paint.snap import PAINT_DISAGREES
-from app.paint.view_paint import PictureScale, paint_of, why_unreadable
+from app.paint.view_paint import PictureScale, read_paint_of_image, why_unreadable
 from app.soccer.frames import Box, ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
@@ -56,7 +56,7 @@ POLICY = PAPER.calibration
 
 
 def seen(image, start, size=SIZE):
-    return paint_of(image, size, start, Pitch(), POLICY)
+    return read_paint_of_image(image, size, start, Pitch(), POLICY)
 
 
 def test_paint_lies_on_the_markings_of_the_true_camera(rendered) -> None:
@@ -75,11 +75,11 @@ def test_paint_lies_on_the_markings_of_the_true_camera(rendered) -> None:
 def test_paint_is_sought_and_judged_on_the_lines_that_the_policy_fits(rendered) -> None:
     """The picture shows a pitch whose lines lie where the plan has them, not by the Laws."""
     laws = replace(POLICY, goal="laws")
-    found = paint_of(rendered.image, SIZE, rendered.clicked, Pitch(), laws)
+    found = read_paint_of_image(rendered.image, SIZE, rendered.clicked, Pitch(), laws)
     plan = seen(rendered.image, rendered.clicked)
     assert found.error_px > 1.5 * plan.error_px
     assert replace(found, error_px=None) != replace(plan, error_px=None)
-    middle = paint_of(
+    middle = read_paint_of_image(
         rendered.image, SIZE, rendered.clicked, Pitch(), replace(POLICY, goal="middle")
     )
     assert middle == plan
@@ -118,7 +118,7 @@ def test_nothing_is_believed_where_people_are_and_a_box_of_the_field_hides_none(
     people = (Box(x - 30, y - 40, 60, 80), Box(0, 0, 1280, 720))
     small = np.asarray(cv2.resize(rendered.image, (960, 540), interpolation=cv2.INTER_AREA))
     for image in (rendered.image, small):
-        found = paint_of(image, SIZE, rendered.clicked, Pitch(), POLICY, people)
+        found = read_paint_of_image(image, SIZE, rendered.clicked, Pitch(), POLICY, people)
         told = [
             *found.line_like,
             *(place for some in found.evidence.points.values() for place in some),

@@ -10,8 +10,13 @@ import pytest
 
 from app.errors import GeometryError
 from app.paint import view_proposal
-from app.paint.propose import propose
-from app.paint.view_proposal import NOTHING_NEW, ViewProposal, beside_drawn, proposal_of
+from app.paint.propose import propose_camera
+from app.paint.view_proposal import (
+    NOTHING_NEW,
+    ViewProposal,
+    keep_undrawn_markings,
+    propose_lines_in_image,
+)
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.paint_evidence import POINTS_PER_MARKING
@@ -28,7 +33,7 @@ POLICY = PAPER.calibration
 def test_the_lines_make_the_camera_that_drew_the_picture() -> None:
     # Annotated at another size than the picture has.
     size = ImageSize(1920, 1080)
-    found = proposal_of(lawn(drawn(TRUE, 3)), size, (), PITCH, POLICY)
+    found = propose_lines_in_image(lawn(drawn(TRUE, 3)), size, (), PITCH, POLICY)
     assert (found.outcome, found.sentence) == ("proposed", "")
     assert max(map(len, found.lines.values())) <= POINTS_PER_MARKING
     camera = calibrate(found.lines, PITCH, size, POLICY).camera
@@ -39,8 +44,8 @@ def test_the_lines_make_the_camera_that_drew_the_picture() -> None:
 
 def test_its_numbers_are_those_of_the_search_in_pixels_of_the_annotations() -> None:
     image = lawn(drawn(TRUE, 3))
-    search = propose(image, PITCH, (), POLICY)
-    found = proposal_of(image, ImageSize(1920, 1080), (), PITCH, POLICY)
+    search = propose_camera(image, PITCH, (), POLICY)
+    found = propose_lines_in_image(image, ImageSize(1920, 1080), (), PITCH, POLICY)
     assert search.agreement is not None and search.snapped is not None
     told = (found.supported, found.explained, found.runner_up, found.points)
     assert told == (
@@ -57,8 +62,8 @@ def test_a_picture_that_cannot_be_solved_gets_a_sentence(monkeypatch: pytest.Mon
     def fail(*_: object) -> None:
         raise GeometryError("nothing meets")
 
-    monkeypatch.setattr(view_proposal, "propose", fail)
-    found = proposal_of(lawn(drawn(TRUE, 3)), SMALL, (), PITCH, POLICY)
+    monkeypatch.setattr(view_proposal, "propose_camera", fail)
+    found = propose_lines_in_image(lawn(drawn(TRUE, 3)), SMALL, (), PITCH, POLICY)
     assert (found.outcome, found.lines) == ("nothing", {})
     assert found.sentence == "The paint of this picture cannot be solved."
 
@@ -70,13 +75,13 @@ def test_cameras_of_other_frames_are_what_is_tried_first(monkeypatch: pytest.Mon
         tried.append(known)
         raise GeometryError("that was all")
 
-    monkeypatch.setattr(view_proposal, "propose", keep)
-    proposal_of(lawn(drawn(TRUE, 3)), SMALL, (TRUE,), PITCH, POLICY)
+    monkeypatch.setattr(view_proposal, "propose_camera", keep)
+    propose_lines_in_image(lawn(drawn(TRUE, 3)), SMALL, (TRUE,), PITCH, POLICY)
     assert tried == [(TRUE,)]
 
 
 def test_an_empty_lawn_gets_none_and_a_sentence() -> None:
-    found = proposal_of(lawn(np.zeros((540, 960), np.bool_)), SMALL, (), PITCH, POLICY)
+    found = propose_lines_in_image(lawn(np.zeros((540, 960), np.bool_)), SMALL, (), PITCH, POLICY)
     assert (found.outcome, found.lines) == ("nothing", {})
     assert found.sentence.endswith(".") and found.sentence[0].isupper()
 
@@ -84,7 +89,7 @@ def test_an_empty_lawn_gets_none_and_a_sentence() -> None:
 def test_a_single_line_is_unsure() -> None:
     mask = np.zeros((540, 960), np.uint8)
     cv2.line(mask, (100, 300), (800, 350), 1, 3)
-    found = proposal_of(lawn(mask.astype(np.bool_)), SMALL, (), PITCH, POLICY)
+    found = propose_lines_in_image(lawn(mask.astype(np.bool_)), SMALL, (), PITCH, POLICY)
     assert found.outcome == "unsure"
     assert found.lines == {} and found.sentence
 
@@ -99,8 +104,8 @@ def test_a_policy_whose_lines_lie_by_the_laws_is_followed(
         tried.append(pitch.goal)
         raise GeometryError("that was all")
 
-    monkeypatch.setattr(view_proposal, "propose", keep)
-    proposal_of(lawn(drawn(TRUE, 3)), SMALL, (), PITCH, replace(POLICY, goal=goal))
+    monkeypatch.setattr(view_proposal, "propose_camera", keep)
+    propose_lines_in_image(lawn(drawn(TRUE, 3)), SMALL, (), PITCH, replace(POLICY, goal=goal))
     assert tried == [sought]
 
 
@@ -110,7 +115,7 @@ DEFAULT_POLICY = CalibrationPolicy()
 
 
 def beside(drawn: Lines) -> ViewProposal:
-    return beside_drawn(FOUND, drawn, PITCH, SIZE, DEFAULT_POLICY)
+    return keep_undrawn_markings(FOUND, drawn, PITCH, SIZE, DEFAULT_POLICY)
 
 
 def only(*markings: str) -> Lines:
@@ -120,7 +125,7 @@ def only(*markings: str) -> Lines:
 def test_without_drawn_lines_all_is_proposed() -> None:
     assert beside({}) is FOUND
     nothing = replace(FOUND, outcome="nothing", lines={})
-    assert beside_drawn(nothing, SEEN, PITCH, SIZE, DEFAULT_POLICY) is nothing
+    assert keep_undrawn_markings(nothing, SEEN, PITCH, SIZE, DEFAULT_POLICY) is nothing
 
 
 def test_drawn_markings_are_not_proposed_again() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.geometry.camera import Camera
-from app.paint.evidence import read_picture, seek, trace
+from app.paint.evidence import find_paint, read_picture, trace_visible_markings
 from app.paint.grass import field_of_play
 from app.sample.film import (
     Backdrop,
@@ -64,7 +64,7 @@ class TestBackdrop:
         for camera in cameras:
             image = np.ascontiguousarray(backdrop.render_from(camera)[..., ::-1])
             reading = read_picture(image, field_of_play(image))
-            evidence = seek(reading, trace(reading, camera, Pitch()), 4.0)
+            evidence = find_paint(reading, trace_visible_markings(reading, camera, Pitch()), 4.0)
             assert len(evidence.offsets) > 60
             assert np.median(np.abs(evidence.offsets)) < 0.12
 

@@ -35,7 +35,7 @@ def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
         asked.append(now)
         return FrameProposal("nothing", "no straight line is seen on the grass")
 
-    monkeypatch.setattr(follow, "propose", nothing)
+    monkeypatch.setattr(follow, "propose_camera", nothing)
     for now in range(FRAMES):
         assert follower._another(replace(black, number=now), frame) is frame
     waits = np.diff(asked).tolist()

@@ -95,7 +95,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
             return ViewProposal("nothing", "No straight line is seen on the grass.", {})
         return ViewProposal("proposed", "", lines_of(CAMERA), 0.9, 0.8, 0.3, 0.25, 500)
 
-    monkeypatch.setattr(proposal_reading, "proposal_of", look)
+    monkeypatch.setattr(proposal_reading, "propose_lines_in_image", look)
     return seen
 
 
