@@ -222,7 +222,9 @@ def detection_summary(judged: Sequence[JudgedFrame], resamples: Resamples) -> Ta
         cell(ap, *resamples.statistic(lambda weights: mean_interpolated(hits, weights[place]))),
         cell(
             area_under_curve(once) if balls else None,
-            *resamples.statistic(lambda w: _area_of_hits(hits, w[place])),
+            *resamples.statistic(
+                lambda w: area_under_curve(precision_recall_curve(hits, 0, w[place]))
+            ),
         ),
         cell(recall, *resamples.statistic(lambda w: _highest_recall(hits, w[place]))),
     )
@@ -262,10 +264,6 @@ def _curve_series(hits: Hits, index: int, words: str) -> Series:
         count=tuple((chosen + 1).tolist()),
         frames=tuple(FrameRange("score", low=score) for score in hits.scores[chosen].tolist()),
     )
-
-
-def _area_of_hits(hits: Hits, weights: FloatArray) -> float:
-    return area_under_curve(precision_recall_curve(hits, 0, weights))
 
 
 def _highest_recall(hits: Hits, weights: FloatArray) -> float:

@@ -45,7 +45,7 @@ def measure_frame(
     hit = next((found for found in sure if truth is not None and iou(found.box, truth) > 0), None)
     distance = _distance_from_camera(frame)
     own, other = (
-        _place_errors(frame, camera, best, hit, diameter_m) for camera in _both(frame, predicted)
+        _place_errors(frame, camera, best, hit, diameter_m) for camera in (frame.camera, predicted)
     )
     return FrameResult(
         frame_id=frame.id,
@@ -88,10 +88,6 @@ def place_error(
         return None
     error = float(np.linalg.norm(place - frame.point))
     return error if np.isfinite(error) else None
-
-
-def _both(frame: Frame, predicted: Camera | None) -> tuple[Camera | None, Camera | None]:
-    return frame.camera, predicted
 
 
 def _place_errors(

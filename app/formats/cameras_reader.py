@@ -262,7 +262,10 @@ def _named_cameras(value: Any, shown: str) -> _Items | None:
     if isinstance(value, list):
         if not any(map(is_camera, map(_unwrap_camera, value))):
             return None
-        return [_name_camera(item, number) for number, item in enumerate(value)]
+        return [
+            (_image_name_of_camera(item) or f"camera {number}", item)
+            for number, item in enumerate(value)
+        ]
     if (
         not any(map(is_camera, map(_unwrap_camera, value.values())))
         and describe_document(value)[:5] == "holds"
@@ -280,10 +283,6 @@ def _unwrap_camera(value: Any) -> Any:
             if is_camera(value.get(name)):
                 return value[name]
     return value
-
-
-def _name_camera(item: Any, number: int) -> tuple[str | None, Any]:
-    return _image_name_of_camera(item) or f"camera {number}", item
 
 
 def _image_name_of_camera(value: Any) -> str | None:

@@ -159,7 +159,10 @@ def write_format(
         case "gamestate":
             return write_gamestate(root, records)
         case "coco":
-            info = {"description": options.provenance.get("dataset"), "software": _software_name()}
+            info = {
+                "description": options.provenance.get("dataset"),
+                "software": f"{SOFTWARE} {software_version()}",
+            }
             return write_coco(
                 root,
                 records,
@@ -253,7 +256,3 @@ def missing_sentence(format: str, counts: Mapping[str, int]) -> dict[str, str]: 
     """What a manifest says of frames that a format needs and that were not copied."""
     sentence = missing_for_use(format, counts)
     return {} if sentence is None else {"missing_images": sentence}
-
-
-def _software_name() -> str:
-    return f"{SOFTWARE} {software_version()}"

@@ -266,7 +266,10 @@ def _tracks_by_camera(
     One source is that of the file. Of several each must name its own camera; where they do not,
     the first is that of the file, and the others are reported.
     """
-    named = [camera_number(_path_stem(track.source), strict=True) for track in tracks]
+    named = [
+        camera_number(PurePosixPath(track.source.replace("\\", "/")).stem, strict=True)
+        for track in tracks
+    ]
     if len(tracks) > 1 and None not in named and len(set(named)) == len(named):
         yield from zip(named, tracks, strict=True)
         return
@@ -280,10 +283,6 @@ def _tracks_by_camera(
             f"is left out with {plural(balls, 'ball')} and {plural(persons, 'person')}: no name "
             "of a camera in it tells it from the first source",
         )
-
-
-def _path_stem(name: str) -> str:
-    return PurePosixPath(name.replace("\\", "/")).stem
 
 
 def _compare_sizes(

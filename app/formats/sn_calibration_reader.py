@@ -28,7 +28,7 @@ from app.formats.trees import opened_tree
 from app.plural import plural
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import HALF, ImagePoint, ImageSize
-from app.soccer.group import Group, Media, Station, View
+from app.soccer.group import Group, Station, View
 from app.soccer.pitch import WITHOUT_GEOMETRY, find_marking_like
 
 _OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
@@ -119,7 +119,8 @@ def read_line_files_of_tree(
             made = drawn if stays else size
             shown = tree.shown(name)
             lines, others = lines_from_json(document.lines, made, shown, report, drawn)
-            media = _media_of_image(tree, beside.get(where))
+            image = beside.get(where)
+            media = None if image is None else tree.media(image)
             report.imported += 1
             yield LineFile(named, made, lines, others, media, where)
 
@@ -160,10 +161,6 @@ def _images_by_stem(names: Iterable[str]) -> dict[str, str]:
         for place in places
         if place.suffix.lower() in IMAGE_SUFFIXES
     }
-
-
-def _media_of_image(tree: FileTree, image: str | None) -> Media | None:
-    return None if image is None else tree.media(image)
 
 
 def lines_from_json(

@@ -92,10 +92,6 @@ class MatchFrames:
         self._members = {name: archive.stored_name(name) for name in images}
         archive.close()
 
-    def _media_of_member(self, name: str) -> Media:
-        """Where a member of the archive is."""
-        return self._tree.media_in_zip(self._match + ARCHIVE, self._members[name])
-
     @property
     def has_frames(self) -> bool:
         """Whether there are frames at all."""
@@ -105,7 +101,7 @@ class MatchFrames:
         """Where the frame of an image name (``7_1.png``) lies, or None."""
         for folder in FOLDERS:
             if folder + image in self._members:
-                return self._media_of_member(folder + image)
+                return self._tree.media_in_zip(self._match + ARCHIVE, self._members[folder + image])
         for folder in FOLDERS:
             if folder + image in self._loose:
                 return self._tree.media(self._match + folder + image)

@@ -52,21 +52,6 @@ class ViewProposal:
     points: int = 0
 
 
-def propose_lines(
-    media: Media,
-    flipped: bool,
-    settings: Settings,
-    size: ImageSize,
-    known: Sequence[Camera],
-    pitch: Pitch,
-    policy: CalibrationPolicy,
-) -> ViewProposal:
-    """``propose_lines_in_image`` for a frame where it lies; raises what ``decode_frame`` does."""
-    return propose_lines_in_image(
-        decode_frame(media, flipped, settings), size, known, pitch, policy
-    )
-
-
 def propose_lines_in_image(
     image: Image,
     size: ImageSize,
@@ -173,8 +158,12 @@ def propose_undrawn_lines(
     policy: CalibrationPolicy,
     drawn: Lines,
 ) -> ViewProposal:
-    """``propose_lines`` beside drawn ones; raises what it does."""
-    found = propose_lines(media, flipped, settings, size, known, pitch, policy)
+    """``propose_lines_in_image`` beside drawn ones, for a frame where it lies.
+
+    Raises what ``decode_frame`` does.
+    """
+    image = decode_frame(media, flipped, settings)
+    found = propose_lines_in_image(image, size, known, pitch, policy)
     return keep_undrawn_markings(found, drawn, pitch, size, policy)
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
 from app.sample.instant import BALL_DIAMETER, FORMATION, PEOPLE, TEAM, Instant, push_people_apart
@@ -26,7 +25,6 @@ RUN, SPRINT = 6.0, 8.5
 """Metres a second."""
 
 BallMode = Literal["held", "roll", "flight"]
-Numbers = npt.NDArray[np.int64]
 
 
 def step_ball(place: FloatArray, velocity: FloatArray, seconds: float) -> BallMode:
