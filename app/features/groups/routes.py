@@ -26,7 +26,7 @@ from app.features.groups.state import GroupState
 from app.features.people.roles import role_allows
 from app.features.queue import service as queue
 from app.features.queue.schemas import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
-from app.features.queue.service import Ids
+from app.features.queue.service import MatchingGroups
 from app.finite import MAX_ID
 from app.http.access import current_login
 from app.http.cursor import foreign_cursor, paged
@@ -189,7 +189,7 @@ def list_group_ids(
     start: Annotated[
         int, Query(alias="from", ge=0, le=MAX_ID, description="Position of the first, from 0.")
     ] = 0,
-) -> Ids:
+) -> MatchingGroups:
     """The ids alone of the groups that match, in the order of the list.
 
     What `id:12,15,19` in a query takes, and what a loop over a whole dataset needs.

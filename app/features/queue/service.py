@@ -153,7 +153,7 @@ class Neighbours:
 
 
 @dataclass(frozen=True)
-class Ids:
+class MatchingGroups:
     """Ids of groups in order, out of ``total`` that match.
 
     Attributes:
@@ -221,7 +221,7 @@ def list_groups(
 
 def list_ids(
     store: Store, dataset_id: int, query: str = "", limit: int = MAX_IDS, start: int = 0
-) -> Ids:
+) -> MatchingGroups:
     """The ids alone of the groups that match, in order, from a position on.
 
     Raises:
@@ -232,7 +232,7 @@ def list_ids(
         listing = Listing(session, dataset_id, parsed.conditions)
         total = listing.count()
         ids = listing.ids_from(parsed.order, start, limit, total)
-    return Ids(tuple(ids), total)
+    return MatchingGroups(tuple(ids), total)
 
 
 def find_neighbours(store: Store, group_id: int, query: str = "") -> Neighbours:

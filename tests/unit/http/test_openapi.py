@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -73,6 +74,12 @@ class TestDocument:
             for key, one in schema.get("properties", {}).items():
                 told = f"{name}.{key}: describe it in its model or in property_words.py"
                 assert one.get("description"), told
+
+    def test_no_schema_is_called_like_a_property_of_its_own(self, document) -> None:
+        """A generated Python client names the value it reads after the schema, over that property."""
+        for name, schema in document["components"]["schemas"].items():
+            variable = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+            assert variable not in schema.get("properties", {}), f"{name}: give it another name"
 
     def test_a_value_that_is_served_has_all_its_fields_and_the_words_of_its_docstring(
         self, document
