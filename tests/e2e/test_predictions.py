@@ -139,7 +139,7 @@ class TestMarks:
         expect(objects.get_by_role("button", name="Predicted by detector")).to_have_count(0)
         page.wait_for_function(f"() => {COUNT_PREDICTED} === 0")
         screen.press("y")
-        expect(page.locator(".bars")).to_contain_text("Predictions are hidden. B shows")
+        expect(page.locator(".bars")).to_contain_text("Predictions are hidden. Press B to see")
         assert screen.document()["views"][0]["balls"] == []
 
     def test_without_a_prediction_set_nothing_is_shown(self, open_page: OpenPage) -> None:

@@ -41,6 +41,7 @@ from app.features.policies.service import read_policy
 from app.features.predictions.evaluation_run import EvaluationRequest, run_evaluation
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions
+from app.features.recordings.ball_runs import BallFollower, add_run, get_run
 from app.features.recordings.camera_tracking import Tracked, save_cameras
 from app.features.recordings.index import index_now
 from app.features.recordings.links import add_link, get_link
@@ -55,9 +56,10 @@ from app.features.webhooks.service import make_webhook, send_ping
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.main import create_app
+from app.tracking.ball_run import BallClick
+from tests.drawn_balls import place, write_film
 from tests.flights import add_flight
 from tests.tracked_frames import frame
-from tests.videos import write_video
 from tests.waiting import SECONDS
 
 EXAMPLES = 5
@@ -67,7 +69,9 @@ EXPORT, DELETED_EXPORT = "1", "2"
 """Exports are the first jobs of the home; what is deleted must not be asked for later."""
 DELETED_WEBHOOK = "2"
 DELETED_COMMENT = "2"
-DELETED_RECORDING = DELETED_LINK = "2"
+DELETED_RECORDING = DELETED_LINK = DELETED_RUN = "2"
+BALL_CLICKS = [dict(zip("xy", place(frame), strict=True)) | {"frame": frame} for frame in (5, 20)]
+"""On the ball of the recording."""
 HOOK = "http://127.0.0.1:9/hook"
 """Where webhooks may be sent, and nobody listens."""
 REFUSALS = ["2xx", "400", "404", "409", "412", "422", "428", "503"]
@@ -128,7 +132,7 @@ def application(tmp_path_factory: pytest.TempPathFactory, tree: Path) -> Iterato
         send_ping(store, "small", webhook.id, actor="local")
     for name in ("kept", "deleted"):
         make_batch(store, "small", NewBatch(name, skip_given=False), actor="local")
-    add_recordings(store)
+    add_recordings(store, services.balls)
     assert add_flight(store) == 1
     talk = begin_thread(store, 1, "Is this the ball?", actor="local")
     add_reply(store, 1, talk.id, "It is.", actor="local")
@@ -150,10 +154,10 @@ def add_evaluations(store: Store) -> None:
         assert (str(found.id), str(done.id)) == (name, name)
 
 
-def add_recordings(store: Store) -> None:
-    """One that is indexed, and one that is there to be deleted."""
-    film = write_video(store.settings.home / "film.mp4", "mp4v", 20)
-    for path in (film, film.with_name("gone.mp4")):
+def add_recordings(store: Store, follower: BallFollower) -> None:
+    """One that is indexed and whose ball is followed, and one that is there to be deleted."""
+    film = write_film(store.settings.home / "film.avi")
+    for path in (film, film.with_name("gone.avi")):
         number = add_recording(store, "small", path, actor="local").id
     assert str(number) == DELETED_RECORDING
     found = index_now(store, 1, progress=lambda *_: None, stop=lambda: None)
@@ -163,6 +167,9 @@ def add_recordings(store: Store) -> None:
     for first in (0, 1):
         number = add_link(store, (1, first, 9), (1, 10, 19), actor="local").id
     assert str(number) == DELETED_LINK
+    for click in BALL_CLICKS:
+        number = add_run(store, follower, 1, BallClick(**click), actor="local").id
+    assert str(number) == DELETED_RUN
 
 
 @pytest.fixture(scope="module")
@@ -336,6 +343,14 @@ class Attack:
             case.path_parameters["recording"] = DELETED_RECORDING
         if "link" in case.path_parameters:
             case.path_parameters["link"] = DELETED_LINK if case.method == "DELETE" else "1"
+        if "run" in case.path_parameters and case.method == "DELETE":
+            case.path_parameters["run"] = DELETED_RUN
+        if case.operation.path.endswith("/ball-runs") and case.method == "POST":
+            case.body = BALL_CLICKS[0]
+        if case.operation.path.endswith("/clicks"):
+            case.body = BALL_CLICKS[1]
+        if case.operation.path.endswith("/{run}") and case.method == "PATCH":
+            case.body = {"accepted": False}
         if "/suggestions/" in case.operation.path:
             case.path_parameters["frame"] = "3"
         if case.operation.path.endswith("/links") and case.method == "POST":
@@ -344,7 +359,7 @@ class Attack:
         if case.operation.path.endswith("/instants"):
             case.body = {"instants": [{"live": 3, "replay": 12}, {"live": 7, "replay": 18}]}
         if case.operation.path.endswith("/recordings") and case.method == "POST":
-            case.body = {"dataset": "small", "source": {"upload": self.upload("film.mp4")}}
+            case.body = {"dataset": "small", "source": {"upload": self.upload("film.avi")}}
         if case.operation.path.endswith("/tracks") and case.method == "POST":
             case.path_parameters["dataset"], case.body = "flight", {}
         if "track" in case.path_parameters and case.method == "PATCH":
@@ -374,6 +389,8 @@ class Attack:
             return read_pitches(self.store, "small").etag
         if "link" in case.path_parameters:
             return get_link(self.store, 1, 1).etag
+        if "run" in case.path_parameters:
+            return get_run(self.store, 1, 1).etag
         if "recording" in case.path_parameters:
             return get_shots(self.store, 1).etag
         if "track" in case.path_parameters:
