@@ -62,7 +62,7 @@ from app.http.idempotency import Idempotency
 from app.http.metrics import SharedNumbers, install_metrics
 from app.http.openapi import describe
 from app.http.pages import STATIC, Site, install_pages
-from app.http.request_limits import THREADS, ClassLimiters
+from app.http.request_limits import THREADS, RequestLimits
 from app.http.request_log import RequestLog
 from app.http.requests import HeadAsGet, OneLength, OneRange, refuse_unknown_parameters
 from app.http.route import Gate, Route, answer_no_route, require_permissions
@@ -160,11 +160,10 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     )
     app.state.services = services
     team = app.state.team = Team.of(settings, services.store)
-    shared = services.store.sharing.is_shared
     app.state.gate = Gate(
         None if team is None else Access(team, services.store),
         Idempotency(),
-        ClassLimiters(shared, settings.solves_apart),
+        RequestLimits(team=team is not None),
         min(MAX_JSON_BYTES, settings.max_upload_bytes),
     )
     install_handlers(app)
@@ -192,7 +191,7 @@ def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
     app.add_middleware(OneLength)
     app.add_middleware(SameOrigin, url=settings.url, required=settings.team)
     app.add_middleware(KnownHosts, allowed=allowed_hosts(settings))
-    install_metrics(app, app.state.gate.doors)
+    install_metrics(app, app.state.gate.limits)
     app.add_middleware(RequestLog)
     app.add_middleware(SecurityHeaders, policy=site.policy)
 

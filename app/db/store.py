@@ -12,7 +12,6 @@ from sqlalchemy import Engine, update
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
-from app.admission import release_admission
 from app.config import Settings
 from app.db.dialects.dialect import AGAIN, WRITE, dialect_of
 from app.db.engine import make_engine, report_storage_errors
@@ -195,7 +194,6 @@ class Store:
                 self._file.require_log()
             if lasting:
                 self.sharing.publish(session, COMMITTED)
-                release_admission()
             session.commit()
             self._refused = None
             self._save_anchor(session)

@@ -15,7 +15,6 @@ from app.http.deps import AppServices, SeesWhole
 from app.http.events import EVENTS, Listener, first_event
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import STREAMS, limit
 from app.http.requests import is_head
 from app.http.route import Route
 from app.http.services import Services
@@ -132,7 +131,6 @@ def under_way(
     responses={**responses(404), **STREAM},
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE)
-@limit(STREAMS)
 async def listen(
     request: Request,
     start: Annotated[Start, Depends()],

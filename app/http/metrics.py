@@ -23,7 +23,7 @@ from app.errors import StorageError
 from app.features.maintenance.upkeep import Home, read_home
 from app.http.events import Counts
 from app.http.pages import ELSEWHERE
-from app.http.request_limits import ClassLimiters
+from app.http.request_limits import RequestLimits
 from app.http.services import Services
 from app.worker_process import COUNTS
 
@@ -38,14 +38,14 @@ REFRESH_SECONDS = 1.0
 _NUMBER = re.compile(r"/[0-9]+(?=/|$)")
 
 
-def install_metrics(app: FastAPI, doors: ClassLimiters) -> None:
+def install_metrics(app: FastAPI, limits: RequestLimits) -> None:
     """Count requests by route, each application for itself, and watch its services.
 
     Of several web processes each counts in a file that all of them read, and whichever answers adds
     them up (``web_processes``): a number never depends on who was asked.
     """
     registry = app.state.metrics = CollectorRegistry()
-    own = ProcessCollector(app, doors)
+    own = ProcessCollector(app, limits)
     if MULTIPROCESS in os.environ:
         app.state.shared_metrics = SharedNumbers(own)
         answered = CollectorRegistry()
@@ -108,8 +108,8 @@ class DatabaseCollector(Collector):
 class ProcessCollector(Collector):
     """Reads the numbers of this process: its requests at work, its event streams, its worker processes."""
 
-    def __init__(self, app: FastAPI, doors: ClassLimiters):
-        self._app, self._doors = app, doors
+    def __init__(self, app: FastAPI, limits: RequestLimits):
+        self._app, self._limits = app, limits
 
     def describe(self) -> Iterator[Metric]:
         """Nothing beforehand: what there is is read when it is asked for."""
@@ -123,13 +123,13 @@ class ProcessCollector(Collector):
         yield from _worker_metrics()
 
     def _request_classes(self) -> Iterator[Metric]:
-        doors = self._doors.all
-        busy = {limiter.lane.name: limiter.busy for limiter in doors}
-        yield _gauges("lane_busy", "Requests at work, by kind.", "lane", busy)
-        waiting = {limiter.lane.name: limiter.waiting for limiter in doors}
-        yield _gauges("lane_waiting", "Requests that wait for their turn.", "lane", waiting)
-        refused = {door.lane.name: door.refused for door in doors}
-        yield _counter("lane_refused", "Requests refused with Retry-After.", "lane", refused)
+        limits = {one.request_class.name: one for one in self._limits.all}
+        busy = {name: one.busy for name, one in limits.items()}
+        yield _gauges("requests_busy", "Requests at work, by class.", "class", busy)
+        waiting = {name: one.waiting for name, one in limits.items()}
+        yield _gauges("requests_waiting", "Requests that wait to be admitted.", "class", waiting)
+        refused = {name: one.refused for name, one in limits.items()}
+        yield _counter("requests_refused", "Requests refused with Retry-After.", "class", refused)
 
 
 class SharedNumbers:

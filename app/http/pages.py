@@ -23,7 +23,6 @@ from starlette.types import Receive, Scope, Send
 from app.canonical import digest_of
 from app.config import own_folder
 from app.errors import StorageError
-from app.http import request_limits
 from app.http.headers import content_security_policy
 from app.http.permissions import open_to_all
 from app.http.request_limits import limit
@@ -355,7 +354,6 @@ def install_pages(
         return index
 
     @open_to_all
-    @limit(request_limits.PAGES)
     def page(request: Request) -> Response:
         index = found()
         if moment is not None:
@@ -375,7 +373,6 @@ def install_pages(
         return Response(content, media_type="text/css", headers=headers)
 
     @open_to_all
-    @limit(request_limits.PAGES)
     def elsewhere(request: Request) -> Response:
         """People who mistyped an address are told so by the page, programs by a problem."""
         if "text/html" not in request.headers.get("accept", ""):

@@ -34,7 +34,7 @@ from app.http.bodies import (
 from app.http.headers import SAFE_METHODS
 from app.http.idempotency import Idempotency, RequestDigest
 from app.http.permissions import OwnedMention, Permission, RequestSubject, find_permission
-from app.http.request_limits import ClassLimiters, request_class, wait_for_turn
+from app.http.request_limits import RequestLimits, request_class_of
 from app.soccer.actors import LOCAL_USER
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -47,13 +47,13 @@ class Gate:
     Attributes:
         access: Who asks; None on a server that somebody runs alone.
         idempotency: What was answered before.
-        doors: Who is at work, and who waits.
+        limits: Who is at work, and who waits.
         max_json_bytes: Of a body.
     """
 
     access: Access | None
     idempotency: Idempotency
-    doors: ClassLimiters
+    limits: RequestLimits
     max_json_bytes: int
 
 
@@ -75,7 +75,7 @@ class Route(APIRoute):
         if permission is None:
             raise TypeError(f"{path}: say who may ask it, with @may below the route")
         self.permission = permission
-        self.lane = request_class(endpoint, options.get("methods") or ("GET",))
+        self.request_class = request_class_of(endpoint, options.get("methods") or ("GET",))
         content = (options.get("openapi_extra") or {}).get("requestBody", {}).get("content", {})
         self._takes_bytes = BYTES in content
         super().__init__(path, endpoint, **options)
@@ -180,8 +180,7 @@ class Route(APIRoute):
     async def _answer_within_limits(
         self, gate: Gate, request: Request, handler: Handler
     ) -> Response:
-        door = gate.doors.of(self.lane, request.scope)
-        async with wait_for_turn(door, request.scope) as refusal:
+        async with gate.limits.admit(self.request_class, request.scope) as refusal:
             return refusal or await handler(request)
 
 

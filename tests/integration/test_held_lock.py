@@ -26,7 +26,7 @@ def held(touchline):
 def waiting(client: httpx.Client) -> float:
     """How many changes wait for their turn, as the server itself says."""
     found = re.search(
-        r'touchline_lane_waiting\{lane="changes"\} (\S+)', client.get("/metrics").text
+        r'touchline_requests_waiting\{class="write"\} (\S+)', client.get("/metrics").text
     )
     assert found is not None
     return float(found[1])

@@ -132,7 +132,7 @@ class TestStopping:
         with ThreadPoolExecutor() as executor, holding_the_write_lock(home):
             body = {"name": "kept", "q": "status:accepted"}
             change = executor.submit(httpx.post, address + views, json=body, timeout=SECONDS)
-            busy = 'touchline_lane_busy{lane="changes"} 1.0'
+            busy = 'touchline_requests_busy{class="write"} 1.0'
             until(lambda: busy in httpx.get(f"{address}/metrics", timeout=SECONDS).text)
             server.terminate()
             until(lambda: not is_listening(address))
@@ -184,13 +184,13 @@ class TestStopping:
 class TestIndexing:
     """A recording whose indexing is killed is indexed by whoever comes next, and never by half."""
 
-    FRAMES = 2000
+    FRAMES = 1200
 
     @pytest.fixture
     def data(self, tmp_path: Path) -> Path:
-        """A folder with a film that takes some seconds to index."""
+        """A folder with a film that takes seconds to index, also where much else is done."""
         (tmp_path / "data").mkdir()
-        small = [cv2.resize(numbered(number), (640, 384)) for number in range(200)]
+        small = [cv2.resize(numbered(number), (320, 192)) for number in range(200)]
         pictures = (small[number % 200] for number in range(self.FRAMES))
         write_pictures(tmp_path / "data" / "final.mp4", "mp4v", pictures)
         return tmp_path / "data"

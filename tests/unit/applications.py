@@ -25,7 +25,7 @@ from app.http.errors import install_handlers
 from app.http.headers import SecurityHeaders
 from app.http.idempotency import Idempotency
 from app.http.pages import Site, install_pages
-from app.http.request_limits import ClassLimiters
+from app.http.request_limits import RequestLimits
 from app.http.route import Gate
 from app.http.services import Services
 from app.main import create_app
@@ -101,7 +101,7 @@ def pages_client(plain_app: FastAPI, client_of, static_folder: Path) -> TestClie
 def plain_app() -> FastAPI:
     """An application without routes of its own, which anybody may ask."""
     app = FastAPI(docs_url=None, redoc_url=None)
-    app.state.gate = Gate(None, Idempotency(), ClassLimiters(), MAX_JSON_BYTES)
+    app.state.gate = Gate(None, Idempotency(), RequestLimits(), MAX_JSON_BYTES)
     return app
 
 

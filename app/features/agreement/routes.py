@@ -35,7 +35,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.documents import Document, ListDocument, document, no_content, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import LOOKS, QUESTIONS, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.soccer.choices import VerdictState
 
@@ -224,7 +224,7 @@ class Decision(BaseModel):
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP, with_=OwnedKind.GROUP)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 def compare(
     group: Id,
     store: AppStore,
@@ -297,7 +297,6 @@ def list_waiting(dataset: DatasetPath, store: AppStore) -> WaitingList:
     responses=responses(404),
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
     return document(CaseDocument.of(adjudicate.get_case(store, group, actor=actor)))

@@ -34,7 +34,6 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
 from app.http.documents import as_document, document, no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
-from app.http.request_limits import EDITS, LOOKS, limit
 from app.http.route import Route
 from app.http.services import Services
 from app.soccer.actors import LOCAL_USER
@@ -76,7 +75,6 @@ def _announced(services: Services, lease: Lease) -> Lease:
 
 @router.get("/work", operation_id="getMyWork", responses=responses())
 @may(Action.READ, where=Where.SOMEWHERE)
-@limit(LOOKS)
 @paged()
 def my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
@@ -181,7 +179,6 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-@limit(EDITS)
 def open_next_group(batch: Id, origin: NextGroup, services: AppServices, members: Members) -> Lease:
     """Take the next group that waits for whoever asks, and that nobody else has open.
 
@@ -198,7 +195,6 @@ def open_next_group(batch: Id, origin: NextGroup, services: AppServices, members
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-@limit(EDITS)
 def open_group(
     batch: Id, group: Id, how: LeaseRequest, services: AppServices, members: Members
 ) -> Lease:
@@ -215,7 +211,6 @@ def open_group(
     responses=responses(404),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-@limit(EDITS)
 def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
     worker = members.of_batch(services.store, batch)

@@ -17,7 +17,6 @@ from app.http.deps import Actor, AppStore, Id
 from app.http.documents import Document, ListDocument, document, no_content, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import LOOKS, limit
 from app.http.route import Route
 from app.soccer.actors import is_actor_of, person_of
 from app.soccer.frames import MAX_PIXEL
@@ -120,7 +119,6 @@ class PeopleOfGroup(Document):
 
 @router.get("/people", operation_id="listPeopleOfGroup", responses=responses(404))
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def list_people(group: Id, store: AppStore) -> PeopleOfGroup:
     """Who can be mentioned in comments on the group: everybody who sees it."""
     return PeopleOfGroup(names=comments.list_mentionable_people(store, group))
@@ -128,7 +126,6 @@ def list_people(group: Id, store: AppStore) -> PeopleOfGroup:
 
 @router.get("/threads", operation_id="listThreads", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 @paged()
 def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
     """What people say to each other about the group, the oldest thread first."""

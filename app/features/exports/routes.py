@@ -26,7 +26,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
 from app.http.documents import Document, ListDocument, document, no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import ZIPS, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.http.services import Services
 from app.http.stored_file import stored_file
@@ -313,7 +313,7 @@ async def written(export: ExportId, services: AppServices) -> str:
     responses={**responses(404, 409, 503), **ZIP},
 )
 @may(Action.READ, export=OwnedKind.EXPORT)
-@limit(ZIPS)
+@limit(TRANSFER)
 def get_content(
     export: Annotated[str, Depends(written)], services: AppServices, request: Request
 ) -> Response:

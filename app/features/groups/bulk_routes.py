@@ -29,7 +29,7 @@ from app.http.documents import Document, as_document, document, responds
 from app.http.errors import http_status
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import LARGE, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.soccer.pitch import MARKINGS
 
@@ -199,7 +199,7 @@ class BulkEditDocument(Document):
     responses=responses(404, 413, 415),
 )
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
-@limit(LARGE)
+@limit(COMPUTE)
 @responds(as_document(BulkEditDocument.of))
 def edit_many(
     dataset: DatasetPath,

@@ -27,7 +27,7 @@ from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, preview
 from app.features.groups.view_paint import PaintFollower, WithoutPictures
 from app.http.documents import Document
-from app.http.request_limits import PREVIEWS, is_large
+from app.http.request_limits import is_large
 from app.log import log_to_stderr
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -38,6 +38,8 @@ from app.worker_process import WorkerEnded, WorkerLimits
 
 Solved = TypeVar("Solved")
 
+PROCESSES = 2
+"""Of a team's server: who drags a line keeps nobody waiting who drags a ball (decision 0065)."""
 LIMITS = WorkerLimits(memory=2 * 2**30, processor=60.0, silence=120.0)
 """For one preview or large edit; the first one of a process may have to wait for kernels to be compiled."""
 NICENESS = 5
@@ -186,10 +188,9 @@ class PreviewSolver:
         self, settings: Settings, store: Store, paint: PaintFollower, large: LargeGroupSolver
     ):
         self._settings, self._store, self._paint, self._large = settings, store, paint, large
-        places = PREVIEWS.apart if settings.solves_apart else None
         self.workers = [
             ReadyWorker("previews", LIMITS, _process_ended_error, prepare_preview_process, settings)
-            for _ in range(places or 0)
+            for _ in range(PROCESSES if settings.solves_apart else 0)
         ]
 
     async def preview_document(

@@ -44,7 +44,7 @@ from app.http.documents import Document, document, responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import EDITS, LOOKS, PREVIEWS, limit
+from app.http.request_limits import READ, limit
 from app.http.route import Route
 from app.soccer.group import View, view_letter
 
@@ -204,7 +204,6 @@ def list_group_ids(
     responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def get_group(group: Id, store: AppStore, request: Request) -> Response:
     """One group, complete: annotations, solution, verdict."""
     if "if-none-match" in request.headers:
@@ -216,7 +215,6 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
 
 @router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
     state = submit.load_solved(store, group)
@@ -232,7 +230,6 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""
     return queue.find_neighbours(store, group, query)
@@ -240,7 +237,6 @@ def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.N
 
 @router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 @paged()
 def get_history(group: Id, store: AppStore) -> History:
     """Everything that was said about the group and changed of its static cameras, oldest first."""
@@ -251,7 +247,6 @@ def get_history(group: Id, store: AppStore) -> History:
 
 @router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     """What one entry of the history has changed: the views that differ, before and after."""
     return StepDocument.of(read_entry_changes(store, group, entry))
@@ -264,7 +259,7 @@ def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(PREVIEWS)
+@limit(READ)
 async def preview_group(
     group: Id, changes: PreviewRequest, services: AppServices, request: Request
 ) -> Response:
@@ -280,7 +275,6 @@ async def preview_group(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@limit(EDITS)
 @responds(group_answer)
 def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
@@ -296,7 +290,6 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@limit(EDITS)
 @responds(group_answer)
 def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""

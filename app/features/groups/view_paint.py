@@ -9,7 +9,6 @@ from time import monotonic
 
 import numpy as np
 
-from app.admission import release_admission
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import NotFoundError, ReviewError
@@ -202,7 +201,6 @@ class PaintFollower:
 
     def _read_pictures(self, tasks: list[PaintTask]) -> Iterator[tuple[str, PaintReading]]:
         """By view what was read of those whose picture could be read in time."""
-        release_admission()
         end = monotonic() + SECONDS
         try:
             started = [

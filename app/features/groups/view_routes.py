@@ -39,7 +39,7 @@ from app.http.documents import responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import EDITS, IMAGES, is_large, limit
+from app.http.request_limits import TRANSFER, is_large, limit
 from app.http.route import Route
 from app.http.services import Services
 from app.media.frames import Frames, SentPicture
@@ -75,7 +75,6 @@ FRAME: Responses = {
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@limit(EDITS)
 @responds(group_answer)
 def patch_lines(
     view: Id,
@@ -103,7 +102,6 @@ def patch_lines(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@limit(EDITS)
 @responds(group_answer)
 def patch_ball(
     view: Id,
@@ -124,7 +122,6 @@ def patch_ball(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@limit(EDITS)
 @responds(group_answer)
 def patch_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
@@ -164,7 +161,7 @@ def _submit_view_edit(
     responses={**responses(404, 413, 503), **FRAME},
 )
 @may(Action.READ, view=OwnedKind.VIEW)
-@limit(IMAGES)
+@limit(TRANSFER)
 async def get_image(
     view: Id,
     services: AppServices,
@@ -206,7 +203,7 @@ async def get_image(
     responses=responses(404, 503),
 )
 @may(Action.READ, view=OwnedKind.VIEW)
-@limit(IMAGES)
+@limit(TRANSFER)
 @paged()
 async def get_neighbours(
     view: Id, services: AppServices, request: Request

@@ -37,7 +37,7 @@ from app.http.deps import Actor, AppServices, DryRun, Sees
 from app.http.documents import no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
-from app.http.request_limits import UPLOADS, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.http.services import Services
 
@@ -155,7 +155,7 @@ BODY: dict[str, Any] = {
     },
 )
 @may(Action.LEAD, where=Where.SOMEWHERE)
-@limit(UPLOADS)
+@limit(TRANSFER)
 async def upload_file(
     request: Request,
     services: AppServices,
@@ -194,7 +194,7 @@ async def upload_file(
     responses=responses(404, 409, 413, 415, 507),
 )
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
-@limit(UPLOADS)
+@limit(TRANSFER)
 async def send_part(
     upload: UploadId, request: Request, services: AppServices, offset: PartOffset = 0
 ) -> UploadDocument:

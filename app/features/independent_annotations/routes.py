@@ -32,7 +32,6 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.documents import document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import LOOKS, limit
 from app.http.route import Route
 
 annotations_router = APIRouter(tags=["independent annotations"], route_class=Route)
@@ -86,7 +85,6 @@ def begin(group: Id, store: AppStore, actor: Actor) -> service.DisclosedAnnotati
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def get_independent_annotation(group: Id, store: AppStore) -> service.DisclosedAnnotation:
     """Whose own annotation a group is; 404 for an ordinary group."""
     return service.disclose_annotation(store, service.get_annotation_of_copy(store, group))

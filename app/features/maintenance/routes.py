@@ -117,7 +117,7 @@ def get_readiness(store: AppStore) -> Readiness:
 @may(Action.ADMINISTER)
 @limit(None)
 def get_metrics(request: Request) -> Response:
-    """Requests, lanes, event streams, processes, jobs, files and room, in Prometheus' text format."""
+    """Requests, request limits, event streams, processes, jobs, files and room, in Prometheus' text format."""
     shared: SharedNumbers | None = getattr(request.app.state, "shared_metrics", None)
     if shared is not None:
         shared.refresh()

@@ -24,7 +24,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath
 from app.http.documents import Document, ListDocument, document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import QUESTIONS, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.solving.ball_noise import Sigma
 from app.solving.line_noise import LineEstimate
@@ -237,7 +237,7 @@ def delete_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int
     "", operation_id="getNoise", response_model=NoiseDocument, responses=responses(404)
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
     """Sigma of balls, given cameras and field lines with intervals, and what the policy says.
 
@@ -249,7 +249,7 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.Noise:
 
 @noise_router.post("", operation_id="acceptNoise", **by_job(404, 412))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 @responds(job_answer)
 def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Judge by the estimates: `values` go into the policy, `factors` to the balls; the job solves.
@@ -267,7 +267,7 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
 
 @noise_router.delete("", operation_id="revertNoise", **by_job(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 @responds(job_answer)
 def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.

@@ -17,7 +17,6 @@ from app.http.deps import AppStore
 from app.http.documents import ListDocument, as_document, responds
 from app.http.permissions import Action, may
 from app.http.problem import responses
-from app.http.request_limits import LOOKS, limit
 from app.http.route import Route
 from app.http.team import AppTeam
 
@@ -44,7 +43,6 @@ class SeenNotifications(BaseModel):
 
 @router.get("", operation_id="getNotifications", responses=responses(401, 409))
 @may(Action.ACCOUNT)
-@limit(LOOKS)
 def get_notifications(
     store: AppStore,
     _team: AppTeam,

@@ -29,7 +29,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
 from app.http.documents import Document, ListDocument, document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import IMAGES, LOOKS, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.paint.view_paint import ViewPaint
 from app.paint.view_proposal import ViewProposal
@@ -221,7 +221,7 @@ def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -
     responses=responses(*REFUSALS),
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@limit(IMAGES)
+@limit(TRANSFER)
 async def read_view_paint(
     view: Id, wanted: PaintRequest, services: AppServices, request: Request
 ) -> PaintDocument | Response:
@@ -242,7 +242,7 @@ async def read_view_paint(
     responses=responses(404, 413, 415, 503),
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@limit(IMAGES)
+@limit(TRANSFER)
 async def propose_lines(
     view: Id, services: AppServices, request: Request, wanted: PaintRequest | None = None
 ) -> ProposalDocument | Response:
@@ -340,7 +340,6 @@ def forget(dataset: DatasetPath, services: AppServices) -> int:
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 @paged()
 def group_proposals(group: Id, store: AppStore) -> GroupProposals:
     """What was proposed for the views of a group, with its lines and scores."""

@@ -31,7 +31,7 @@ from app.http.deps import AppServices, AppStore, Id
 from app.http.headers import bearer_token
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
-from app.http.request_limits import LOGINS, LOOKS, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import SecretRoute
 from app.http.team import AppTeam, Team
 from app.soccer.actors import LOCAL_USER
@@ -80,7 +80,6 @@ def session_document(login: Login | None, store: Store) -> SessionDocument:
 
 @router.get("/session", operation_id="getSession", responses=responses(401, 429))
 @open_to_all
-@limit(LOOKS)
 def get_session(request: Request, services: AppServices) -> SessionDocument:
     """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
     team: Team | None = request.app.state.team
@@ -107,7 +106,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
 
 @router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
 @open_to_all
-@limit(LOGINS)
+@limit(TRANSFER)
 def log_in(
     who: NewSession, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -156,7 +155,7 @@ def _begin_session(
 
 @router.delete("/session", operation_id="deleteSession", responses=responses(409))
 @open_to_all
-@limit(LOGINS)
+@limit(TRANSFER)
 def log_out(
     request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
@@ -174,7 +173,7 @@ def log_out(
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT, to_enrol=True)
-@limit(LOGINS)
+@limit(TRANSFER)
 def change_password(
     change: PasswordEdit,
     request: Request,
@@ -236,7 +235,7 @@ def look_at_link(asked: LinkToken, request: Request, store: AppStore, team: AppT
     "/links/use", operation_id="useLink", responses=responses(401, 404, 409, 413, 415, 429)
 )
 @open_to_all
-@limit(LOGINS)
+@limit(TRANSFER)
 def use_link(
     chosen: LinkUse, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:

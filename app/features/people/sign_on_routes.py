@@ -22,7 +22,7 @@ from app.features.people.sign_on_rules import read_login_ways, unlink_identity, 
 from app.http.deps import AppStore, Id
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
-from app.http.request_limits import SIGN_ONS, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import SecretRoute
 from app.http.team import AppTeam
 
@@ -36,7 +36,7 @@ log = structlog.get_logger("touchline.access")
     responses=responses(404, 409, 413, 415, 429),
 )
 @open_to_all
-@limit(SIGN_ONS)
+@limit(TRANSFER)
 def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam) -> SignOnStarted:
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on()
@@ -55,7 +55,7 @@ def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @open_to_all
-@limit(SIGN_ONS)
+@limit(TRANSFER)
 def finish(
     body: SignOnAnswer, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnEnd:
@@ -110,7 +110,7 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
     responses=responses(401, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT)
-@limit(SIGN_ONS)
+@limit(TRANSFER)
 def begin_link(
     body: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnStarted:

@@ -24,7 +24,6 @@ from app.http.deps import Actor, AppServices, Id, Sees
 from app.http.documents import Document, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
-from app.http.request_limits import LOOKS, limit
 from app.http.route import Route
 
 LessonState = Literal["open", "mended", "right", "almost", "wrong"]
@@ -200,7 +199,6 @@ def start_recording_practice(
     responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
     """What a practice group asks, and whether it was answered rightly; 404 for other groups."""
     return read_lesson(services.settings, load(services.store, group))

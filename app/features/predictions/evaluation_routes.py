@@ -38,7 +38,7 @@ from app.http.documents import Document, ListDocument, document, no_content, res
 from app.http.headers import content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import IMAGES, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.soccer.choices import BoxKind, LiveRule
 
@@ -292,7 +292,7 @@ def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
     responses={**responses(404), **FIGURE_FILES},
 )
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
-@limit(IMAGES)
+@limit(TRANSFER)
 def get_figure(
     evaluation: Id,
     figure: FigureName,

@@ -40,7 +40,6 @@ from app.http.documents import document, no_content, responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import LOOKS, limit
 from app.http.route import Route
 
 router = APIRouter(tags=["predictions"], route_class=Route)
@@ -167,7 +166,6 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     "/views/{view}/predictions", operation_id="getViewPredictions", responses=responses(404)
 )
 @may(Action.READ, view=OwnedKind.VIEW)
-@limit(LOOKS)
 @paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     """What was predicted for a view."""
@@ -182,7 +180,6 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     "/groups/{group}/predictions", operation_id="getGroupPredictions", responses=responses(404)
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 @paged()
 def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
     """What was predicted for all views of a group, and where its accepted balls come from."""

@@ -32,7 +32,7 @@ from app.http.deps import AppServices, AppStore, DatasetPath, Id, QueryText
 from app.http.documents import Document, ListDocument
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
-from app.http.request_limits import QUESTIONS, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 
 Place = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -212,7 +212,7 @@ def get_timeline(
     "/groups/{group}/suggestions", operation_id="getSuggestions", responses=responses(404)
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 @paged()
 def get_suggestions(group: Id, store: AppStore) -> Suggestions:
     """Small edits with which a group that fails would pass, each tried out; saves nothing."""
@@ -227,7 +227,7 @@ def get_suggestions(group: Id, store: AppStore) -> Suggestions:
     "/views/{view}/influence", operation_id="getInfluence", responses=responses(404)
 )
 @may(Action.READ, view=OwnedKind.VIEW)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 @paged()
 def get_influence(view: Id, store: AppStore) -> Influences:
     """What the camera of a view would be without each of its markings; saves nothing."""

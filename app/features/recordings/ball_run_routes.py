@@ -29,7 +29,7 @@ from app.http.documents import document, no_content, responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import QUESTIONS, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 
 router = APIRouter(
@@ -70,7 +70,7 @@ def get_runs(recording: Id, store: AppStore) -> BallRunList:
     },
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 @responds(_made)
 def add_one(
     recording: Id, wanted: BallClickRequest, services: AppServices, actor: Actor
@@ -103,7 +103,7 @@ def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
     responses={**responses(404, 409, 412, 413, 415, 428, 503), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 @responds(_tagged)
 def mend_one(
     recording: Id,

@@ -33,7 +33,7 @@ from app.http.documents import document, responds
 from app.http.headers import content_disposition
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import ZIPS, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
@@ -128,7 +128,7 @@ def turn_stretch(
     responses={**responses(404, 409), **FILE},
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
-@limit(ZIPS)
+@limit(TRANSFER)
 def get_file(
     recording: Id,
     frame: Frame,

@@ -42,7 +42,7 @@ from app.http.documents import as_document, document, no_content, responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
-from app.http.request_limits import IMAGES, limit
+from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.media.images import JPEG
 
@@ -144,7 +144,7 @@ def delete_one(recording: Id, store: AppStore, actor: Actor) -> None:
     responses={**responses(404, 409, 413, 503), **FRAME},
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
-@limit(IMAGES)
+@limit(TRANSFER)
 async def get_frame(
     recording: Id,
     frame: Frame,

@@ -37,7 +37,6 @@ from app.http.documents import responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import LOOKS, limit
 from app.http.route import Route
 from app.http.services import Services
 from app.soccer.choices import CalibrationChoice
@@ -109,7 +108,6 @@ class StationDetail(BaseModel):
     },
 )
 @may(Action.READ, station=OwnedKind.STATION)
-@limit(LOOKS)
 def get_station(station: Id, store: AppStore, response: Response) -> StationDetail:
     """A station with its lines and its own ETag."""
     state = load_station(store, station)

@@ -30,7 +30,7 @@ from app.http.documents import document, responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import LOOKS, QUESTIONS, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 
 TAGGED = {"headers": {"ETag": {"description": "Of the track.", "schema": {"type": "string"}}}}
@@ -39,7 +39,7 @@ router = APIRouter(tags=["tracks"], route_class=Route)
 
 @router.get("/datasets/{dataset}/tracks", operation_id="listTracks", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 @paged()
 def list_tracks(
     dataset: DatasetPath,
@@ -99,7 +99,7 @@ def get_track(track: Id, store: AppStore, response: Response) -> TrackDocument:
     responses={**responses(404), 200: TAGGED},
 )
 @may(Action.READ, track=OwnedKind.TRACK)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 def get_track_frames(
     track: Id,
     store: AppStore,
@@ -123,7 +123,7 @@ def get_track_frames(
 
 @router.get("/tracks/{track}/around", operation_id="getTrackAround", responses=responses(404))
 @may(Action.READ, track=OwnedKind.TRACK)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 def get_track_around(
     track: Id,
     store: AppStore,
@@ -141,7 +141,6 @@ def get_track_around(
 
 @router.get("/groups/{group}/tracks", operation_id="listTracksOfGroup", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(LOOKS)
 @paged()
 def list_tracks_of_group(group: Id, store: AppStore) -> GroupTrackList:
     """The track that a group is in, and its frame there."""

@@ -26,7 +26,6 @@ from app.http.documents import Document, ListDocument, as_document, document, re
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import EDITS, limit
 from app.http.route import Route
 from app.soccer.choices import VerdictState
 from app.soccer.finding import FINDING_KINDS
@@ -165,7 +164,6 @@ class BatchList(ListDocument[BatchDocument]):
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@limit(EDITS)
 @responds(group_answer)
 def put_verdict(
     group: Id,

@@ -15,7 +15,7 @@ from app.http.deps import AppServices, DatasetPath
 from app.http.documents import Document
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
-from app.http.request_limits import QUESTIONS, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.soccer.policy import THRESHOLDS, CalibrationPolicy, Policy, Threshold, thresholds_of
 
@@ -178,7 +178,7 @@ class YieldDocument(Document):
 
 @router.get("", operation_id="getYield", response_model=YieldDocument, responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     """What the policy lets through: funnel, curves, splits, distances, leakage.
 
@@ -194,7 +194,7 @@ def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     "", operation_id="tryPolicy", response_model=YieldDocument, responses=responses(404, 413, 415)
 )
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
-@limit(QUESTIONS)
+@limit(COMPUTE)
 def try_policy(dataset: DatasetPath, values: WhatIf, services: AppServices) -> Yield:
     """What other thresholds would let through; nothing is saved and nothing solved.
 

@@ -5,7 +5,6 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from contextvars import copy_context
 from pathlib import Path
 
 import pysqlite3.dbapi2 as sqlite
@@ -13,7 +12,6 @@ import pytest
 from sqlalchemy import text
 from structlog.testing import capture_logs
 
-from app.admission import hold_admission
 from app.config import Settings
 from app.db.dialects.dialect import dialect_of
 from app.db.dialects.sqlite import AGAIN_S, PRAGMAS
@@ -219,18 +217,6 @@ class TestWrite:
         assert names(own_store) == ["afterwards"]
         with own_store.read() as session:
             assert session.execute(text("PRAGMA busy_timeout")).scalar() == 5000
-
-    def test_who_waits_for_the_disk_gives_their_place_back_before(self, own_store: Store) -> None:
-        left: list[list[str]] = []
-
-        def write(*, lasting: bool) -> None:
-            hold_admission(lambda: left.append(names(own_store)))
-            with own_store.write(lasting=lasting) as session:
-                session.execute(text(INSERT.format(f"lasting {lasting}")))
-
-        for lasting in (False, True):
-            copy_context().run(write, lasting=lasting)
-        assert left == [["lasting False"]]
 
     def test_reading_does_not_lock(self, own_store: Store) -> None:
         with own_store.read() as session:

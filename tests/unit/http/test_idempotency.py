@@ -16,14 +16,13 @@ from sqlalchemy import update
 from starlette.responses import Response
 from structlog.testing import capture_logs
 
-from app.admission import release_admission
 from app.db import idempotency
 from app.db.idempotency import StoredResponseModel, shorten_responses
 from app.errors import StorageError
 from app.features.verdicts import routes as verdicts
 from app.features.verdicts.service import set_verdict
 from app.http.idempotency import Idempotency, RequestDigest
-from app.http.request_limits import EDITS
+from app.http.request_limits import WRITE
 from app.http.server import Server, listen
 from tests.waiting import SECONDS
 
@@ -237,7 +236,6 @@ class TestRepetitionsThatWait:
 
         def slow(store: Any, group: int, *said: Any, **options: Any) -> Any:
             if group == 1:
-                release_admission()
                 assert finish.wait(SECONDS)
             return set_verdict(store, group, *said, **options)
 
@@ -251,7 +249,7 @@ class TestRepetitionsThatWait:
                     path, body = f"{API}/groups/{group}/verdict", {"state": "deferred"}
                     return asyncio.create_task(client.put(path, json=body, headers=headers))
 
-                same = [put(1, {"If-Match": etag, **KEY}) for _ in range(EDITS.width + 3)]
+                same = [put(1, {"If-Match": etag, **KEY}) for _ in range(WRITE.width + 3)]
                 await asyncio.sleep(0.1)
                 try:
                     change = await put(2, {"If-Match": other})
@@ -260,7 +258,7 @@ class TestRepetitionsThatWait:
                     finish.set()
                 return change.status_code, [(await task).status_code for task in same]
 
-        assert asyncio.run(ask()) == (200, [200] * (EDITS.width + 3))
+        assert asyncio.run(ask()) == (200, [200] * (WRITE.width + 3))
 
 
 class TestStreamed:

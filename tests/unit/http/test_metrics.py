@@ -25,7 +25,7 @@ from app.errors import DamagedError, StorageError
 from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.features.imports.ingest import ingest
 from app.http import metrics
-from app.http.request_limits import EDITS, REQUEST_CLASSES
+from app.http.request_limits import REQUEST_CLASSES, WRITE
 from app.http.services import Services
 from app.worker_pool import WorkerPool
 from app.worker_process import KINDS, WorkerEnded
@@ -85,18 +85,18 @@ def test_says_how_long_the_files_are(app: FastAPI, read) -> None:
         assert read("touchline_file_bytes", file=name) == path.stat().st_size > 0
 
 
-@pytest.mark.parametrize("lane", [lane.name for lane in REQUEST_CLASSES])
-def test_every_lane_begins_with_nobody(read, lane: str) -> None:
-    for name in ("lane_busy", "lane_waiting", "lane_refused_total"):
-        assert read(f"touchline_{name}", lane=lane) == 0
+@pytest.mark.parametrize("name", [one.name for one in REQUEST_CLASSES])
+def test_every_class_of_requests_begins_with_nobody(read, name: str) -> None:
+    for metric in ("busy", "waiting", "refused_total"):
+        assert read(f"touchline_requests_{metric}", **{"class": name}) == 0
 
 
 def test_says_who_is_at_work_who_waits_and_who_was_told_to_come_back(app: FastAPI) -> None:
-    door = SimpleNamespace(lane=EDITS, busy=1, waiting=2, refused=3)
+    limiter = SimpleNamespace(request_class=WRITE, busy=1, waiting=2, refused=3)
     registry = CollectorRegistry()
-    registry.register(metrics.ProcessCollector(app, SimpleNamespace(all=(door,))))
+    registry.register(metrics.ProcessCollector(app, SimpleNamespace(all=(limiter,))))
     for name, value in (("busy", 1), ("waiting", 2), ("refused_total", 3)):
-        assert registry.get_sample_value(f"touchline_lane_{name}", {"lane": "edits"}) == value
+        assert registry.get_sample_value(f"touchline_requests_{name}", {"class": "write"}) == value
 
 
 def test_counts_windows_that_listen(app: FastAPI, read, event_loop_of_all: BlockingPortal) -> None:
@@ -249,7 +249,7 @@ def test_a_database_that_does_not_answer_is_a_number_and_no_error(
 
     monkeypatch.setattr("app.http.metrics.read_home", fail)
     assert read("touchline_database_up") == 0
-    assert read("touchline_lane_busy", lane="reads") == 0
+    assert read("touchline_requests_busy", **{"class": "read"}) == 0
 
 
 def test_a_database_that_was_seen_to_be_damaged_is_said_while_it_answers(
@@ -316,11 +316,11 @@ class TestOperations:
             assert ours <= said, rule["alert"]
             assert rule["annotations"]["summary"] and rule["labels"]["severity"]
 
-    def test_every_lane_and_every_kind_of_children_has_a_line(self) -> None:
+    def test_every_class_of_requests_and_every_kind_of_worker_has_a_line(self) -> None:
         text = PAGE.read_text("utf-8")
         rows = {
             name
             for row in re.findall(r"^\| (`[a-z].*?) \|", text, re.M)
             for name in re.findall(r"`([a-z-]+)`", row)
         }
-        assert {*KINDS, *(lane.name for lane in REQUEST_CLASSES)} - rows == set()
+        assert {*KINDS, *(one.name for one in REQUEST_CLASSES)} - rows == set()

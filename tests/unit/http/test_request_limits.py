@@ -1,134 +1,85 @@
-"""Lanes: who gets a turn, who waits, and who is told to come back."""
+"""Request limits: who is admitted, who waits, and who is told to come back."""
 
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from time import monotonic
 from typing import Any
 
-import anyio
 import pytest
 from fastapi import FastAPI
 from starlette.responses import Response
 from starlette.types import Scope
 
-from app.admission import release_admission
-from app.http import request_limits as lanes
+from app.http import request_limits
 from app.http.access import LOGIN
-from app.http.pages import ELSEWHERE
 from app.http.request_limits import (
-    AWAY,
-    CHANGES,
-    EDITS,
-    IMAGES,
-    LARGE,
-    LOOKS,
-    PAGES,
-    PREVIEWS,
-    QUESTIONS,
-    READS,
-    REQUEST_CLASSES,
-    STREAMS,
-    UPLOADS,
-    ZIPS,
-    ClassLimiter,
-    ClassLimiters,
+    COMPUTE,
+    MOST_WAITING,
+    READ,
+    TRANSFER,
+    WRITE,
     RequestClass,
-    wait_for_turn,
+    RequestLimits,
 )
 from app.http.route import list_routes
 from app.main import PREFIX
 
+SMALL = {b"content-length": b"8192"}
+LARGE = {b"content-length": b"8193"}
 
-class TestLaneOf:
+
+class TestClassOfARoute:
     def test_stands_with_the_route(self, app: FastAPI) -> None:
-        lanes_of = {name: route.lane for name, route in list_routes(app)}
-        for lane, names in {
-            LOOKS: (
+        classes = {name: route.request_class for name, route in list_routes(app)}
+        for request_class, names in {
+            READ: (
                 "GET /groups/{group}",
-                "GET /views/{view}/predictions",
-                "GET /stations/{station}",
-                "GET /work",
-                "GET /groups/{group}/neighbours",
-            ),
-            READS: (
                 "GET /groups",
-                "GET /groups/ids",
-                "GET /datasets/{dataset}/team-work",
+                "GET /work",
                 "GET /uploads",
+                "GET /events",
+                "POST /groups/{group}/preview",
             ),
-            EDITS: (
+            WRITE: (
                 "PATCH /views/{view}/ball",
-                "PATCH /views/{view}",
                 "PUT /groups/{group}/verdict",
-                "POST /groups/{group}/undo",
                 "POST /batches/{batch}/next",
-                "PUT /batches/{batch}/groups/{group}/lease",
-            ),
-            CHANGES: (
-                "POST /groups/{group}/adoption",
-                "PATCH /stations/{station}/lines",
                 "DELETE /uploads/{upload}",
                 "POST /datasets/{dataset}/verdicts",
             ),
-            LARGE: ("POST /datasets/{dataset}/edits",),
-            PREVIEWS: ("POST /groups/{group}/preview",),
-            QUESTIONS: (
+            COMPUTE: (
+                "POST /datasets/{dataset}/edits",
                 "GET /views/{view}/influence",
                 "POST /datasets/{dataset}/yield",
                 "GET /datasets/{dataset}/noise",
             ),
-            IMAGES: (
+            TRANSFER: (
                 "GET /views/{view}/image",
                 "GET /evaluations/{evaluation}/figures/{figure}.{ending}",
-                "GET /views/{view}/neighbours",
-                "POST /views/{view}/paint",
                 "POST /views/{view}/propose",
+                "GET /exports/{export}/content",
+                "POST /uploads",
+                "POST /session",
             ),
-            ZIPS: ("GET /exports/{export}/content",),
-            UPLOADS: ("POST /uploads",),
-            STREAMS: ("GET /events",),
         }.items():
             for name in names:
                 method, path = name.split(" ")
-                assert lanes_of[f"{method} {PREFIX}{path}"] is lane, name
+                assert classes[f"{method} {PREFIX}{path}"] is request_class, name
 
-    def test_health_waits_for_nobody_and_pages_for_each_other_alone(self, app: FastAPI) -> None:
-        lanes_of = {name: route.lane for name, route in list_routes(app)}
-        free = {name for name, lane in lanes_of.items() if lane is None}
+    def test_health_and_styles_wait_for_nobody(self, app: FastAPI) -> None:
+        free = {name for name, route in list_routes(app) if route.request_class is None}
         styles = "GET /assets/{version}/all.css"
         assert free == {"GET /healthz", "GET /readyz", "GET /metrics", styles}
-        pages = {name for name in lanes_of if PREFIX not in name} - free
-        assert pages == {name for name, lane in lanes_of.items() if lane is PAGES}
-        assert {"GET /", f"GET {ELSEWHERE}"} < pages
 
-    @pytest.mark.parametrize(
-        ("usual", "large"), [(EDITS, LARGE), (PREVIEWS, LARGE), (CHANGES, CHANGES)]
-    )
-    @pytest.mark.parametrize(
-        ("headers", "is_large"),
-        [
-            ({}, False),
-            ({b"content-length": b"8192"}, False),
-            ({b"content-length": b"8193"}, True),
-            ({b"transfer-encoding": b"chunked"}, True),
-        ],
-    )
-    def test_what_draws_hundreds_of_points_keeps_nobody_waiting_who_drags_one(
-        self, usual: RequestClass, large: RequestClass, headers: Any, is_large: bool
-    ) -> None:
-        door = ClassLimiters().of(usual, {"headers": [*headers.items()]})
-        assert door is not None
-        assert door.lane == (large if is_large else usual)
-
-    def test_every_route_that_changes_something_has_one(self, app: FastAPI) -> None:
-        assert [
+    def test_whatever_changes_something_has_one_that_is_not_for_reading(self, app: FastAPI) -> None:
+        assert {
             name
             for name, route in list_routes(app)
-            if not name.startswith("GET ") and route.lane in (None, LOOKS, READS, STREAMS, ZIPS)
-        ] == []
+            if not name.startswith("GET ") and route.request_class in (None, READ)
+        } == {f"POST {PREFIX}/groups/{{group}}/preview"}
 
 
 class Work:
@@ -137,42 +88,45 @@ class Work:
     def __init__(self) -> None:
         self.begun: list[str] = []
         self.may_answer, self.may_end = asyncio.Event(), asyncio.Event()
-        self.away = False
-        """Whether they say that they wait for something else."""
 
     async def __call__(self, scope: Scope) -> Response:
         self.begun.append(scope["path"])
-        if self.away:
-            await asyncio.to_thread(release_admission)
         await self.may_answer.wait()
         return Response()
 
 
 @dataclass
 class Named:
-    """What lanes ask of whoever is logged in."""
+    """What limits ask of whoever is logged in."""
 
     name: str
 
 
 class Service:
-    """Requests that take turns, without a socket."""
+    """Requests that are limited, without a socket."""
 
-    def __init__(self) -> None:
-        self.work, self.doors = Work(), ClassLimiters()
+    def __init__(self, *, team: bool) -> None:
+        self.work, self.limits = Work(), RequestLimits(team=team)
         self.app: Callable[[Scope], Awaitable[Response]] = self.work
         self.statuses: list[int] = []
         self.bodies: list[bytes] = []
         self.tasks: list[asyncio.Task[None]] = []
 
-    def ask(self, lane: RequestClass, path: str = "/1", accept: str = "*/*", who: str = "") -> None:
-        headers = [(b"accept", accept.encode())]
-        scope = {"type": "http", "path": path, "headers": headers}
+    def ask(
+        self,
+        request_class: RequestClass,
+        path: str = "/1",
+        accept: str = "*/*",
+        who: str = "",
+        headers: dict[bytes, bytes] | None = None,
+    ) -> asyncio.Task[None]:
+        sent = {b"accept": accept.encode(), **(headers or {})}
+        scope: dict[str, Any] = {"type": "http", "path": path, "headers": [*sent.items()]}
         if who:
             scope[LOGIN] = Named(who)
 
         async def run() -> None:
-            async with wait_for_turn(self.doors.of(lane, scope), scope) as refusal:
+            async with self.limits.admit(request_class, scope) as refusal:
                 response = refusal or await self.app(scope)
             self.statuses.append(response.status_code)
             self.bodies.append(bytes(response.body))
@@ -180,206 +134,189 @@ class Service:
                 await self.work.may_end.wait()
 
         self.tasks.append(asyncio.create_task(run()))
+        return self.tasks[-1]
 
     async def settle(self) -> None:
         """Let every task go as far as it can."""
-        for _ in range(20):
+        for _ in range(30):
             await asyncio.sleep(0)
 
     async def end(self) -> None:
         self.work.may_answer.set()
         self.work.may_end.set()
-        await asyncio.gather(*self.tasks)
+        await asyncio.gather(*self.tasks, return_exceptions=True)
+
+    def counts(self, request_class: RequestClass) -> tuple[int, int, int]:
+        """How many are at work, wait, and were refused."""
+        (found,) = (one for one in self.limits.all if one.request_class is request_class)
+        return found.busy, found.waiting, found.refused
+
+    def is_quiet(self) -> bool:
+        """Whether nobody is at work or waits."""
+        return all(one.busy == one.waiting == 0 for one in self.limits.all)
 
 
-def run(test: Callable[[Service], Awaitable[None]]) -> None:
+def run(test: Callable[[Service], Awaitable[None]], *, team: bool = False) -> None:
     async def inside() -> None:
-        await test(Service())
+        service = Service(team=team)
+        await test(service)
+        await service.end()
+        assert service.is_quiet()
 
     asyncio.run(inside())
 
 
-class TestLanes:
-    def test_changes_that_wait_leave_reads_alone(self) -> None:
+class TestLimits:
+    @pytest.mark.parametrize("busy", [WRITE, COMPUTE, TRANSFER])
+    def test_a_class_whose_requests_wait_leaves_reads_alone(self, busy: RequestClass) -> None:
         async def test(service: Service) -> None:
-            for _ in range(CHANGES.width + 5):
-                service.ask(CHANGES)
-            service.ask(LOOKS, "/groups/1")
+            for _ in range(busy.width + 5):
+                service.ask(busy)
+            service.ask(READ, "/groups/1")
             await service.settle()
-            assert len(service.work.begun) == CHANGES.width + 1
-            assert service.work.begun[-1].endswith("/groups/1")
-            door = service.doors.of(CHANGES, {"headers": []})
-            assert door is not None and (door.busy, door.waiting) == (CHANGES.width, 5)
+            assert len(service.work.begun) == busy.width + 1
+            assert service.work.begun[-1] == "/groups/1"
+            assert service.counts(busy) == (busy.width, 5, 0)
             await service.end()
-            assert service.statuses == [200] * (CHANGES.width + 6)
-            assert (door.busy, door.waiting, door.refused) == (0, 0, 0)
+            assert service.statuses == [200] * (busy.width + 6)
 
         run(test)
 
-    def test_who_sends_many_requests_waits_behind_himself(self) -> None:
-        async def test(service: Service) -> None:
-            for path, who in (("/views/1", "ann"),) * 3 + (("/views/2", "bob"),):
-                service.ask(EDITS, path, who=who)
-            await service.settle()
-            await service.end()
-            assert [path[-1] for path in service.work.begun] == ["1", "1", "2", "1"]
-
-        run(test)
-
-    def test_who_waits_for_a_disk_lets_the_next_one_in_but_not_everybody(self) -> None:
-        async def test(service: Service) -> None:
-            service.work.away = True
-            for _ in range(EDITS.width + AWAY + 1):
-                service.ask(EDITS)
-            while len(service.work.begun) < EDITS.width + AWAY:
-                await asyncio.sleep(0.01)
-            # Time enough for one more, if it were let in.
-            await asyncio.sleep(0.1)
-            door = service.doors.of(EDITS, {"headers": []})
-            assert door is not None
-            # One more is at work, has asked to leave, and had to stay.
-            assert len(service.work.begun) == EDITS.width + AWAY
-            assert (door.busy, door.away, door.waiting) == (EDITS.width, AWAY, 1)
-            await service.end()
-            assert service.statuses == [200] * (EDITS.width + AWAY + 1)
-            assert (door.busy, door.away, door.waiting) == (0, 0, 0)
-
-        run(test)
-
+    @pytest.mark.parametrize("usual", [READ, WRITE])
     @pytest.mark.parametrize(
-        ("lane", "elsewhere", "people", "together"),
-        [
-            (EDITS, {"served": True}, ("ann", "ann", "ann", "ann"), EDITS.served),
-            # One person drags one thing at a time.
-            (PREVIEWS, {"apart": True}, ("ann", "ann", "bob", "eve"), PREVIEWS.apart),
-        ],
+        ("headers", "is_large"),
+        [({}, 0), (SMALL, 0), (LARGE, 1), ({b"transfer-encoding": b"chunked"}, 1)],
     )
-    def test_more_are_let_in_where_what_takes_long_is_not_done_here(
-        self, lane: RequestClass, elsewhere: Any, people: tuple[str, ...], together: int
+    def test_what_draws_hundreds_of_points_keeps_nobody_waiting_who_drags_one(
+        self, usual: RequestClass, headers: dict[bytes, bytes], is_large: int
     ) -> None:
-        async def let_in(door: ClassLimiter | None) -> int:
-            assert door is not None
-            return sum([await is_let_in(door, who) for who in people])
-
-        async def is_let_in(door: ClassLimiter, who: str) -> bool:
-            with anyio.move_on_after(0.01):
-                return await door.enter(who)
-            return False
-
-        doors = ClassLimiters(), ClassLimiters(**elsewhere)
-        assert [asyncio.run(let_in(one.of(lane, {"headers": []}))) for one in doors] == [
-            1,
-            together,
-        ]
-
-    def test_zips_that_are_not_written_yet_leave_reads_alone(self) -> None:
         async def test(service: Service) -> None:
-            for _ in range(READS.width + ZIPS.width):
-                service.ask(ZIPS)
-            service.ask(LOOKS, "/groups/1")
+            service.ask(usual, headers=headers)
             await service.settle()
-            assert service.work.begun[-1].endswith("/groups/1")
-            await service.end()
+            assert service.counts(COMPUTE) == (is_large, 0, 0)
+            assert service.counts(usual) == (1 - is_large, 0, 0)
 
         run(test)
 
     def test_one_more_than_may_wait_is_told_to_come_back(self) -> None:
         async def test(service: Service) -> None:
-            for _ in range(CHANGES.width + CHANGES.queue + 1):
-                service.ask(CHANGES)
+            for _ in range(WRITE.width + MOST_WAITING + 1):
+                service.ask(WRITE)
             await service.settle()
             assert service.statuses == [503]
-            await service.end()
-
-        run(test)
-
-    def test_who_uploads_one_too_many_is_told_so_slowly_and_keeps_nobody_waiting(self) -> None:
-        async def test(service: Service) -> None:
-            began = monotonic()
-            for _ in range(UPLOADS.width + UPLOADS.queue + 3):
-                service.ask(UPLOADS)
-            await service.settle()
-            assert service.statuses == []
-            service.ask(LOOKS, "/groups/1")
-            await service.settle()
-            assert len(service.work.begun) == UPLOADS.width + 1
-            while len(service.statuses) < 3:
-                await asyncio.sleep(0.05)
-            assert service.statuses == [503, 503, 503]
-            assert monotonic() - began >= UPLOADS.pause
-            await service.end()
-
-        run(test)
-
-    def test_nobody_waits_for_ever(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(lanes, "PATIENCE", 0.01)
-
-        async def test(service: Service) -> None:
-            for _ in "12":
-                service.ask(PREVIEWS)
-            while not service.statuses:
-                await asyncio.sleep(0.01)
-            assert service.statuses == [503]
-            await service.end()
+            assert service.counts(WRITE) == (WRITE.width, MOST_WAITING, 1)
 
         run(test)
 
     @pytest.mark.parametrize(
         ("accept", "begins"), [("text/html,*/*", b"<!doctype html>"), ("*/*", b'{"type"')]
     )
-    def test_who_waits_for_a_page_is_told_by_one(
+    def test_nobody_waits_for_ever_and_who_asked_for_a_page_is_told_by_one(
         self, monkeypatch: pytest.MonkeyPatch, accept: str, begins: bytes
     ) -> None:
-        monkeypatch.setattr(lanes, "PATIENCE", 0.01)
+        monkeypatch.setattr(request_limits, "PATIENCE", 0.01)
 
         async def test(service: Service) -> None:
-            for _ in range(PAGES.width + 1):
-                service.ask(PAGES, accept=accept)
+            for _ in range(READ.width + 1):
+                service.ask(READ, accept=accept)
             while not service.bodies:
                 await asyncio.sleep(0.01)
             assert service.statuses == [503]
             assert service.bodies[0].startswith(begins)
-            await service.end()
 
         run(test)
 
-    def test_a_turn_ends_when_the_answer_begins(self) -> None:
+    def test_it_ends_when_the_answer_begins(self) -> None:
         async def test(service: Service) -> None:
-            for _ in range(IMAGES.width):
-                service.ask(IMAGES)
+            for _ in range(TRANSFER.width):
+                service.ask(TRANSFER)
             await service.settle()
             service.work.may_answer.set()
             await service.settle()
-            service.ask(IMAGES, "/views/2/image")
+            service.ask(TRANSFER, "/views/2/image")
             await service.settle()
-            assert service.work.begun[-1].endswith("/views/2/image")
-            await service.end()
+            assert service.work.begun[-1] == "/views/2/image"
+            assert service.is_quiet()
 
         run(test)
 
-    def test_streams_begin_a_few_at_a_time_and_hold_up_nobody_while_they_last(self) -> None:
-        async def test(service: Service) -> None:
-            for _ in range(3 * STREAMS.width):
-                service.ask(STREAMS)
-            await service.settle()
-            assert len(service.work.begun) == STREAMS.width
-            service.work.may_answer.set()
-            await service.settle()
-            assert service.statuses == [200] * (3 * STREAMS.width)
-            assert [door.busy for door in service.doors.all] == [0] * len(REQUEST_CLASSES)
-            await service.end()
-
-        run(test)
-
-    def test_an_application_that_breaks_gives_its_turn_back(self) -> None:
+    def test_an_application_that_breaks_leaves_no_place_taken(self) -> None:
         async def broken(_: Scope) -> Response:
             raise KeyError
 
         async def test(service: Service) -> None:
             service.app = broken
-            service.ask(LOOKS, "/groups/1")
             with pytest.raises(KeyError):
-                await service.end()
-            assert [door.busy for door in service.doors.all] == [0] * len(REQUEST_CLASSES)
+                await service.ask(READ)
 
         run(test)
+
+
+class TestTeam:
+    def test_who_sends_a_hundred_requests_waits_for_them_alone(self) -> None:
+        async def test(service: Service) -> None:
+            for who in ("ann",) * 100 + ("bob", "eve"):
+                service.ask(WRITE, f"/{who}", who=who)
+            await service.settle()
+            assert service.work.begun == ["/ann", "/bob", "/eve"]
+
+        run(test, team=True)
+
+    def test_people_are_admitted_one_after_the_other(self) -> None:
+        async def test(service: Service) -> None:
+            step = asyncio.Semaphore(0)
+
+            async def answer(scope: Scope) -> Response:
+                service.work.begun.append(scope["path"])
+                await step.acquire()
+                return Response()
+
+            service.app = answer
+            for who in ("ann",) * 4 + ("bob", "bob", "eve", "dan", "kim"):
+                service.ask(COMPUTE, f"/{who}", who=who)
+            for _ in service.tasks:
+                await service.settle()
+                step.release()
+            await service.settle()
+            begun = service.work.begun
+            assert begun[:5] == ["/ann", "/bob", "/eve", "/dan", "/kim"]
+            assert Counter(begun) == {"/ann": 4, "/bob": 2, "/eve": 1, "/dan": 1, "/kim": 1}
+
+        run(test, team=True)
+
+    def test_strangers_together_are_one_person(self) -> None:
+        async def test(service: Service) -> None:
+            for _ in range(READ.width):
+                service.ask(READ, "/login")
+            service.ask(READ, "/groups/1", who="ann")
+            await service.settle()
+            assert service.work.begun == ["/login"] * READ.each + ["/groups/1"]
+
+        run(test, team=True)
+
+    def test_one_person_may_let_half_as_many_wait_as_all(self) -> None:
+        async def test(service: Service) -> None:
+            for _ in range(READ.each + MOST_WAITING):
+                service.ask(READ, who="ann")
+            await service.settle()
+            assert service.statuses == [503] * (MOST_WAITING // 2)
+            service.ask(READ, "/bob", who="bob")
+            await service.settle()
+            assert service.work.begun[-1] == "/bob"
+
+        run(test, team=True)
+
+    def test_who_goes_while_waiting_leaves_no_place_taken(self) -> None:
+        async def test(service: Service) -> None:
+            for who in ("ann", "bob", "eve"):
+                service.ask(WRITE, who=who)
+            at_work = len(service.tasks)
+            for who in ("ann", "dan"):
+                service.ask(WRITE, who=who)
+            await service.settle()
+            for gone in service.tasks[at_work:]:
+                gone.cancel()
+            await service.settle()
+            assert service.counts(WRITE) == (3, 0, 0)
+
+        run(test, team=True)

@@ -12,7 +12,7 @@ from app.errors import ForbiddenError, NotLoggedInError
 from app.http.bodies import MAX_STRANGERS_BYTES
 from app.http.errors import install_handlers
 from app.http.permissions import Action, OwnedKind, Where, may, open_to_all
-from app.http.request_limits import ClassLimiters
+from app.http.request_limits import RequestLimits
 from app.http.route import Gate, Route, answer_no_route, list_routes, require_permissions
 
 JSON = [(b"content-type", b"application/json")]
@@ -67,7 +67,7 @@ class Exchange:
         made = FastAPI(openapi_url=None)
         made.router.route_class, made.router.default = Route, answer_no_route
         keyless: Any = KeyLess()
-        made.state.gate = Gate(access, keyless, ClassLimiters(), most)
+        made.state.gate = Gate(access, keyless, RequestLimits(), most)
         install_handlers(made)
 
         async def read(request: Request) -> None:
