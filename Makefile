@@ -19,7 +19,7 @@ export TOUCHLINE_HOME ?= $(CURDIR)/.touchline
 unexport PYTHONDONTWRITEBYTECODE
 NPM := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm
 
-.PHONY: setup run test test-all test-python test-browser test-late test-postgresql check audit release generators readers moto bench mutate torture fuzz paper chromium postgresql clean
+.PHONY: setup run test test-all test-python test-browser test-late test-postgresql check audit release generators readers moto bench mutate torture fuzz paper chromium postgresql caddy clean
 .DEFAULT_GOAL := run
 
 setup: .venv/ready static/node_modules/.ready static/built/about.json
@@ -65,7 +65,7 @@ test: setup chromium postgresql readers moto
 
 # The same and what is slow and broad (tests/broad.txt): torture in its short form, every upgrade, wheels, generated
 # clients, a cluster, the twins on PostgreSQL, hostile requests to every operation; and late pages. For every night.
-test-all: setup chromium postgresql generators readers moto
+test-all: setup chromium postgresql caddy generators readers moto
 	@$(BIN)/python -m tests.compiled
 	@$(MAKE) --no-print-directory -j2 test-python test-browser
 	@$(MAKE) --no-print-directory test-late
@@ -150,7 +150,7 @@ bench: setup
 mutate: setup
 	$(BIN)/python -m tests.mutate
 
-torture: setup
+torture: setup caddy
 	$(BIN)/python -m tests.torture
 
 # Files of every format, damaged at random: ten minutes, or SECONDS=60.
@@ -165,6 +165,10 @@ chromium: setup
 
 postgresql: setup
 	@$(BIN)/python -m tests.install_postgresql
+
+# The proxy of a team, behind which the flood runs.
+caddy: setup
+	@$(BIN)/python -m tests.torture.proxy
 
 clean:
 	rm -rf .venv .venv-release .venv-generators .readers .moto dist static/node_modules static/built tests/generators/node_modules

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 from collections import Counter
@@ -11,7 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 from starlette.datastructures import Headers
 from starlette.responses import Response
-from starlette.types import Receive
+from starlette.types import Message, Receive
 
 from app.finite import quoted
 from app.http.problem import make_problem, problem_response
@@ -33,6 +34,9 @@ MAX_NAME = 1_000
 """Characters of a name; that of a view is a file's."""
 MAX_STRANGERS_BYTES = 64 * 1024
 """Of what is asked before anybody is known: a passkey's answer has three texts of 16 kB at most."""
+BODY_SECONDS = 20.0
+"""For each ``BODY_BYTES`` of a body, and for what is left of it: so long a client may let the server wait."""
+BODY_BYTES = 16 * 1024
 # Possessive, and the closing quote may be missing: linear on whatever comes.
 _STRINGS = re.compile(rb'"(?:[^"\\]|\\.)*+"?', re.DOTALL)
 _NO_BRACKETS = bytes(sorted(set(range(256)) - set(b"[]{}")))
@@ -53,8 +57,42 @@ class BodyError(Exception):
         """What its sender is told."""
         problem = make_problem(self.status, self.detail, hint=self.hint)
         # The rest of the body is unread: the connection cannot carry another request.
-        headers = {"Connection": "close"} if self.status == 413 else None
+        headers = {"Connection": "close"} if self.status in (408, 413) else None
         return problem_response(problem, headers)
+
+
+class TimedBody:
+    """Receives a body from a client that has to send it steadily; the time that the server takes does not count.
+
+    Args:
+        receive: Gives the next message.
+    """
+
+    def __init__(self, receive: Receive):
+        self._receive = receive
+        self._seconds, self._bytes, self._ended = BODY_SECONDS, 0, False
+
+    async def receive(self) -> Message:
+        """The next message.
+
+        Raises:
+            BodyError: It did not come in time.
+        """
+        if self._ended:
+            return await self._receive()
+        clock = asyncio.get_running_loop().time
+        began = clock()
+        try:
+            async with asyncio.timeout(self._seconds):
+                message = await self._receive()
+        except TimeoutError:
+            raise BodyError(408, "the rest of the request did not come") from None
+        self._seconds -= clock() - began
+        self._bytes += len(message.get("body", b""))
+        if self._bytes >= BODY_BYTES:
+            self._seconds, self._bytes = BODY_SECONDS, 0
+        self._ended = not message.get("more_body", False)
+        return message
 
 
 def read_json(body: bytes) -> Any:
@@ -157,17 +195,17 @@ async def read_body(headers: Headers, receive: Receive, most: int) -> bytes:
     soon as the cap is passed.
 
     Raises:
-        BodyError: It is longer, or whoever sent it has left.
+        BodyError: It is longer, does not come in time, or whoever sent it has left.
     """
     declared = headers.get("content-length", "0")
     if not declared.isascii() or not declared.isdigit():
         raise BodyError(400, "Content-Length is not a number")
     if len(declared) > 18 or int(declared) > most:
         raise _too_large_error(most)
-    body = bytearray()
+    body, timed = bytearray(), TimedBody(receive)
     more = True
     while more:
-        message = await receive()
+        message = await timed.receive()
         if message["type"] == "http.disconnect":
             raise BodyError(400, "the body was cut off")
         body += message.get("body", b"")

@@ -33,6 +33,7 @@ from app.db.idempotency import (
 )
 from app.db.store import Store
 from app.errors import BusyError, OverloadedError, StorageError
+from app.http.bodies import TimedBody
 from app.http.deps import ACTOR_HEADER
 from app.http.documents import KEYED_REQUEST, stored_form
 from app.http.problem import make_problem, problem_response
@@ -76,10 +77,11 @@ class RequestDigest:
         self.is_streamed = is_streamed
         self._request, self._value, self._has_value = request, value, has_value
         self._sum, self._ended = hashlib.sha256(), not is_streamed
+        self._body = TimedBody(request.receive)
 
     async def receive(self) -> Message:
-        """The next message of a body of bytes."""
-        message = await self._request.receive()
+        """The next message of a body of bytes; raises ``BodyError`` where it does not come in time."""
+        message = await self._body.receive()
         if message["type"] == "http.request":
             self._sum.update(message.get("body", b""))
             self._ended = self._ended or not message.get("more_body", False)

@@ -72,7 +72,6 @@ TITLES: Mapping[int, tuple[str, str]] = {
     422: ("invalid", "The request is not valid"),
     428: ("precondition-required", "If-Match is required"),
     429: ("too-many-tries", "Too many tries"),
-    431: ("head-too-long", "The head of the request is too long"),
     500: ("internal", "The server made a mistake"),
     503: ("unavailable", "The service is not ready"),
     507: ("storage", "The server cannot store it"),

@@ -94,15 +94,15 @@ class Route(APIRoute):
         gate, access, login = gate_of(request.scope), None, None
         if self.permission.action is not None and (access := gate.access) is not None:
             login = await access.log_in(request.scope)
-        body = Body()
-        if request.method not in SAFE_METHODS:
-            try:
+        try:
+            body = Body()
+            if request.method not in SAFE_METHODS:
                 body = await self._read_request_body(gate, request)
-            except BodyError as error:
-                return error.response()
-        if access is None or login is None:
-            return await self._answer_once_per_key(gate, request, body, handler)
-        return await self._answer_as_login(access, login, gate, request, body, handler)
+            if access is None or login is None:
+                return await self._answer_once_per_key(gate, request, body, handler)
+            return await self._answer_as_login(access, login, gate, request, body, handler)
+        except BodyError as error:
+            return error.response()
 
     async def _answer_as_login(
         self,

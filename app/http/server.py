@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import gc
 import os
+import resource
 import signal
 import socket
 import sys
@@ -24,10 +25,14 @@ from prometheus_client.multiprocess import mark_process_dead
 
 from app.config import Settings
 from app.errors import InputError
-from app.http.connections import Connection
 from app.http.metrics import MULTIPROCESS
 from app.solving.solve import warm_up
 
+MAX_CONNECTIONS = 1000
+SPARE_FILES = 128
+"""Descriptors that stay free for the database, frames and exports."""
+HEAD_BYTES = 64 * 1024
+"""Of the first line of a request and its headers."""
 WAITING = 256
 """Connections that may wait to be accepted."""
 ACCEPTED_AT_ONCE = 1
@@ -106,11 +111,26 @@ def settle() -> None:
     gc.set_threshold(*GC_THRESHOLDS)
 
 
+def connection_limit() -> int:
+    """How many connections fit; the process is given as many descriptors as it may have."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = MAX_CONNECTIONS + SPARE_FILES
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    if soft == resource.RLIM_INFINITY:
+        return MAX_CONNECTIONS
+    return max(8, min(MAX_CONNECTIONS, soft - SPARE_FILES))
+
+
 def make_server(app: FastAPI) -> Server:
     """What serves an application."""
     config = uvicorn.Config(
         app,
-        http=Connection,
+        # The parser that bounds a head; clients that are slow with theirs are the business of the proxy.
+        http="h11",
+        h11_max_incomplete_event_size=HEAD_BYTES,
+        limit_concurrency=connection_limit(),
         ws="none",
         # What a stranger sends must not fill the log: malformed bytes are answered, not logged.
         log_level="error",

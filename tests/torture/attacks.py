@@ -14,12 +14,12 @@ from typing import Any
 import httpx
 
 from app.features.groups.edit_codec import VIEW_POINTS
-from app.http.request_limits import UPLOADS
+from app.http.request_limits import MOST_WAITING
 from app.soccer.pitch import MARKINGS
 from tests.torture.background import Background, Busy
 from tests.torture.connection import API, Connection, read_answer, write_head
-from tests.torture.kills import Server
 from tests.torture.people import LEAD, log_in
+from tests.torture.proxy import Proxy
 from tests.torture.quiet import Place
 from tests.waiting import SECONDS
 
@@ -78,7 +78,7 @@ async def nothing(_number: int) -> tuple[int, dict[str, str]]:
     return 200, {}
 
 
-def _logged_in(server: Server, name: str) -> dict[str, str]:
+def _logged_in(server: Proxy, name: str) -> dict[str, str]:
     """What somebody's requests say of who they are."""
     own = {"Origin": server.address}
     with httpx.Client(base_url=server.address, headers=own, timeout=SECONDS) as http:
@@ -91,13 +91,13 @@ class Target:
     """A server, what there is to ask of it, and where the quiet parties are meanwhile.
 
     Args:
-        server: It runs.
+        server: Where it is reached.
         scale: How much is asked.
         home: What it serves.
         busy: What there is long work on; None: there is no such work.
     """
 
-    def __init__(self, server: Server, scale: Scale, home: Path, busy: Busy | None = None):
+    def __init__(self, server: Proxy, scale: Scale, home: Path, busy: Busy | None = None):
         self.scale, self._headers = scale, _logged_in(server, LEAD)
         self.port = port = server.port
         line = Connection(port, self._headers)
@@ -121,9 +121,8 @@ class Target:
     def attacks(self) -> list[Attack]:
         """All of them."""
         scale, read = self.scale, frozenset({200})
-        # The short form ends before anybody is told: who cannot wait is told slowly.
-        refused = frozenset({429, 503} if scale.seconds > UPLOADS.pause else ())
-        # A connection more than there is room for ends without an answer.
+        refused = frozenset({429, 503} if scale.uploads > MOST_WAITING else ())
+        # The proxy ends connections that say nothing without an answer.
         mute = frozenset({CLOSED, 408})
         return [
             Attack("slow bodies", scale.bodies, self._slow_body, mute),
@@ -131,7 +130,7 @@ class Target:
             Attack("streams", scale.streams, self._listen, frozenset({200})),
             Attack("uploads", scale.uploads, self._upload, frozenset({201}), refused),
             Attack("ranges", scale.others, self._ranges, read | {206}),
-            Attack("queries", scale.others, self._query, read | {400, 414, 422, 431}),
+            Attack("queries", scale.others, self._query, read | {400, 404, 422}),
             Attack("edits", scale.others, self._edit, read | {400, 412, 413, 422}, read),
             Attack("previews", scale.others, self._preview, frozenset({200, 400, 422})),
             *self._long_work(),

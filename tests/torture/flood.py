@@ -29,6 +29,7 @@ from tests.torture.background import Busy
 from tests.torture.counting import family
 from tests.torture.kills import Server
 from tests.torture.people import invite_all
+from tests.torture.proxy import behind_proxy
 from tests.torture.quiet import PARTIES, READY, Told
 from tests.waiting import SECONDS
 
@@ -37,11 +38,11 @@ MOST_TIMES = 3.0
 LEAST_MS = 15.0
 """A p99 below this is quiet, whatever the machine does besides."""
 UNBOUNDED = """
-from app.http import request_limits as lanes
-object.__setattr__(lanes.UPLOADS, "queue", 100_000)
-lanes.PATIENCE = 1000.0
+from app.http import request_limits
+request_limits.MOST_WAITING = 100_000
+request_limits.PATIENCE = 1000.0
 """
-"""Plants a lane in which any number may wait for any time."""
+"""Plants limits under which any number may wait for any time."""
 QUIET = "from tests.torture.quiet import main; main()"
 
 
@@ -83,7 +84,7 @@ def flood(
     plant: str = "",
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> list[str]:
-    """Flood a server over a home; what was not in order, one sentence each.
+    """Flood the server of a team, behind a proxy; what was not in order, one sentence each.
 
     Args:
         home: A home that ``kills.prepare`` has made.
@@ -100,22 +101,23 @@ def flood(
     server.start()
     try:
         server.wait()
-        target = Target(server, scale, home, busy)
-        # The first drags, and the first large one, start the processes that solve them.
-        asyncio.run(target.warm_up())
-        with _quiet(target):
-            threading.Event().wait(scale.warm_up)
-        quiet = _watched(server, target, "nobody", lambda: None)
-        tell(HEAD)
-        tell(quiet.line())
-        faults = list(quiet.faults)
-        for attack in target.attacks():
-            if only and attack.name not in only:
-                continue
-            seen = _watched(server, target, attack.name, lambda a=attack: run(a, scale))
-            faults += seen.faults + judged(seen, quiet, attack, times)
-            tell(seen.line())
-        return faults
+        with behind_proxy(server.port, home) as proxy:
+            target = Target(proxy, scale, home, busy)
+            # The first drags, and the first large one, start the processes that solve them.
+            asyncio.run(target.warm_up())
+            with _quiet(target):
+                threading.Event().wait(scale.warm_up)
+            quiet = _watched(server, target, "nobody", lambda: None)
+            tell(HEAD)
+            tell(quiet.line())
+            faults = list(quiet.faults)
+            for attack in target.attacks():
+                if only and attack.name not in only:
+                    continue
+                seen = _watched(server, target, attack.name, lambda a=attack: run(a, scale))
+                faults += seen.faults + judged(seen, quiet, attack, times)
+                tell(seen.line())
+            return faults
     finally:
         server.kill()
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from starlette.datastructures import Headers
 
+from app.http import bodies
 from app.http.bodies import (
     _STRINGS,
     MAX_CONTAINERS,
@@ -18,7 +22,9 @@ from app.http.bodies import (
     MAX_NAMES,
     MAX_VALUES,
     BodyError,
+    TimedBody,
     _without_strings,
+    read_body,
     read_json,
     require_json_type,
 )
@@ -29,6 +35,71 @@ def refusal(body: bytes) -> str:
         read_json(body)
     assert caught.value.status == 400
     return caught.value.detail
+
+
+class Sender:
+    """Sends parts of a body, each after a pause, seconds."""
+
+    def __init__(self, parts: Sequence[tuple[float, bytes]], *, ends: bool = True):
+        self._parts, self._ends = list(parts), ends
+
+    async def receive(self) -> Any:
+        if not self._parts:
+            await asyncio.Event().wait()
+        pause, part = self._parts.pop(0)
+        await asyncio.sleep(pause)
+        more = bool(self._parts) or not self._ends
+        return {"type": "http.request", "body": part, "more_body": more}
+
+
+class TestTimedBody:
+    def test_one_that_stops_is_not_waited_for(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(bodies, "BODY_SECONDS", 0.05)
+        sender = Sender([(0.0, b"[1, ")], ends=False)
+        with pytest.raises(BodyError, match="the rest of the request did not come") as caught:
+            asyncio.run(read_body(Headers(), sender.receive, 100))
+        assert caught.value.status == 408
+        assert caught.value.response().headers["connection"] == "close"
+
+    def test_one_that_comes_drop_by_drop_is_not_waited_for(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(bodies, "BODY_SECONDS", 0.1)
+        sender = Sender([(0.03, b" ")] * 100)
+        with pytest.raises(BodyError, match="did not come"):
+            asyncio.run(read_body(Headers(), sender.receive, 1000))
+
+    def test_one_that_comes_steadily_may_take_any_time(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(bodies, "BODY_SECONDS", 30.0)
+        monkeypatch.setattr(bodies, "BODY_BYTES", 10)
+
+        async def seconds_left() -> list[float]:
+            body = TimedBody(Sender([(0.01, b"0123456789"), (0.01, b"01234")] * 3).receive)
+            left = []
+            for _ in range(6):
+                await body.receive()
+                left.append(body._seconds)
+            return left
+
+        left = asyncio.run(seconds_left())
+        assert left[::2] == [30.0, 30.0, 30.0]
+        assert all(one < 30.0 for one in left[1::2])
+
+    def test_what_the_server_takes_between_two_parts_is_not_counted(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(bodies, "BODY_SECONDS", 5.0)
+
+        async def seconds_left() -> float:
+            body = TimedBody(Sender([(0.0, b"0"), (0.0, b"1")]).receive)
+            await body.receive()
+            await asyncio.sleep(0.3)
+            await body.receive()
+            return body._seconds
+
+        assert asyncio.run(seconds_left()) > 4.8
 
 
 class TestWithoutStrings:

@@ -15,7 +15,17 @@ from unittest.mock import Mock
 import pytest
 
 from app.errors import InputError
-from app.http.server import ACCEPTED_AT_ONCE, SWITCH_SECONDS, Server, listen, make_server, settle
+from app.http.server import (
+    ACCEPTED_AT_ONCE,
+    HEAD_BYTES,
+    MAX_CONNECTIONS,
+    SWITCH_SECONDS,
+    Server,
+    connection_limit,
+    listen,
+    make_server,
+    settle,
+)
 
 
 class TestListen:
@@ -61,6 +71,16 @@ def server() -> Iterator[Server]:
     interval = sys.getswitchinterval()
     yield make_server(silent)  # type: ignore[arg-type]
     sys.setswitchinterval(interval)
+
+
+class TestConnections:
+    def test_leave_descriptors_for_the_files_of_the_home(self) -> None:
+        assert 8 <= connection_limit() <= MAX_CONNECTIONS
+
+    def test_a_head_and_connections_are_bounded(self, server: Server) -> None:
+        assert server.config.h11_max_incomplete_event_size == HEAD_BYTES
+        assert server.config.limit_concurrency == connection_limit()
+        assert not server.config.proxy_headers
 
 
 class TestServer:
