@@ -1,6 +1,6 @@
-"""An S3 server for tests (moto), apart from the product's libraries, and a door before it that fails.
+"""An S3 server for tests (moto), apart from the product's libraries, and a proxy before it that fails.
 
-The door counts what goes through, and does what stores do on bad days: refuses, hangs, cuts bodies off.
+The proxy counts what goes through, and does what stores do on bad days: refuses, hangs, cuts bodies off.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _GONE = {
 
 
 @dataclass
-class ClassLimiter:
+class StoreProxy:
     """What stands before the server.
 
     Attributes:
@@ -65,8 +65,8 @@ class ClassLimiter:
 
 
 @contextmanager
-def moto_server(*more: str) -> Iterator[ClassLimiter]:
-    """A server with an empty bucket ``soccer-data``, and ``more``, behind a door."""
+def moto_server(*more: str) -> Iterator[StoreProxy]:
+    """A server with an empty bucket ``soccer-data``, and ``more``, behind a proxy."""
     if not (MOTO / "ready").is_file():
         pytest.fail("The S3 server of the tests is missing: run 'make moto'.", pytrace=False)
     port = _free_port()
@@ -79,18 +79,18 @@ def moto_server(*more: str) -> Iterator[ClassLimiter]:
     try:
         for bucket in ("soccer-data", "other-data", *more):
             _make_bucket(port, bucket)
-        with _door(port) as door:
-            yield door
+        with _proxy(port) as proxy:
+            yield proxy
     finally:
         process.kill()
         process.wait()
 
 
-def store_settings(door: ClassLimiter, **more: object) -> StoreSettings:
-    """The store ``soccer-data/frames`` behind a door, that gives up within seconds."""
+def store_settings(proxy: StoreProxy, **more: object) -> StoreSettings:
+    """The store ``soccer-data/frames`` behind a proxy, that gives up within seconds."""
     values: dict[str, object] = {
         "url": "s3://soccer-data/frames",
-        "endpoint": door.endpoint,
+        "endpoint": proxy.endpoint,
         "key": "tests",
         "secret": "of-tests",
         "exports": True,
@@ -99,9 +99,9 @@ def store_settings(door: ClassLimiter, **more: object) -> StoreSettings:
     return StoreSettings.model_validate({**values, **more})
 
 
-def stored_settings(home: Path, door: ClassLimiter, **more: object) -> Settings:
+def stored_settings(home: Path, proxy: StoreProxy, **more: object) -> Settings:
     """Settings of a home that has the store ``frames``."""
-    return Settings(home=home, stores={"frames": store_settings(door, **more)})
+    return Settings(home=home, stores={"frames": store_settings(proxy, **more)})
 
 
 def fill_store(settings: Settings, files: Path, below: str = "") -> ObjectStore:
@@ -133,15 +133,15 @@ def _make_bucket(port: int, name: str) -> None:
 
 
 @contextmanager
-def _door(behind: int) -> Iterator[ClassLimiter]:
+def _proxy(behind: int) -> Iterator[StoreProxy]:
     server = ThreadingHTTPServer(("127.0.0.1", 0), _Passing)
     server.daemon_threads = True
-    door = ClassLimiter(server.server_address[1])
-    server.door, server.behind = door, behind  # type: ignore[attr-defined]
+    proxy = StoreProxy(server.server_address[1])
+    server.proxy, server.behind = proxy, behind  # type: ignore[attr-defined]
     thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
     thread.start()
     try:
-        yield door
+        yield proxy
     finally:
         server.shutdown()
         server.server_close()
@@ -161,14 +161,14 @@ class _Passing(BaseHTTPRequestHandler):
             super().handle_one_request()
 
     def _pass(self) -> None:
-        door: ClassLimiter = self.server.door  # type: ignore[attr-defined]
+        proxy: StoreProxy = self.server.proxy  # type: ignore[attr-defined]
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-        door.asked.append(f"{self.command} {self.path}")
-        mode = door.mode
-        if self.command in ("PUT", "POST") and door.writes_fail_after >= 0:
-            door.writes_fail_after -= 1
-            mode = "denied" if door.writes_fail_after < 0 else mode
-            door.writes_fail_after = max(door.writes_fail_after, 0)
+        proxy.asked.append(f"{self.command} {self.path}")
+        mode = proxy.mode
+        if self.command in ("PUT", "POST") and proxy.writes_fail_after >= 0:
+            proxy.writes_fail_after -= 1
+            mode = "denied" if proxy.writes_fail_after < 0 else mode
+            proxy.writes_fail_after = max(proxy.writes_fail_after, 0)
         if mode in _GONE:
             self._refuse(*_GONE[mode])
         elif mode == "closed":
@@ -177,7 +177,7 @@ class _Passing(BaseHTTPRequestHandler):
         else:
             if mode == "hangs":
                 time.sleep(3)
-            self._forward(door, body, cut=mode == "cuts")
+            self._forward(proxy, body, cut=mode == "cuts")
 
     def _refuse(self, status: int, code: str) -> None:
         text = f"<Error><Code>{code}</Code><Message>secret-bucket-name</Message></Error>".encode()
@@ -187,9 +187,9 @@ class _Passing(BaseHTTPRequestHandler):
         if self.command != "HEAD":
             self.wfile.write(text)
 
-    def _forward(self, door: ClassLimiter, body: bytes, *, cut: bool) -> None:
+    def _forward(self, proxy: StoreProxy, body: bytes, *, cut: bool) -> None:
         line = http.client.HTTPConnection("127.0.0.1", self.server.behind, timeout=SECONDS)  # type: ignore[attr-defined]
-        dropped = ("host", "if-match") if door.mode == "unconditional" else ("host",)
+        dropped = ("host", "if-match") if proxy.mode == "unconditional" else ("host",)
         headers = {n: value for n, value in self.headers.items() if n.lower() not in dropped}
         line.request(
             self.command,
@@ -211,7 +211,7 @@ class _Passing(BaseHTTPRequestHandler):
             self.close_connection = True
             return
         self.wfile.write(data)
-        door.sent += len(data)
+        proxy.sent += len(data)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002
         """Nothing."""

@@ -184,10 +184,10 @@ def installed(folder: Path, caddy: str) -> Iterator[tuple[Installation, ObjectSt
     """Everything but a dataset, until the block is left."""
     secrets = make_secrets(folder / "secrets")
     ports = {name: free_port() for name in ("https", "http", "server", "scheduler")}
-    with running_cluster() as database, moto_server("touchline") as door, ExitStack() as ended:
+    with running_cluster() as database, moto_server("touchline") as proxy, ExitStack() as ended:
         # Its password is not asked here, where it is reached by its socket alone.
         (secrets / "database_url").write_text(database.create())
-        ports["store"] = door.port
+        ports["store"] = proxy.port
         services = together()["services"]
         it = Installation(folder, secrets, services, ports, ended)
         for name in ("scheduler", "worker"):
@@ -208,7 +208,7 @@ def installed(folder: Path, caddy: str) -> Iterator[tuple[Installation, ObjectSt
         it.until("the workers are healthy", lambda: it.healthy("worker"))
         it.until("the server is healthy", lambda: _server_is_healthy(ports["server"]))
         stores = json.loads(services["touchline"]["environment"]["TOUCHLINE_STORES"])
-        stores["store"] |= {"endpoint": door.endpoint, "key_file": str(secrets / "store_keys")}
+        stores["store"] |= {"endpoint": proxy.endpoint, "key_file": str(secrets / "store_keys")}
         yield it, open_store(Settings(home=folder / "filling", stores=stores), "store")
         codes = {name: it.end(name) for name in ("server", *_workers(it), "scheduler")}
         it.expect(f"all end when they are told to: {codes}", not any(codes.values()))

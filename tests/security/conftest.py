@@ -33,7 +33,7 @@ from tests.integration.conftest import picture
 from tests.provider import CLIENT, SECRET, Provider, providing
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Asker
-from tests.security.door import ClassLimiter
+from tests.security.sign_on_visitor import SignOnVisitor
 from tests.security.table import CORPUS
 from tests.security.team import Team
 from tests.videos import write_video
@@ -217,17 +217,17 @@ def team(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterat
 
 
 @pytest.fixture
-def door(team: Team, provider: Provider) -> Iterator[ClassLimiter]:
+def visitor(team: Team, provider: Provider) -> Iterator[SignOnVisitor]:
     provider.behave()
-    yield ClassLimiter(team, provider)
+    yield SignOnVisitor(team, provider)
     provider.behave()
 
 
 @pytest.fixture
-def ruled(door: ClassLimiter, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+def ruled(visitor: SignOnVisitor, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Lets the operator have said something else of whom to let in."""
 
     def rule(**other: Any) -> None:
-        monkeypatch.setattr(door.sign_on, "rules", replace(door.sign_on.rules, **other))
+        monkeypatch.setattr(visitor.sign_on, "rules", replace(visitor.sign_on.rules, **other))
 
     return rule

@@ -20,7 +20,7 @@ from app.features.people import provider as provider_answers
 from tests.provider import CLIENT, Provider, send_away, tell
 from tests.provider import SECRET as CLIENT_SECRET
 from tests.security.asking import Answer
-from tests.security.door import BEGIN, ClassLimiter, assert_refused, name_in
+from tests.security.sign_on_visitor import BEGIN, SignOnVisitor, assert_refused, name_in
 from tests.security.team import cookie_in
 
 
@@ -43,8 +43,8 @@ def public_keys(provider: Provider) -> list[bytes]:
 
 
 class TestToken:
-    def test_says_what_was_asked_or_nobody_comes_in(self, door: ClassLimiter) -> None:
-        door.join("tom")
+    def test_says_what_was_asked_or_nobody_comes_in(self, visitor: SignOnVisitor) -> None:
+        visitor.join("tom")
         now = int(time.time())
         for changed in (
             {"nonce": "another"},
@@ -63,20 +63,20 @@ class TestToken:
             {"sub": None},
             {"sub": 7},
         ):
-            door.provider.changed = changed
-            assert_refused(door.enter(), word="not confirm")
+            visitor.provider.changed = changed
+            assert_refused(visitor.enter(), word="not confirm")
 
-    def test_the_clocks_may_differ_by_a_minute(self, door: ClassLimiter) -> None:
-        door.join("clara")
+    def test_the_clocks_may_differ_by_a_minute(self, visitor: SignOnVisitor) -> None:
+        visitor.join("clara")
         now = int(time.time())
-        door.provider.changed = {"exp": now - 40, "iat": now - 300}
-        assert name_in(door.enter()) == "clara"
+        visitor.provider.changed = {"exp": now - 40, "iat": now - 300}
+        assert name_in(visitor.enter()) == "clara"
 
-    def test_is_signed_by_the_provider_and_by_nobody_else(self, door: ClassLimiter) -> None:
-        door.join("ken")
+    def test_is_signed_by_the_provider_and_by_nobody_else(self, visitor: SignOnVisitor) -> None:
+        visitor.join("ken")
         other = jwk.RSAKey.generate_key(2048, {"kid": "first"})
-        signed = door.provider.signed
-        secrets = [*public_keys(door.provider), CLIENT_SECRET.encode()]
+        signed = visitor.provider.signed
+        secrets = [*public_keys(visitor.provider), CLIENT_SECRET.encode()]
         for sign in (
             *(
                 partial(by_hand, header={"alg": alg}, secret=None)
@@ -88,38 +88,38 @@ class TestToken:
             lambda claims: signed(claims, other, jwk=other.as_dict(private=False)),
             lambda claims: "no token",
         ):
-            door.provider.sign = sign
-            assert_refused(door.enter(), word="not confirm")
+            visitor.provider.sign = sign
+            assert_refused(visitor.enter(), word="not confirm")
 
     def test_new_keys_of_the_provider_are_asked_for_but_not_by_everybodys_word(
-        self, door: ClassLimiter
+        self, visitor: SignOnVisitor
     ) -> None:
-        door.join("nina")
-        kept = door.sign_on._provider._keys
+        visitor.join("nina")
+        kept = visitor.sign_on._provider._keys
         assert kept is not None
-        door.provider.key = jwk.RSAKey.generate_key(2048, {"kid": "second"})
-        door.provider.asked.clear()
-        assert_refused(door.enter(), word="not confirm")
-        assert "/keys" not in door.provider.asked, "they were asked for within the last minute"
+        visitor.provider.key = jwk.RSAKey.generate_key(2048, {"kid": "second"})
+        visitor.provider.asked.clear()
+        assert_refused(visitor.enter(), word="not confirm")
+        assert "/keys" not in visitor.provider.asked, "they were asked for within the last minute"
         old = replace(kept, at=kept.at - timedelta(minutes=2))
-        door.sign_on._provider._keys = old
-        assert name_in(door.enter()) == "nina"
-        door.provider.behave()
-        door.sign_on._provider._keys = old
+        visitor.sign_on._provider._keys = old
+        assert name_in(visitor.enter()) == "nina"
+        visitor.provider.behave()
+        visitor.sign_on._provider._keys = old
 
 
 class TestProvider:
     """One that does not do as it should."""
 
     @pytest.fixture(autouse=True)
-    def forgetful(self, door: ClassLimiter, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forgetful(self, visitor: SignOnVisitor, monkeypatch: pytest.MonkeyPatch) -> None:
         """Nothing is remembered of it."""
-        there = door.sign_on._provider
+        there = visitor.sign_on._provider
         monkeypatch.setattr(there, "_description", None)
         monkeypatch.setattr(there, "_keys", None)
 
     def test_that_never_ends_holds_nobody_up(
-        self, door: ClassLimiter, monkeypatch: pytest.MonkeyPatch
+        self, visitor: SignOnVisitor, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(provider_answers, "SECONDS", 2.0)
         answered, heard_out = threading.Event(), []
@@ -134,13 +134,13 @@ class TestProvider:
                 handler.wfile.flush()
             heard_out.append(True)
 
-        door.provider.instead["/token"] = drip
-        refused = self.ends(door)
+        visitor.provider.instead["/token"] = drip
+        refused = self.ends(visitor)
         answered.set()
         assert_refused(refused, 409, "valid response")
         assert not heard_out
 
-    def test_that_talks_too_much_is_not_heard_out(self, door: ClassLimiter) -> None:
+    def test_that_talks_too_much_is_not_heard_out(self, visitor: SignOnVisitor) -> None:
         sent = []
 
         def talk(handler: Any) -> None:
@@ -150,40 +150,44 @@ class TestProvider:
                 handler.wfile.write(b" " * 2**16)
                 sent.append(2**16)
 
-        door.provider.instead["/token"] = talk
-        assert_refused(self.ends(door), 409, "valid response")
+        visitor.provider.instead["/token"] = talk
+        assert_refused(self.ends(visitor), 409, "valid response")
         assert sum(sent) < 10 * 2**20
 
     @pytest.mark.parametrize("path", ["/.well-known/openid-configuration", "/token", "/keys"])
-    def test_that_sends_us_elsewhere_is_not_followed(self, door: ClassLimiter, path: str) -> None:
-        door.provider.instead["/elsewhere"] = lambda handler: tell(handler, {"keys": []})
-        there = f"{door.provider.address}/elsewhere"
-        door.provider.instead[path] = lambda handler: send_away(handler, there)
-        door.provider.asked.clear()
-        assert_refused(self.ends(door), 409, "valid response")
-        assert "/elsewhere" not in door.provider.asked
+    def test_that_sends_us_elsewhere_is_not_followed(
+        self, visitor: SignOnVisitor, path: str
+    ) -> None:
+        visitor.provider.instead["/elsewhere"] = lambda handler: tell(handler, {"keys": []})
+        there = f"{visitor.provider.address}/elsewhere"
+        visitor.provider.instead[path] = lambda handler: send_away(handler, there)
+        visitor.provider.asked.clear()
+        assert_refused(self.ends(visitor), 409, "valid response")
+        assert "/elsewhere" not in visitor.provider.asked
 
     @pytest.mark.parametrize("name", ["token_endpoint", "jwks_uri", "authorization_endpoint"])
-    def test_that_names_foreign_addresses_is_refused(self, door: ClassLimiter, name: str) -> None:
+    def test_that_names_foreign_addresses_is_refused(
+        self, visitor: SignOnVisitor, name: str
+    ) -> None:
         path = "/.well-known/openid-configuration"
         for there in ("http://127.0.0.2:9/x", "https://127.0.0.1/x", "file:///etc/passwd", 7):
-            described = {**door.provider.described(), name: there}
-            door.provider.instead[path] = lambda handler, said=described: tell(handler, said)
-            assert_refused(self.ends(door), 409, "TOUCHLINE_SSO_HOSTS")
+            described = {**visitor.provider.described(), name: there}
+            visitor.provider.instead[path] = lambda handler, said=described: tell(handler, said)
+            assert_refused(self.ends(visitor), 409, "TOUCHLINE_SSO_HOSTS")
 
-    def test_that_calls_itself_otherwise_is_refused(self, door: ClassLimiter) -> None:
-        described = {**door.provider.described(), "issuer": "https://evil.example"}
+    def test_that_calls_itself_otherwise_is_refused(self, visitor: SignOnVisitor) -> None:
+        described = {**visitor.provider.described(), "issuer": "https://evil.example"}
         path = "/.well-known/openid-configuration"
-        door.provider.instead[path] = lambda handler: tell(handler, described)
-        assert_refused(self.ends(door), 409, "does not answer as the provider")
+        visitor.provider.instead[path] = lambda handler: tell(handler, described)
+        assert_refused(self.ends(visitor), 409, "does not answer as the provider")
 
     @pytest.mark.parametrize("said", [b"[1]", b"<html>", b'{"a":' * 9000, b"\xff"])
-    def test_that_talks_nonsense_is_refused(self, door: ClassLimiter, said: bytes) -> None:
-        door.provider.instead["/token"] = lambda handler: tell(handler, said)
-        assert_refused(self.ends(door), 409, "valid response")
+    def test_that_talks_nonsense_is_refused(self, visitor: SignOnVisitor, said: bytes) -> None:
+        visitor.provider.instead["/token"] = lambda handler: tell(handler, said)
+        assert_refused(self.ends(visitor), 409, "valid response")
 
-    def ends(self, door: ClassLimiter) -> Answer:
-        begun = door.team.ask("POST", BEGIN, {})
+    def ends(self, visitor: SignOnVisitor) -> Answer:
+        begun = visitor.team.ask("POST", BEGIN, {})
         if begun.status != 200:
             return begun
-        return door.finish(door.back(json.loads(begun.body)["address"]), cookie_in(begun))
+        return visitor.finish(visitor.back(json.loads(begun.body)["address"]), cookie_in(begun))

@@ -9,17 +9,17 @@ import pytest
 
 from app.config import Settings
 from app.object_store.store import SCHEME
-from tests.moto_server import ClassLimiter, fill_store, moto_server, stored_settings
+from tests.moto_server import StoreProxy, fill_store, moto_server, stored_settings
 
 
 @pytest.fixture(scope="session")
-def _server() -> Iterator[ClassLimiter]:
-    with moto_server() as door:
-        yield door
+def _server() -> Iterator[StoreProxy]:
+    with moto_server() as proxy:
+        yield proxy
 
 
 @pytest.fixture
-def door(_server: ClassLimiter) -> Iterator[ClassLimiter]:
+def proxy(_server: StoreProxy) -> Iterator[StoreProxy]:
     """The S3 server, open."""
     _server.reset()
     yield _server
@@ -27,14 +27,14 @@ def door(_server: ClassLimiter) -> Iterator[ClassLimiter]:
 
 
 @pytest.fixture
-def settings(tmp_path: Path, door: ClassLimiter) -> Settings:
+def settings(tmp_path: Path, proxy: StoreProxy) -> Settings:
     """A home of its own with the store ``frames``."""
-    return stored_settings(tmp_path / "home", door)
+    return stored_settings(tmp_path / "home", proxy)
 
 
 @pytest.fixture(scope="session")
 def filled_store(
-    _server: ClassLimiter, tree: Path, tmp_path_factory: pytest.TempPathFactory
+    _server: StoreProxy, tree: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> str:
     """Address of a dataset of four groups, whose frames are in a zip for each match."""
     settings = stored_settings(tmp_path_factory.mktemp("filling"), _server)

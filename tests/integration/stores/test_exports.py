@@ -35,13 +35,13 @@ from app.object_store.store import open_store
 from app.soccer.group import Media
 from app.worker_process import WorkerProcess
 from tests.e2e.service import serving
-from tests.moto_server import SIGNED, ClassLimiter, store_settings, stored_settings
+from tests.moto_server import SIGNED, StoreProxy, store_settings, stored_settings
 from tests.unit.features.jobs.steps import a_job
 
 
 @pytest.fixture(scope="session")
 def imported(
-    _server: ClassLimiter, filled_store: str, tmp_path_factory: pytest.TempPathFactory
+    _server: StoreProxy, filled_store: str, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Store]:
     """A database with the dataset of the store."""
     settings = stored_settings(tmp_path_factory.mktemp("imported"), _server)
@@ -56,7 +56,7 @@ def imported(
 
 class TestExports:
     def test_a_zip_appears_when_it_is_complete_with_the_frames_of_the_store(
-        self, imported: Store, door: ClassLimiter, tmp_path: Path
+        self, imported: Store, proxy: StoreProxy, tmp_path: Path
     ) -> None:
         settings = imported.settings
         out = target_path(settings, "s3://frames/out/league.zip")
@@ -75,7 +75,7 @@ class TestExports:
         assert not [*settings.exports.glob(".*")]
 
     def test_an_upload_that_breaks_off_leaves_the_earlier_export(
-        self, settings: Settings, imported: Store, door: ClassLimiter
+        self, settings: Settings, imported: Store, proxy: StoreProxy
     ) -> None:
         out = target_path(settings, "s3://frames/out/twice.zip")
         export_dataset(imported, "league", "parquet", out, everything=True)
@@ -84,30 +84,30 @@ class TestExports:
             file.write(b"half of it")
             raise RuntimeError
         assert out.store.head(out.key) == before
-        door.writes_fail_after = 0
+        proxy.writes_fail_after = 0
         with pytest.raises(StorageError, match="refuses the keys"):
             export_dataset(imported, "league", "soccernet-v3", out, everything=True, images="copy")
-        door.reset()
+        proxy.reset()
         assert out.store.head(out.key) == before
         export_dataset(imported, "league", "soccernet-v3", out, everything=True)
         assert out.store.head(out.key) != before
 
     def test_the_manifest_is_written_last_and_removed_first_when_a_folder_is_exported_again(
-        self, settings: Settings, imported: Store, door: ClassLimiter
+        self, settings: Settings, imported: Store, proxy: StoreProxy
     ) -> None:
         out = target_path(settings, "s3://frames/out/folder")
         export_dataset(imported, "league", "soccernet-v3", out, everything=True, images="copy")
-        written = [line.rsplit("/", 1)[-1] for line in door.asked if line.startswith("PUT")]
+        written = [line.rsplit("/", 1)[-1] for line in proxy.asked if line.startswith("PUT")]
         assert written[-1] == "manifest.json"
         first = {item.key for item in out.store.below(out.key)}
         export_dataset(imported, "league", "soccernet-v3", out, everything=True)
         second = {item.key for item in out.store.below(out.key)}
         assert second < first and f"{out.key}/manifest.json" in second
-        door.reset()
-        door.writes_fail_after = 1
+        proxy.reset()
+        proxy.writes_fail_after = 1
         with pytest.raises(StorageError):
             export_dataset(imported, "league", "soccernet-v3", out, everything=True)
-        door.reset()
+        proxy.reset()
         with pytest.raises(NotFoundError):
             out.store.head(f"{out.key}/manifest.json")
 
@@ -126,9 +126,9 @@ class TestExports:
         assert open_store(settings, "frames").read_whole("own.zip", 99)[0] == b"somebody's own"
 
     def test_a_store_that_is_only_read_from_takes_no_export(
-        self, imported: Store, door: ClassLimiter, tmp_path: Path
+        self, imported: Store, proxy: StoreProxy, tmp_path: Path
     ) -> None:
-        closed = stored_settings(tmp_path / "closed", door, exports=False)
+        closed = stored_settings(tmp_path / "closed", proxy, exports=False)
         with pytest.raises(InputError, match="only read from"):
             export_dataset(
                 imported,
@@ -142,7 +142,7 @@ class TestExports:
 class TestExportApart:
     """A process of its own writes into the store."""
 
-    def test_it_appears_whole(self, imported: Store, door: ClassLimiter, apart: Apart) -> None:
+    def test_it_appears_whole(self, imported: Store, proxy: StoreProxy, apart: Apart) -> None:
         to = "s3://frames/apart/league.zip"
         result = apart.export(to, JobProgress(a_job(31), threading.Event()))
         out = find_path(imported.settings, to)
@@ -150,18 +150,18 @@ class TestExportApart:
         assert len(apart.processes) == 1 and os.getpid() not in apart.processes
 
     def test_cancelled_while_it_is_packed_nothing_of_it_is_there(
-        self, imported: Store, door: ClassLimiter, apart: Apart
+        self, imported: Store, proxy: StoreProxy, apart: Apart
     ) -> None:
         to = "s3://frames/apart/cancelled.zip"
         with pytest.raises(JobCancelled):
             apart.export(to, CancelledAt("Packing the files."))
         assert apart.half_written() == []
-        assert _uploads(door) == 0
+        assert _uploads(proxy) == 0
         with pytest.raises(NotFoundError):
             find_path(imported.settings, to)
 
     def test_killed_what_it_had_gathered_is_gone_with_it(
-        self, imported: Store, door: ClassLimiter, apart: Apart
+        self, imported: Store, proxy: StoreProxy, apart: Apart
     ) -> None:
         apart.killed = True
         with pytest.raises(OverloadedError, match="the process of the export was killed"):
@@ -228,18 +228,18 @@ def apart(imported: Store, monkeypatch: pytest.MonkeyPatch) -> Apart:
     return Apart(imported, monkeypatch)
 
 
-def _uploads(door: ClassLimiter) -> int:
+def _uploads(proxy: StoreProxy) -> int:
     """How many uploads in parts are begun and neither ended nor taken back."""
-    answer = httpx.get(f"{door.endpoint}/soccer-data?uploads", headers={"Authorization": SIGNED})
+    answer = httpx.get(f"{proxy.endpoint}/soccer-data?uploads", headers={"Authorization": SIGNED})
     assert answer.status_code == 200, answer.text
     return answer.text.count("<Upload>")
 
 
 class TestServer:
     def test_a_dataset_of_a_store_is_imported_shown_and_exported_there(
-        self, door: ClassLimiter, filled_store: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+        self, proxy: StoreProxy, filled_store: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        stores = {"frames": _as_json(door), "signing": _as_json(door, delivery="signed")}
+        stores = {"frames": _as_json(proxy), "signing": _as_json(proxy, delivery="signed")}
         monkeypatch.setenv("TOUCHLINE_STORES", json.dumps(stores))
         home = tmp_path / "home"
         home.mkdir(mode=0o700)
@@ -249,8 +249,8 @@ class TestServer:
         ):
             self._imports(ask, filled_store)
             views = self._views(ask)
-            self._shows(ask, door, views)
-            self._exports(ask, door)
+            self._shows(ask, proxy, views)
+            self._exports(ask, proxy)
 
     def _imports(self, ask: httpx.Client, address: str) -> None:
         listed = ask.get("/imports/folders", params={"path": "s3://frames"}).json()
@@ -269,9 +269,9 @@ class TestServer:
         document = ask.get(f"/groups/{groups[0]['id']}").json()
         return [view["image"] for view in document["views"]]
 
-    def _shows(self, ask: httpx.Client, door: ClassLimiter, views: list[str]) -> None:
+    def _shows(self, ask: httpx.Client, proxy: StoreProxy, views: list[str]) -> None:
         root = str(ask.base_url).partition("/api/")[0]
-        door.mode = "hangs"
+        proxy.mode = "hangs"
         with ThreadPoolExecutor(4) as people:
             late = [people.submit(httpx.get, f"{root}{view}", timeout=60) for view in views]
             # Whoever asks for something else is not kept waiting for the store.
@@ -279,12 +279,12 @@ class TestServer:
         for answer in late:
             assert answer.result().status_code == 503, answer.result().text
             assert "does not answer in time" in answer.result().json()["detail"]
-        door.mode = "open"
+        proxy.mode = "open"
         for view in views:
             whole = httpx.get(f"{root}{view}", timeout=60)
             assert (whole.status_code, whole.headers["content-type"]) == (200, "image/png")
 
-    def _exports(self, ask: httpx.Client, door: ClassLimiter) -> None:
+    def _exports(self, ask: httpx.Client, proxy: StoreProxy) -> None:
         asked = {"dataset": "league", "format": "soccernet-v3", "all": True}
         for wrong, status in (
             ("s3://frames/a/folder", 400),
@@ -325,6 +325,6 @@ def finished(ask: httpx.Client, answer: httpx.Response) -> dict[str, Any]:
     return job
 
 
-def _as_json(door: ClassLimiter, **more: object) -> dict[str, object]:
-    found = store_settings(door, **more).model_dump(mode="json", exclude_none=True)
+def _as_json(proxy: StoreProxy, **more: object) -> dict[str, object]:
+    found = store_settings(proxy, **more).model_dump(mode="json", exclude_none=True)
     return {**found, "key": "tests", "secret": "of-tests"}

@@ -26,7 +26,7 @@ from app.media.object_frames import is_kept
 from app.object_store.path import find_path, split_address
 from app.object_store.store import open_store
 from app.soccer.group import Group, Media
-from tests.moto_server import ClassLimiter, fill_store, store_settings, stored_settings
+from tests.moto_server import StoreProxy, fill_store, store_settings, stored_settings
 
 
 def groups_of(settings: Settings, address: str) -> list[Group]:
@@ -48,11 +48,11 @@ class TestAddresses:
         ["s3://frames/../other", "s3://frames/a//b", "s3://frames/a\\b", "s3://frames/%2e%2e/b", "s3://frames/a\x00"],
     )  # fmt: skip
     def test_what_leads_out_of_the_store_is_refused(
-        self, settings: Settings, door: ClassLimiter, address: str
+        self, settings: Settings, proxy: StoreProxy, address: str
     ) -> None:
         with pytest.raises(InputError):
             resolve_folder(settings, address)
-        assert door.asked == []
+        assert proxy.asked == []
 
     @pytest.mark.parametrize("inside", ["../b", "a/../b", "a//b", "./a", "a\\b", "a\n", "x" * 1001])
     def test_an_address_whose_key_has_a_part_that_is_no_plain_name_is_refused(
@@ -61,17 +61,17 @@ class TestAddresses:
         with pytest.raises(InputError):
             split_address(f"s3://frames/{inside}")
 
-    def test_only_configured_stores_are_asked(self, settings: Settings, door: ClassLimiter) -> None:
+    def test_only_configured_stores_are_asked(self, settings: Settings, proxy: StoreProxy) -> None:
         with pytest.raises(NotFoundError, match='no store "other-data"'):
             resolve_folder(settings, "s3://other-data/x")
-        assert door.asked == []
+        assert proxy.asked == []
 
     def test_objects_beside_the_prefix_are_not_there(
-        self, settings: Settings, door: ClassLimiter, tmp_path: Path
+        self, settings: Settings, proxy: StoreProxy, tmp_path: Path
     ) -> None:
         beside = Settings(
             home=tmp_path / "b",
-            stores={"frames": store_settings(door, url="s3://soccer-data/framesets")},
+            stores={"frames": store_settings(proxy, url="s3://soccer-data/framesets")},
         )
         open_store(beside, "frames").put("secret.json", b"{}")
         assert not [s for s in open_store(settings, "frames").below("") if "secret" in s.key]
@@ -79,7 +79,7 @@ class TestAddresses:
             find_path(settings, "s3://frames/secret.json")
 
     def test_folders_are_listed_with_the_format_that_they_hold(
-        self, settings: Settings, filled_store: str, door: ClassLimiter
+        self, settings: Settings, filled_store: str, proxy: StoreProxy
     ) -> None:
         assert [item.path for item in list_folder(settings).items] == ["s3://frames"]
         assert f"{filled_store}" in [i.path for i in list_folder(settings, "s3://frames").items]
@@ -106,7 +106,7 @@ class TestReading:
                 )
 
     def test_a_member_is_fetched_without_its_archive(
-        self, settings: Settings, door: ClassLimiter, tmp_path: Path
+        self, settings: Settings, proxy: StoreProxy, tmp_path: Path
     ) -> None:
         frame = _noise(2**20)
         with zipfile.ZipFile(tmp_path / "big.zip", "w") as archive:
@@ -114,12 +114,12 @@ class TestReading:
                 archive.writestr(f"{number}.bin", frame + bytes([number]))
         store = open_store(settings, "frames")
         store.put("big.zip", (tmp_path / "big.zip").read_bytes())
-        door.reset()
+        proxy.reset()
         media = Media("s3://frames/big.zip", "3.bin")
         with contextlib.suppress(ReviewError):
             read_frame(media, None, False, settings)
         assert is_kept(media, settings)
-        assert len(frame) < door.sent < len(frame) + 3 * 128 * 1024
+        assert len(frame) < proxy.sent < len(frame) + 3 * 128 * 1024
         # Its list is known here; no range of another zip is taken for one of it.
         sealed = Media(find_path(settings, "s3://frames/big.zip").sealed(), "1.bin")
         with contextlib.suppress(ReviewError):
@@ -129,13 +129,13 @@ class TestReading:
             read_frame(sealed, None, False, settings)
 
     def test_a_frame_is_fetched_once_and_kept_for_its_owner_alone(
-        self, settings: Settings, filled_store: str, door: ClassLimiter
+        self, settings: Settings, filled_store: str, proxy: StoreProxy
     ) -> None:
         media = first_media(settings, filled_store)
         first = read_frame(media, None, False, settings)
-        door.reset()
+        proxy.reset()
         assert read_frame(media, None, False, settings) == first
-        assert door.asked == []
+        assert proxy.asked == []
         kept = [path for path in (settings.cache / "objects").rglob("*") if path.is_file()]
         assert [stat.S_IMODE(path.stat().st_mode) for path in kept] == [0o600]
 
@@ -211,16 +211,16 @@ class TestBadDays:
         ],
     )
     def test_a_frame_that_cannot_be_had_says_so_and_is_had_later(
-        self, settings: Settings, door: ClassLimiter, picture_object: Media, mode: str, said: str
+        self, settings: Settings, proxy: StoreProxy, picture_object: Media, mode: str, said: str
     ) -> None:
-        door.mode = mode
+        proxy.mode = mode
         with pytest.raises(StorageError) as caught:
             read_frame(picture_object, None, False, settings)
         assert said in caught.value.message
         assert "secret" not in f"{caught.value.message} {caught.value.hint}"
         assert "soccer-data" not in caught.value.message
         assert not is_kept(picture_object, settings)
-        door.mode = "open"
+        proxy.mode = "open"
         assert content_type(read_frame(picture_object, None, False, settings)) == "image/png"
 
     def test_an_object_that_was_changed_is_not_shown_in_the_place_of_the_first(
@@ -250,21 +250,21 @@ class TestBadDays:
             read_frame(picture_object, None, False, settings)
 
     def test_a_frame_that_is_damaged_on_this_disk_is_fetched_again(
-        self, settings: Settings, picture_object: Media, door: ClassLimiter
+        self, settings: Settings, picture_object: Media, proxy: StoreProxy
     ) -> None:
         first = read_frame(picture_object, None, False, settings)
         (kept,) = [path for path in (settings.cache / "objects").rglob("*") if path.is_file()]
         kept.write_bytes(kept.read_bytes()[:-100])
-        door.reset()
+        proxy.reset()
         assert read_frame(picture_object, None, False, settings) == first
-        assert len(door.asked) == 1
+        assert len(proxy.asked) == 1
 
     def test_keys_in_a_file_are_its_owners_and_read_again_when_they_change(
-        self, tmp_path: Path, door: ClassLimiter
+        self, tmp_path: Path, proxy: StoreProxy
     ) -> None:
         file = tmp_path / "keys"
         file.write_text("[default]\naws_access_key_id = one\naws_secret_access_key = s\n")
-        settings = stored_settings(tmp_path / "home", door, key=None, secret=None, key_file=file)
+        settings = stored_settings(tmp_path / "home", proxy, key=None, secret=None, key_file=file)
         with pytest.raises(StorageError, match="other users can read"):
             open_store(settings, "frames")
         file.chmod(0o600)
@@ -290,22 +290,22 @@ def picture_object(settings: Settings, tree: Path) -> Media:
 
 class TestDoctor:
     def test_says_what_a_store_can_do_and_what_it_cannot(
-        self, settings: Settings, filled_store: str, door: ClassLimiter
+        self, settings: Settings, filled_store: str, proxy: StoreProxy
     ) -> None:
         (check,) = examine_stores(settings)
         assert (check.ok, check.sentence) == (True, "lists, reads, writes")
-        door.writes_fail_after = 0
+        proxy.writes_fail_after = 0
         (check,) = examine_stores(settings)
         assert not check.ok
         assert check.sentence.endswith("(AccessDenied); it lists and reads")
-        door.mode = "expired"
+        proxy.mode = "expired"
         (check,) = examine_stores(settings)
         assert "ExpiredToken" in check.sentence
 
     def test_a_store_that_gives_out_whatever_is_there_is_told(
-        self, settings: Settings, filled_store: str, door: ClassLimiter
+        self, settings: Settings, filled_store: str, proxy: StoreProxy
     ) -> None:
-        door.mode = "unconditional"
+        proxy.mode = "unconditional"
         (check,) = examine_stores(settings)
         assert not check.ok
         assert "If-Match" in check.sentence and "soccer-data" not in check.sentence

@@ -1,4 +1,4 @@
-"""The door of single sign-on: a browser that goes to the provider, comes back, and what it is told."""
+"""Somebody who comes by single sign-on: a browser that goes to the provider, comes back, and what it is told."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BEGIN, FINISH = f"{API}/session/sign-on/begin", f"{API}/session/sign-on"
 
 
 @dataclass
-class ClassLimiter:
+class SignOnVisitor:
     """Somebody before the team's server, who comes by the provider."""
 
     team: Team
