@@ -33,9 +33,7 @@ def settings(tmp_path: Path, proxy: StoreProxy) -> Settings:
 
 
 @pytest.fixture(scope="session")
-def filled_store(
-    _server: StoreProxy, tree: Path, tmp_path_factory: pytest.TempPathFactory
-) -> str:
+def filled_store(_server: StoreProxy, tree: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     """Address of a dataset of four groups, whose frames are in a zip for each match."""
     settings = stored_settings(tmp_path_factory.mktemp("filling"), _server)
     fill_store(settings, tree, "league")
