@@ -110,6 +110,7 @@ def joined(
             against.append(Contradiction(int(knots.rows[ray]), miss, reason))
         if options.leave_out:
             px[knots.rows] = left_out(knots, fitted, run.noise, known)
+    jumps.sort(key=lambda one: one.time_s)
     contradicting = _between_views(times, jumps)
     covariance[:, :3, :3] += contradicting[:, None, None] * np.eye(3)
     mode, out = _outside(position, mode, pitch, frames, times)
@@ -131,7 +132,7 @@ def joined(
             if abs(late) > LEAST_TOLD_S
         ),
         untracked=tuple(sorted(untracked, key=lambda one: one.first)),
-        jumps=tuple(sorted(jumps, key=lambda one: one.time_s)),
+        jumps=tuple(jumps),
     )
 
 
@@ -232,12 +233,22 @@ def _jumps(
 def _between_views(times: FloatArray, jumps: Sequence[ViewJump]) -> FloatArray:
     """What jumps add to the variance of each coordinate, square metres, shape (N,).
 
-    Either side may be the one that is wrong, and in any direction: a jump is one sample of it.
+    Either side may be the one that is wrong, and in any direction: a jump is one sample of it. Of the last one
+    before a frame and the next one the one that adds more counts.
+
+    Args:
+        times: Of the frames, seconds, shape (N,).
+        jumps: By time.
     """
     most = np.zeros(len(times))
-    for jump in jumps:
-        near = jump.metres**2 * np.exp(-np.abs(times - jump.time_s) / _JUMP_S)
-        most = np.maximum(most, near)
+    if not jumps:
+        return most
+    at, metres = np.array([(jump.time_s, jump.metres) for jump in jumps]).T
+    after = np.searchsorted(at, times, "right")
+    for near in (after - 1, after):
+        there = np.clip(near, 0, len(at) - 1)
+        added = metres[there] ** 2 * np.exp(-np.abs(times - at[there]) / _JUMP_S)
+        most = np.maximum(most, added)
     return most
 
 

@@ -50,6 +50,7 @@ def bench_ball_track(data: Path = DATA, seeds: int = 3) -> None:
         clicks, given, bundled = issia(data)
         rigs = {"ISSIA's cameras": bundled}
         _print_left_out(clicks, {"given": given, "bundled": bundled})
+        _print_jumps(clicks, given, bundled)
     rows = []
     for name, cameras in rigs.items():
         for noise, missing in ((0.0, 0.0), (0.0, 0.3), (0.5, 0.3)):
@@ -367,6 +368,35 @@ def _print_left_out(clicks: Sequence[Click], rigs: Mapping[str, Mapping[str, Cam
     header = ("ISSIA, frames left out in all cameras", "clicks", "predicted", "px, median", "p95")
     header += ("interpolated", "contradicted", "CPU s")
     print_table("Does the ball's track predict what it was made without?", header, rows)
+
+
+def _print_jumps(
+    clicks: Sequence[Click], given: Mapping[str, Camera], bundled: Mapping[str, Camera]
+) -> None:
+    """The ball by cameras that contradict each other, against the same by those adjusted to all clicks."""
+    frames = np.arange(clicks[0].frame, clicks[-1].frame + 1)
+    times = frames / FPS
+    track, truth = (
+        track_ball(clicked(clicks, cameras), frames, times, pitch=Pitch())
+        for cameras in (given, bundled)
+    )
+    known = np.isfinite(track.position).all(axis=1)
+    known &= np.array([len(views) > 1 for views in truth.views])
+    known &= np.isfinite(truth.position).all(axis=1)
+    both = replace(track, covariance=track.covariance + np.where(known, 1, np.nan)[:, None, None]
+                   * truth.covariance, position=np.where(known[:, None], track.position, np.nan))  # fmt: skip
+    inside, jumps = _inside(both, truth.position), np.array([one.time_s for one in track.jumps])
+    gap = np.abs(times[:, None] - jumps).min(axis=1, initial=np.inf)
+    off = np.linalg.norm(track.position - truth.position, axis=1)
+    rows = []
+    for label, near in (("at a jump", gap < 0.03), ("within 1 s", gap < 1), ("farther", gap >= 1)):
+        some = known & near
+        rows.append(
+            [label, int(some.sum()), float(np.median(off[some])), float(inside[some].mean())]
+        )
+    metres = [jump.metres for jump in track.jumps]
+    title = f"ISSIA, given cameras: {len(metres)} jumps of {np.median(metres):.2f} m in the median"
+    print_table(title, ("frames", "of two views", "off, m, median", "inside 95 %"), rows)
 
 
 def left_out_of(
