@@ -27,8 +27,8 @@ from app.features.policies.noise import NoiseStore
 from app.features.practice.service import resume_practice
 from app.features.predictions.jobs import resume_evaluations
 from app.features.predictions.reader import PredictionReader
-from app.features.recordings.ball_runs import BallFollower
 from app.features.recordings.camera_jobs import resume_cameras
+from app.features.recordings.follow import BallFollower
 from app.features.recordings.frames import RecordingFrames
 from app.features.recordings.jobs import resume_recordings
 from app.features.solve.jobs import resume_solving, solve_leftovers

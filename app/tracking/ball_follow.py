@@ -40,8 +40,6 @@ MISSED = -2.0
 """Score of a frame in which the ball is not seen."""
 MOST_MISSED = 24
 """Frames in a row without the ball after which it is lost."""
-SOUGHT_AFTER = 6
-"""Frames in a row without the ball after which it is sought wherever a linked view says that it may be."""
 STATIC_SHARE, STATIC = 0.75, 5.0
 """A place that looked the same to this share a few frames before is clutter; what that costs."""
 LOOK_AHEAD = 8
@@ -241,11 +239,6 @@ class _Way:
         worth = self._scores > self._scores.max() - DEEPEST / 2
         centers = [*ahead[worth], *self._places[worth]]
         reaches = [*reach[worth], *np.full(int(worth.sum()), size * REACH)]
-        hint = self._hints.places.get(frame.number)
-        # A segment is long: among all that lies on it, a faint ball is no candidate.
-        if hint is not None and self._missed[0] >= SOUGHT_AFTER:
-            centers.append(np.array([hint.x, hint.y]))
-            reaches.append(2.5 * float(np.sqrt(np.linalg.eigvalsh(hint.covariance)[-1])) + size)
         both = np.array(centers), np.array(reaches)[:, None]
         low, high = (both[0] - both[1]).min(axis=0), (both[0] + both[1]).max(axis=0)
         middle = ahead[0]
@@ -297,7 +290,6 @@ class _Way:
         with np.errstate(invalid="ignore"):
             clutter = ((away > 1.5 * size) & (found.static[None] > STATIC_SHARE)).any(axis=2)
         total = self._scores[:, None] + moves + found.looks[None] - STATIC * clutter
-        total += self._hinted(frame, found.places)
         unseen = self._scores + (-np.inf if frame.number in self._clicks else MISSED)
         every = np.concatenate([total.ravel(), unseen])
         order = np.argsort(-every)[: 8 * BEAM]
@@ -325,19 +317,6 @@ class _Way:
         self._steps.append(step)
         if (place := chosen[kept][0]) >= 0:
             self._resize(found, int(place))
-
-    def _hinted(self, frame: Frame, places: FloatArray) -> FloatArray:
-        """What a predicted place says against each place, shape (C,).
-
-        It does not speak for any: where the ball is not seen something else is near, too.
-        """
-        hint = self._hints.places.get(frame.number)
-        if hint is None or not len(places):
-            return np.zeros(len(places))
-        spread = hint.covariance + np.eye(2) * (0.5 * self._diameter) ** 2
-        off = places - (hint.x, hint.y)
-        near = np.exp(-0.5 * np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off))
-        return np.asarray(np.log((0.05 + near) / 1.05))
 
     def _resize(self, found: Candidates, place: int) -> None:
         """The size follows what is seen, slowly."""

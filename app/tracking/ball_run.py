@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 
 State = Literal["followed", "uncertain"]
@@ -29,20 +28,6 @@ class BallClick:
 
 
 @dataclass(frozen=True)
-class PredictedPlace:
-    """Where something else says that the ball is: a track, or the epipolar segment of a linked view.
-
-    Attributes:
-        x, y: Pixels.
-        covariance: Pixels squared, shape (2, 2); long along a segment.
-    """
-
-    x: float
-    y: float
-    covariance: FloatArray
-
-
-@dataclass(frozen=True)
 class DetectedBall:
     """What a detector takes for the ball: pixels, and how sure it is, 0 to 1."""
 
@@ -58,7 +43,6 @@ class FollowHints:
 
     Attributes:
         cameras: They say how the background moves, and how large a ball is.
-        places: Where the ball is predicted.
         detected: Candidates of a detector; they take part with their score, as others do.
         seen: The same ball in another frame, where a person clicked it: how it looks. A click that mends is the ball
             wherever it is; None: a click is refused where nothing looks like a ball.
@@ -66,7 +50,6 @@ class FollowHints:
     """
 
     cameras: Mapping[int, Camera] = field(default_factory=dict)
-    places: Mapping[int, PredictedPlace] = field(default_factory=dict)
     detected: Mapping[int, Sequence[DetectedBall]] = field(default_factory=dict)
     seen: FollowedBall | None = None
     clicks: Sequence[BallClick] = ()

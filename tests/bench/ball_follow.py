@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,7 @@ import numpy as np
 from app.sample.order import RECORDING_SECONDS
 from app.sample.recording import write_recording
 from app.tracking.ball_follow import follow_ball
-from app.tracking.ball_hints import LinkedBall, predicted_places
-from app.tracking.ball_run import BallClick, BallRun, FollowedBall, FollowHints, PredictedPlace
+from app.tracking.ball_run import BallClick, BallRun, FollowedBall, FollowHints
 from app.video.frames import Image, RecordingReader
 from app.video.index import RecordingIndex
 from tests.bench.recording import KnownRecording, camera_of
@@ -83,13 +82,12 @@ def followed_shot(
     rows: list[dict[str, Any]],
     with_cameras: bool,
     seed: int,
-    places: Mapping[int, PredictedPlace] | None = None,
-) -> tuple[Told, list[BallRun]]:
+) -> Told:
     """What a simulated person needs for a shot whose truth is known; every click but the first mends a run."""
     dice = np.random.default_rng(seed)
     by_number = {row["frame"]: row for row in rows}
     cameras = {row["frame"]: camera_of(row) for row in rows} if with_cameras else {}
-    hints = FollowHints(cameras, places or {})
+    hints = FollowHints(cameras)
     first, last = rows[0]["frame"], rows[-1]["frame"]
     seen = {n: row for n, row in by_number.items() if row["pixel"] and not row["hidden"]}
     told = Told(frames=len(seen))
@@ -144,7 +142,7 @@ def followed_shot(
             runs[near] = runs[near].mended(run)
         told.ends += [run.before, run.after]
     judged(runs, seen, by_number, told)
-    return told, runs
+    return told
 
 
 def is_wrong(ball: FollowedBall, row: dict[str, Any] | None) -> bool:
@@ -206,19 +204,12 @@ def bench_ball_follow(seconds: float = RECORDING_SECONDS, path: Path | None = No
         for with_cameras in (True, False):
             table: list[list[object]] = []
             whole = Told()
-            live: dict[int, list[BallRun]] = {}
             for number, rows in shots_of(known):
                 frames, kind = Frames(known.path, known.index), known.truth["shots"][number]["kind"]
-                told, live[number] = followed_shot(frames, rows, with_cameras, number)
+                told = followed_shot(frames, rows, with_cameras, number)
                 table.append([number + 1, kind, *_cells(told)])
                 _add(whole, told)
             table.append(["all", "", *_cells(whole)])
-            for link in known.truth["links"] if with_cameras else ():
-                number, runs = link["replay"], live[link["live"]]
-                places = places_by_link(known, link, runs)
-                frames, rows = Frames(known.path, known.index), known.rows(number)
-                told, _ = followed_shot(frames, rows, True, number, places)
-                table.append([number + 1, "replay, by the live run", *_cells(told)])
             print_table(
                 f"The sample's film, {'with' if with_cameras else 'without'} cameras over time",
                 (
@@ -228,25 +219,6 @@ def bench_ball_follow(seconds: float = RECORDING_SECONDS, path: Path | None = No
                 ),
                 table,
             )  # fmt: skip
-
-
-def places_by_link(
-    known: KnownRecording, link: dict[str, Any], runs: list[BallRun]
-) -> dict[int, PredictedPlace]:
-    """Where what was followed in a live shot puts the ball in frames of its replay."""
-    fps = known.truth["fps"]
-    cameras = {row["frame"]: camera_of(row) for row in known.rows(link["live"])}
-    balls = [ball for run in runs for ball in run.balls if ball.state == "followed"]
-    ball = LinkedBall.of(
-        [one.frame / fps for one in balls],
-        [(one.x, one.y) for one in balls],
-        [cameras[one.frame] for one in balls],
-    )
-    frames = {
-        row["frame"]: (link["offset_s"] + link["speed"] * row["frame"] / fps, camera_of(row))
-        for row in known.rows(link["replay"])
-    }
-    return predicted_places(ball, frames, 0.5 / fps)
 
 
 def _cells(told: Told) -> list[object]:

@@ -35,7 +35,7 @@ PLAIN_WORDS = """
     drawing durable editor empty endings engine enrol ephemeral equations errors estimates estimator
     evaluate event events executors export exports facets facts faults fields figure figures files
     film filter finder finite first fit fixture folders follow form format formats frozen gestures
-    give glossary gold grass grid guess guide guideline guidelines header headers heat help hints
+    give glossary gold grass grid guess guide guideline guidelines header headers heat help
     histograms history hit home hooks idempotency identity if image images import imports index
     indexing info init insert insight invitation invitations invite items jaccard join json kept
     kernels key keys known konva last latest lazy lease leases least legend lens lesson lessons

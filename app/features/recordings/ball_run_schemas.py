@@ -7,7 +7,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool
 
-from app.features.recordings.ball_runs import EACH_WAY, RunChange, StoredRun
+from app.features.recordings.ball_runs import RunChange, StoredRun
+from app.features.recordings.follow import EACH_WAY
 from app.features.recordings.schemas import Frame
 from app.http.documents import Document, ListDocument
 from app.tracking.ball_run import BallClick, End

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from app.canonical import canonical
-from app.config import Settings
 from app.db.idempotency import without_response
 from app.db.session import Session
 from app.db.store import Store
-from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
+from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.audit_events import add_audit_event
 from app.features.groups.bulk_edits import ViewEdits, edit_views
 from app.features.groups.edit import Edit, SetBalls
@@ -23,8 +20,7 @@ from app.features.groups.state import read_etags, require_etag
 from app.features.groups.view_paint import PaintFollower
 from app.features.recordings.ball_run_values import StoredRun as StoredRun
 from app.features.recordings.ball_run_values import run_columns, run_of_row
-from app.features.recordings.follow_hints import follow_hints
-from app.features.recordings.index import read_index
+from app.features.recordings.follow import EACH_WAY, BallFollower, follow_hints
 from app.features.recordings.queries import (
     delete_run,
     find_run,
@@ -35,22 +31,10 @@ from app.features.recordings.queries import (
 )
 from app.features.recordings.service import Recording, get_recording, need_recording
 from app.features.recordings.shots import get_shots
-from app.media.frames import refused_picture
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
-from app.tracking.ball_follow import follow_ball
-from app.tracking.ball_run import BallClick, BallRun, FollowedBall, FollowHints
-from app.video.frames import Image, RecordingReader
-from app.worker_pool import WorkerPool
-from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
+from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 
-LIMITS = WorkerLimits(memory=1536 * 2**20, processor=120.0, silence=120.0)
-"""For one click."""
-WAITING = 16
-EACH_WAY = 250
-"""Frames that a click is followed to either side: ten seconds."""
-KEPT_BYTES, BEHIND = 160 * 2**20, 16
-"""Of decoded frames; and how many are decoded together where it goes backwards."""
 _BATCH = 100
 
 
@@ -65,79 +49,6 @@ class RunChange:
 
     accepted: bool | None = None
     confirmed: tuple[int, ...] | None = None
-
-
-class BallFollower:
-    """Follows balls in a worker process, which decodes."""
-
-    def __init__(self, settings: Settings):
-        self._settings = settings
-        self._pool = WorkerPool(LIMITS, 1, WAITING, "balls", COUNTS["recordings"])
-
-    def follow(
-        self, recording: Recording, click: BallClick, bounds: tuple[int, int], hints: FollowHints
-    ) -> BallRun | None:
-        """What a click is followed to; waits for the process.
-
-        Args:
-            recording: Of which recording.
-            click: Where the ball is.
-            bounds: First and last frame of the shot.
-            hints: What is known beside the pictures.
-
-        Raises:
-            OverloadedError: Too many wait, or the server is shutting down.
-            ImageError: A frame cannot be decoded.
-        """
-        sha256 = recording.require_readable()
-
-        def explain(error: WorkerEnded) -> Exception:
-            return refused_picture(f"{recording.name} around frame {click.frame}", error)
-
-        asked = (recording.path, sha256, click, bounds, hints, self._settings)
-        task = self._pool.submit(follow_in_file, *asked, explain=explain)
-        try:
-            found: BallRun | None = task.future.result()
-        except CancelledError as error:
-            raise OverloadedError(
-                "the server is shutting down", hint="Nothing was saved. Try it again in a moment."
-            ) from error
-        return found
-
-    def close(self) -> None:
-        """End the process."""
-        self._pool.close()
-
-
-def follow_in_file(
-    path: Path,
-    sha256: str,
-    click: BallClick,
-    bounds: tuple[int, int],
-    hints: FollowHints,
-    settings: Settings,
-) -> BallRun | None:
-    """The work of the process."""
-    reader = RecordingReader(path, read_index(settings, sha256), KEPT_BYTES)
-
-    def read(number: int) -> Image:
-        if number < click.frame and not reader.has(number):
-            # To decode forwards from a key frame costs as much for one frame as for those before it.
-            for before in range(max(number - BEHIND, bounds[0]), number):
-                reader.read(before)
-        return reader.read(number)
-
-    first, last = max(bounds[0], click.frame - EACH_WAY), min(bounds[1], click.frame + EACH_WAY)
-    try:
-        return follow_ball(
-            read,
-            click,
-            range(click.frame - 1, first - 1, -1),
-            range(click.frame + 1, last + 1),
-            hints,
-        )
-    finally:
-        reader.close()
 
 
 def list_runs(store: Store, recording_id: int) -> list[StoredRun]:

@@ -15,7 +15,6 @@ from app.tracking.ball_run import (
     BallRun,
     DetectedBall,
     FollowHints,
-    PredictedPlace,
 )
 from app.video.frames import Image
 from tests.cameras import looking
@@ -147,20 +146,6 @@ class TestFollowBall:
     def test_grass_is_followed_nowhere(self) -> None:
         film = Film(straight())
         assert follow_ball(film.read, BallClick(10, 300, 30), [], [11, 12]) is None
-
-    def test_where_it_is_predicted_it_is_found_behind_a_long_gap(self) -> None:
-        def wall(picture: Image, number: int) -> None:
-            if 15 <= number < 24:
-                picture[:] = GROUND[100:340, 200:620]
-
-        way = straight()
-        way[24:] += (0, 60)
-        film = Film(way, before=wall)
-        places = {
-            number: PredictedPlace(*way[number], np.diag([30.0, 30.0])) for number in range(15, 40)
-        }
-        run = film.followed(5, FollowHints(places=places))
-        assert run.last > 40 and film.off(run)[-5:].max() < 1.0
 
     def test_what_a_detector_says_is_a_candidate_and_no_truth(self) -> None:
         film = Film(straight())

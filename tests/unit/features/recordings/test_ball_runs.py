@@ -13,7 +13,7 @@ from app.db.store import Store
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.recordings.ball_runs import get_run
-from app.features.recordings.follow_hints import follow_hints
+from app.features.recordings.follow import follow_hints
 from app.features.recordings.queries import update_recording
 from app.features.recordings.service import get_recording
 from tests.drawn_balls import FRAMES, WALL, place, write_film

@@ -1,0 +1,125 @@
+"""Following a ball from a click in a worker process, with what is known beside the pictures."""
+
+from __future__ import annotations
+
+from concurrent.futures import CancelledError
+from pathlib import Path
+
+from app.config import Settings
+from app.db.store import Store
+from app.errors import OverloadedError
+from app.features.recordings.cameras import cameras_at
+from app.features.recordings.index import read_index
+from app.features.recordings.queries import predicted_in, views_of_video
+from app.features.recordings.service import Recording
+from app.media.frames import refused_picture
+from app.tracking.ball_follow import follow_ball
+from app.tracking.ball_run import BallClick, BallRun, DetectedBall, FollowHints
+from app.video.frames import Image, RecordingReader
+from app.worker_pool import WorkerPool
+from app.worker_process import COUNTS, WorkerEnded, WorkerLimits
+
+LIMITS = WorkerLimits(memory=1536 * 2**20, processor=120.0, silence=120.0)
+"""For one click."""
+WAITING = 16
+EACH_WAY = 250
+"""Frames that a click is followed to either side: ten seconds."""
+KEPT_BYTES, BEHIND = 160 * 2**20, 16
+"""Of decoded frames; and how many are decoded together where it goes backwards."""
+
+
+class BallFollower:
+    """Follows balls in a worker process, which decodes."""
+
+    def __init__(self, settings: Settings):
+        self._settings = settings
+        self._pool = WorkerPool(LIMITS, 1, WAITING, "balls", COUNTS["recordings"])
+
+    def follow(
+        self, recording: Recording, click: BallClick, bounds: tuple[int, int], hints: FollowHints
+    ) -> BallRun | None:
+        """What a click is followed to; waits for the process.
+
+        Args:
+            recording: Of which recording.
+            click: Where the ball is.
+            bounds: First and last frame of the shot.
+            hints: What is known beside the pictures.
+
+        Raises:
+            OverloadedError: Too many wait, or the server is shutting down.
+            ImageError: A frame cannot be decoded.
+        """
+        sha256 = recording.require_readable()
+
+        def explain(error: WorkerEnded) -> Exception:
+            return refused_picture(f"{recording.name} around frame {click.frame}", error)
+
+        asked = (recording.path, sha256, click, bounds, hints, self._settings)
+        task = self._pool.submit(follow_in_file, *asked, explain=explain)
+        try:
+            found: BallRun | None = task.future.result()
+        except CancelledError as error:
+            raise OverloadedError(
+                "the server is shutting down", hint="Nothing was saved. Try it again in a moment."
+            ) from error
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        self._pool.close()
+
+
+def follow_in_file(
+    path: Path,
+    sha256: str,
+    click: BallClick,
+    bounds: tuple[int, int],
+    hints: FollowHints,
+    settings: Settings,
+) -> BallRun | None:
+    """The work of the process."""
+    reader = RecordingReader(path, read_index(settings, sha256), KEPT_BYTES)
+
+    def read(number: int) -> Image:
+        if number < click.frame and not reader.has(number):
+            # To decode forwards from a key frame costs as much for one frame as for those before it.
+            for before in range(max(number - BEHIND, bounds[0]), number):
+                reader.read(before)
+        return reader.read(number)
+
+    first, last = max(bounds[0], click.frame - EACH_WAY), min(bounds[1], click.frame + EACH_WAY)
+    try:
+        return follow_ball(
+            read,
+            click,
+            range(click.frame - 1, first - 1, -1),
+            range(click.frame + 1, last + 1),
+            hints,
+        )
+    finally:
+        reader.close()
+
+
+def follow_hints(store: Store, recording: Recording, frames: range) -> FollowHints:
+    """What is known of frames of a recording: cameras over time, and what detectors say of those that are groups."""
+    found = cameras_at(store, recording, frames)
+    cameras = {number: one.camera for number, one in found.items() if one.camera is not None}
+    return FollowHints(cameras, _detected(store, recording, frames))
+
+
+def _detected(
+    store: Store, recording: Recording, frames: range
+) -> dict[int, tuple[DetectedBall, ...]]:
+    with store.read() as session:
+        shown = views_of_video(session, recording.dataset_id, recording.require_readable())
+        rows = predicted_in(session, [view for view in shown if view.number in frames])
+    return {
+        number: tuple(
+            DetectedBall(
+                row.x + row.width / 2, row.y + row.height / 2, (row.width + row.height) / 2, row.score
+            )
+            for row in boxes
+        )
+        for number, boxes in rows.items()
+    }  # fmt: skip
