@@ -29,7 +29,6 @@ from app.features.people import commands as people
 from app.features.policies import commands as policies
 from app.features.practice import commands as practice
 from app.features.predictions import commands as predictions
-from app.features.predictions import evaluation_commands as evaluation
 from app.features.solve import commands as solve
 from app.features.verdicts import commands as verdicts
 from app.features.versions import commands as versions
@@ -78,7 +77,7 @@ for part in (
     paint,
     match_estimates,
     versions,
-    evaluation,
+    predictions,
     predictions,
     integrity,
     maintenance,

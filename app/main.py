@@ -33,7 +33,6 @@ from app.features.paint import routes as paint
 from app.features.people import login_routes as people_login
 from app.features.people import routes as people
 from app.features.people import session_routes as people_session
-from app.features.people import sign_on_routes as people_sign_on
 from app.features.pitches import routes as pitches
 from app.features.policies import routes as policies
 from app.features.practice import routes as practice
@@ -56,6 +55,7 @@ from app.http import event_routes as http_event
 from app.http import openapi
 from app.http.access import Access
 from app.http.bodies import MAX_JSON_BYTES
+from app.http.deps import Services
 from app.http.errors import install_handlers
 from app.http.headers import KnownHosts, SameOrigin, SecurityHeaders
 from app.http.idempotency import Idempotency
@@ -66,7 +66,6 @@ from app.http.request_limits import THREADS, RequestLimits
 from app.http.request_log import RequestLog
 from app.http.requests import HeadAsGet, OneLength, OneRange, refuse_unknown_parameters
 from app.http.route import Gate, Route, answer_no_route, require_permissions
-from app.http.services import Services
 from app.http.team import Team, allowed_hosts
 
 PREFIX = "/api/v1"
@@ -116,7 +115,7 @@ ROUTERS = (
     queue.statistics_router,
     independent_annotations.annotations_router,
     practice.router,
-    people_sign_on.router,
+    people_session.sign_on_router,
     people_login.passkeys_router,
     people_login.second_factors_router,
     people_login.team_router,

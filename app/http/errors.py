@@ -156,7 +156,9 @@ async def _review_error(request: Request, error: Exception) -> Response:
         hint=hint,
         pointer=error.pointer,
         station=error.station if isinstance(error, SharedStationError) else None,
-        here=_presence_documents(error) if isinstance(error, HeldGroupError) else None,
+        here=[PresenceDocument.model_validate(one) for one in error.here]
+        if isinstance(error, HeldGroupError)
+        else None,
     )
     headers = {"Retry-After": RETRY_SECONDS} if status in (503, 507) else {}
     if isinstance(error, TooManyTriesError):
@@ -174,10 +176,6 @@ async def _review_error(request: Request, error: Exception) -> Response:
         cause = str(error.__cause__ or "").partition("\n")[0]
         log.error("request refused", instance=problem.instance, error=str(error), cause=cause)
     return problem_response(problem, headers, current)
-
-
-def _presence_documents(error: HeldGroupError) -> list[PresenceDocument]:
-    return [PresenceDocument.model_validate(one) for one in error.here]
 
 
 async def _validation_error(request: Request, error: Exception) -> Response:

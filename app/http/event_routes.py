@@ -11,13 +11,12 @@ from fastapi.responses import StreamingResponse
 
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import reads_blind
-from app.http.deps import AppServices, SeesWhole
+from app.http.deps import AppServices, SeesWhole, Services
 from app.http.events import EVENTS, Listener, first_event
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.requests import is_head
 from app.http.route import Route
-from app.http.services import Services
 
 _UNBUFFERED = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 """What a proxy between asks for, which would hold events back otherwise."""

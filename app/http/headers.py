@@ -151,10 +151,10 @@ def same_origin(origin: str, host: str, scheme: str) -> bool:
     match = _ORIGIN.fullmatch(origin.lower())
     if match is None or match[1] != scheme:
         return False
-    return _with_port(match[2], scheme) == _with_port(host, scheme)
+    return _add_default_port(match[2], scheme) == _add_default_port(host, scheme)
 
 
-def _with_port(host: str, scheme: str) -> str:
+def _add_default_port(host: str, scheme: str) -> str:
     default = {"http": ":80", "https": ":443"}[scheme]
     host = host.strip().lower()
     return host if host.rpartition(":")[2].isdigit() and not host.endswith("]") else host + default

@@ -21,10 +21,10 @@ from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentato
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.maintenance.upkeep import Home, read_home
+from app.http.deps import Services
 from app.http.events import Counts
 from app.http.pages import ELSEWHERE
 from app.http.request_limits import RequestLimits
-from app.http.services import Services
 from app.worker_process import COUNTS
 
 MAX_ADDRESSES = 2000

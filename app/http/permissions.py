@@ -281,10 +281,10 @@ def reads_hidden_work_of(subject: RequestSubject) -> bool:
     Queries are parameters, and fields of bodies, named ``q`` or ``query``.
     """
     texts = [value for name, value in subject.query if name in QUERIES]
-    return any(reads_hidden_work(text) for text in (*texts, *_queries_in(subject.body)))
+    return any(reads_hidden_work(text) for text in (*texts, *_find_queries(subject.body)))
 
 
-def _queries_in(body: Any) -> Iterator[str]:
+def _find_queries(body: Any) -> Iterator[str]:
     """The queries that a JSON body holds, however deep."""
     waiting = [body]
     while waiting:

@@ -17,7 +17,7 @@ from PIL import Image, ImageOps
 from app.config import Settings
 from app.features.exports.source import ExportImages
 from app.features.file_tools.paint import read_pictures
-from app.features.predictions.detect import _picture
+from app.features.predictions.detect import _read_frame
 from app.formats.report import Report
 from app.media.files import decode_frame, picture_header, read_frame, read_pixels
 from app.media.frames import Frames, make_picture
@@ -91,7 +91,7 @@ USERS: dict[str, Callable[[Path, Settings], np.ndarray]] = {
     "paint of a view": lambda path, to: decode_frame(Media(str(path)), False, to),
     "paint of a dataset": lambda path, to: read_pixels(Media(str(path)), False, to)[1],
     "pictures of a folder": of_files,
-    "a detector": lambda path, to: _picture(
+    "a detector": lambda path, to: _read_frame(
         SimpleNamespace(media=Media(str(path)), flipped=False), to
     )[:, :, ::-1],
     "an export that copies": lambda path, to: exported(path, "copy", to),

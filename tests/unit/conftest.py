@@ -79,7 +79,7 @@ ON_BOTH = frozenset(
         "features/integrity/test_database.py",
         "features/groups/test_submit.py",
         "features/verdicts/test_service_verdict.py",
-        "features/versions/test_check.py",
+        "features/integrity/test_records_versions.py",
         "features/versions/test_freeze.py",
         "db/test_idempotency.py",
         "features/queue/test_queries_conditions.py",

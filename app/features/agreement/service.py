@@ -115,13 +115,13 @@ def compare_states(states: Sequence[GroupState], limits: AgreementLimits) -> Com
                 hint="Compare two annotations of the same frames.",
                 pointer="/with",
             )
-        verdicts = (_verdict_of(first), _verdict_of(second))
+        verdicts = (_verdict_from_state(first), _verdict_from_state(second))
         pairs.append(AnnotationPair(a, b, distance, find_disagreements(distance, verdicts, limits)))
     pairs.sort(key=lambda pair: (-_largest_weight(pair.disagreements), -len(pair.disagreements)))
     return Comparison(tuple(states), tuple(pairs), limits, _worst_views(states, pairs))
 
 
-def _verdict_of(state: GroupState) -> str | None:
+def _verdict_from_state(state: GroupState) -> str | None:
     verdict = state.verdict.state
     return None if verdict == "unreviewed" else verdict
 

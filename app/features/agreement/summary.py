@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 from app.db.json_columns import unpack
 from app.db.store import Store
 from app.evaluation.agreement_limits import MEASURES, AgreementLimits, Spread, measure_spreads
-from app.evaluation.annotation_distance import GroupDistance
 from app.evaluation.rater_agreement import (
     Coefficient,
     cohen_kappa,
@@ -191,11 +190,12 @@ def _agreement_of_all(people: Sequence[str], read: Sequence[_ComparedGroup]) -> 
     verdicts = [values for values in verdicts if len(values) > 1]
     equal = len({len(values) for values in verdicts}) == 1
     kappa = fleiss_kappa(verdicts) if equal else None
-    return PeopleAgreement(tuple(people), len(read), kappa, measure_spreads(_group_distances(read)))
-
-
-def _group_distances(read: Sequence[_ComparedGroup]) -> Iterator[GroupDistance]:
-    return (pair.distance for one in read for pair in one.pairs)
+    return PeopleAgreement(
+        tuple(people),
+        len(read),
+        kappa,
+        measure_spreads(pair.distance for one in read for pair in one.pairs),
+    )
 
 
 def _group_agreement(one: _ComparedGroup) -> GroupAgreement:

@@ -32,8 +32,8 @@ def list_(dataset: Dataset, json_: Json = False) -> None:
         from app.features.batches.service import list_batches
 
         with opened_store() as store:
-            found = [_values(batch) for batch in list_batches(store, dataset)]
-    print_rows(found, json_, lambda value: value, _line)
+            found = [_batch_values(batch) for batch in list_batches(store, dataset)]
+    print_rows(found, json_, lambda value: value, _format_value)
 
 
 @commands.command()
@@ -60,7 +60,7 @@ def give(
     json_: Json = False,
 ) -> None:
     """Give out the groups that a query finds now, in its order."""
-    day = _day(due)
+    day = _parse_day(due)
     fields: dict[str, Any] = {
         "name": name,
         "size": size,
@@ -83,7 +83,7 @@ def give(
 
     with opened_store() as store:
         new = NewBatch(query=query, due=day, **fields)
-        print_values(_values(make_batch(store, dataset, new, actor=current_actor())), json_)
+        print_values(_batch_values(make_batch(store, dataset, new, actor=current_actor())), json_)
 
 
 @commands.command()
@@ -99,7 +99,7 @@ def show(batch: Number, json_: Json = False) -> None:
     from app.features.batches.service import get_batch
 
     with opened_store() as store:
-        print_values(_values(get_batch(store, batch)), json_)
+        print_values(_batch_values(get_batch(store, batch)), json_)
 
 
 @commands.command()
@@ -160,7 +160,7 @@ def change(
         found = change_batch(
             store, batch, actor=current_actor(), gold_every=gold_every, no_gold=no_gold
         )
-    print_values(_values(found), json_)
+    print_values(_batch_values(found), json_)
 
 
 @commands.command()
@@ -178,15 +178,15 @@ def close(batch: Number, json_: Json = False) -> None:
 
     with opened_store() as store:
         print_values(
-            _values(change_batch(store, batch, actor=current_actor(), state=CLOSED)), json_
+            _batch_values(change_batch(store, batch, actor=current_actor(), state=CLOSED)), json_
         )
 
 
-def _values(batch: Any) -> dict[str, Any]:
+def _batch_values(batch: Any) -> dict[str, Any]:
     return {name: getattr(batch, name) for name in BATCH}
 
 
-def _line(value: dict[str, Any]) -> str:
+def _format_value(value: dict[str, Any]) -> str:
     people = ", ".join([*value["annotators"], *value["reviewers"]]) or "everybody"
     due = "" if value["due"] is None else f"   due {value['due']}"
     return (
@@ -196,7 +196,7 @@ def _line(value: dict[str, Any]) -> str:
     )
 
 
-def _day(text: str | None) -> date | None:
+def _parse_day(text: str | None) -> date | None:
     try:
         return None if text is None else date.fromisoformat(text)
     except ValueError:

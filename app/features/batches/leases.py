@@ -127,7 +127,7 @@ class Leases:
             back = list_returned_groups(session, batch, worker.name)
             mine = next((group for group in back if group != after), None)
             if mine is not None:
-                row = _group(session, batch, mine)
+                row = _require_batch_group(session, batch, mine)
                 return self._renewed(session, batch, row, Part.ANNOTATOR, worker)
         annotation = next_own(self._store, batch, worker.name)
         if annotation is None:
@@ -168,13 +168,13 @@ class Leases:
             if own is not None:
                 return _copy_lease(session, batch, own, worker)
             _require_given(session, batch, group, worker)
-            parts, row = _need_parts(batch, worker), _group(session, batch, group)
+            parts, row = _need_parts(batch, worker), _require_batch_group(session, batch, group)
             others = _blocking_leases(session, batch, group, worker, self._now())
             if others and not take_over:
-                here = _presences(session, batch, group, self._now())
+                here = _read_presences(session, batch, group, self._now())
                 raise HeldGroupError(f"{others[0].person} has this group open", here)
             end_leases(session, [row.id for row in others])
-            return self._renewed(session, batch, row, _part_in(parts, row), worker)
+            return self._renewed(session, batch, row, _choose_part(parts, row), worker)
 
     def give_back(self, batch_id: int, group: int, worker: BatchMember) -> Lease:
         """End a lease; it does not matter whether there is one.
@@ -185,7 +185,7 @@ class Leases:
         with self._store.write(lasting=False) as session:
             batch = visible_batch(session, read_batch(session, batch_id, with_here=False))
             end_person_lease(session, batch_id, group, worker.name)
-            return Lease(batch, group, here=_presences(session, batch, group, self._now()))
+            return Lease(batch, group, here=_read_presences(session, batch, group, self._now()))
 
     def submit(
         self, batch_id: int, group: int, worker: BatchMember, *, actor: str, done: bool = True
@@ -209,7 +209,7 @@ class Leases:
         with self._store.write() as session:
             batch = _open_batch(session, batch_id)
             _require_given(session, batch, group, worker)
-            row = _group(session, batch, group)
+            row = _require_batch_group(session, batch, group)
             if Part.ANNOTATOR not in worker.parts(batch):
                 raise ConflictError(f'you are not an annotator of the batch "{batch.name}"')
             others = row.submitted is not None and row.submitted_by != worker.name
@@ -237,7 +237,7 @@ class Leases:
         checked = checked_reason(reason)
         with self._store.write() as session:
             batch = _open_batch(session, batch_id)
-            row = _group(session, batch, group)
+            row = _require_batch_group(session, batch, group)
             if row.settled is not None:
                 raise ConflictError("this group was judged", hint="Take the verdict back first.")
             if row.submitted is None:
@@ -253,7 +253,7 @@ class Leases:
         """The response once somebody's lease has ended with what they said of the group."""
         end_person_lease(session, batch_id, group, worker.name)
         batch = visible_batch(session, read_batch(session, batch_id))
-        lease = Lease(batch, group, here=_presences(session, batch, group, self._now()))
+        lease = Lease(batch, group, here=_read_presences(session, batch, group, self._now()))
         session.respond(lease)
         return lease
 
@@ -263,7 +263,7 @@ class Leases:
         at, group = self._clock(), row.group_id
         until = text_of(at + LASTS)
         keep_lease(session, batch.id, group, worker.name, at=text_of(at), until=until)
-        here = _presences(session, batch, group, text_of(at))
+        here = _read_presences(session, batch, group, text_of(at))
         if row.submitted_by is None:
             return Lease(batch, group, part, until, here)
         if row.submitted is not None:
@@ -332,7 +332,7 @@ def _blocking_leases(
     return [row for row in list_group_leases(session, group, at) if row.person != worker.name]
 
 
-def _presences(session: Session, batch: Batch, group: int, at: str) -> tuple[Presence, ...]:
+def _read_presences(session: Session, batch: Batch, group: int, at: str) -> tuple[Presence, ...]:
     return tuple(
         Presence(group, row.person, row.taken, row.seen)
         for row in list_group_leases(session, group, at)
@@ -357,7 +357,7 @@ def _need_parts(batch: Batch, worker: BatchMember) -> set[Part]:
     return parts
 
 
-def _part_in(parts: set[Part], row: WaitingGroup) -> Part:
+def _choose_part(parts: set[Part], row: WaitingGroup) -> Part:
     """What somebody with these parts does with a group of a batch, as far as it is by now."""
     if Part.ANNOTATOR in parts and (row.submitted is None or Part.REVIEWER not in parts):
         return Part.ANNOTATOR
@@ -380,7 +380,7 @@ def _no_group(batch: Batch, group: int) -> NotFoundError:
     return NotFoundError(f'the batch "{batch.name}" has no group {group}')
 
 
-def _group(session: Session, batch: Batch, group: int) -> Any:
+def _require_batch_group(session: Session, batch: Batch, group: int) -> Any:
     row = find_batch_group(session, batch.id, group)
     if row is None:
         raise _no_group(batch, group)

@@ -51,7 +51,7 @@ def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation |
     """
     adopt_submitted(store, batch, person)
     with store.read() as session:
-        groups = _waiting(session, batch)
+        groups = _list_waiting_groups(session, batch)
     terms = Terms(
         batch.id,
         batch.dataset_id,
@@ -79,7 +79,9 @@ def own_left(session: Session, batch: Batch, person: str) -> int:
         return left
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
     kinds = [annotation.kind for annotation in annotations if annotation.person == name]
-    fresh = len(fresh_outside(session, batch.dataset_id, name, _waiting(session, batch)))
+    fresh = len(
+        fresh_outside(session, batch.dataset_id, name, _list_waiting_groups(session, batch))
+    )
     return left + count_gold_left(kinds, batch.gold_every, free, fresh)
 
 
@@ -131,7 +133,7 @@ def seen_batch(store: Store, batch_id: int) -> Batch:
         return visible_batch(session, batch)
 
 
-def _waiting(session: Session, batch: Batch) -> list[int]:
+def _list_waiting_groups(session: Session, batch: Batch) -> list[int]:
     """The groups of a batch that wait; what was submitted otherwise waits for its reviewer."""
     return [
         row.group_id

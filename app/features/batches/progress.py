@@ -87,14 +87,14 @@ def notify_of_stalls(store: Store, at: datetime) -> int:
     with store.read() as session:
         wanted = {row.dataset_id for row in list_active_webhooks(session)}
         datasets = [one for one in sorted(wanted) if list_listeners(session, one, STALLED)]
-        found = _stalls(session, datasets, at, store.settings.stalled_hours)
+        found = _find_stalled_groups(session, datasets, at, store.settings.stalled_hours)
     if not found:
         return 0
     with store.write() as session:
         return sum(_notify_of_stall(session, batch, stall, at) for batch, stall in found)
 
 
-def _stalls(
+def _find_stalled_groups(
     session: Session, datasets: list[int], at: datetime, hours: float
 ) -> list[tuple[Batch, Stall]]:
     batches = [read_batch(session, one) for one in batches_that_wait(session, datasets)]
@@ -225,11 +225,13 @@ def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> T
     entries = entries_of_work(session, batch.id, batch.created)
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
     return TeamBatch(
-        batch, since, _paces(entries, read_batch_groups(session, batch.id), annotations)
+        batch, since, _measure_paces(entries, read_batch_groups(session, batch.id), annotations)
     )
 
 
-def _paces(entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[Any]) -> list[Pace]:
+def _measure_paces(
+    entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[Any]
+) -> list[Pace]:
     """What each person did, from the log and from what was submitted; of groups, and of own copies.
 
     What stands in the original under the name of somebody who has a copy was taken over from it: it
@@ -254,10 +256,10 @@ def _paces(entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[
         if at is not None:
             submitted[name].add(group)
             times[name].append(at)
-    return [_pace(name, times[name], judged, submitted) for name in sorted(times)]
+    return [_measure_pace(name, times[name], judged, submitted) for name in sorted(times)]
 
 
-def _pace(
+def _measure_pace(
     name: str,
     times: Iterable[str],
     judged: Mapping[str, set[int]],

@@ -330,21 +330,28 @@ def waiting_group(
             0: what they have open comes first.
     """
     given = {"batch": batch_id, "person": person, "at": at, "after": after}
-    waiting = _waiting(submitted, bool(after))
+    waiting = _waiting_statement(submitted, bool(after))
     if seen := visible_groups_condition(dataset_id, BatchGroupModel.group_id):
         waiting = waiting.where(*seen)
     return session.row(WaitingGroup, waiting, given)
 
 
 @cache
-def _waiting(submitted: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
+def _waiting_statement(submitted: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
     """Made once for each case: it takes longer to put together than to answer."""
     table = BatchGroupModel
     person: BindParameter[str] = bindparam("person")
     after = bindparam("after", type_=Integer())
     lasts = LeaseModel.until > bindparam("at")
-    mine, others = _leased(LeaseModel.person == person, lasts), LeaseModel.person != person
-    where = [table.batch_id == bindparam("batch"), table.settled.is_(None), ~_leased(others, lasts)]
+    mine, others = (
+        _leased_condition(LeaseModel.person == person, lasts),
+        LeaseModel.person != person,
+    )
+    where = [
+        table.batch_id == bindparam("batch"),
+        table.settled.is_(None),
+        ~_leased_condition(others, lasts),
+    ]
     if submitted is not None:
         where.append(table.submitted.is_not(None) if submitted else table.submitted.is_(None))
     # What somebody submitted themselves, and what was returned to others, comes last for them.
@@ -364,7 +371,7 @@ def _waiting(submitted: bool | None, goes_on: bool) -> Select[*tuple[Any, ...]]:
     return select(*row).where(*where).order_by(*order, table.place).limit(1)
 
 
-def _leased(*where: ColumnElement[bool]) -> ColumnElement[bool]:
+def _leased_condition(*where: ColumnElement[bool]) -> ColumnElement[bool]:
     return exists().where(LeaseModel.group_id == BatchGroupModel.group_id, *where)
 
 
@@ -419,17 +426,19 @@ class WorkEntry(NamedTuple):
 def entries_of_work(session: Session, batch_id: int, since: str) -> Sequence[WorkEntry]:
     """Entries of the log about a batch's groups, and people's own copies of them, since some time, in order."""
     columns = (LogModel.actor, LogModel.at, LogModel.group_id, LogModel.kind)
-    statement = select(*columns).where(*_worked_on(batch_id), LogModel.at >= since)
+    statement = select(*columns).where(*_worked_on_conditions(batch_id), LogModel.at >= since)
     return session.rows(WorkEntry, statement.order_by(LogModel.at))
 
 
 def last_work(session: Session, batch_id: int) -> str | None:
     """When somebody did something with a group of a batch last, or with a copy of one."""
-    last: str | None = session.scalar(select(func.max(LogModel.at)).where(*_worked_on(batch_id)))
+    last: str | None = session.scalar(
+        select(func.max(LogModel.at)).where(*_worked_on_conditions(batch_id))
+    )
     return last
 
 
-def _worked_on(batch_id: int) -> tuple[ColumnElement[bool], ...]:
+def _worked_on_conditions(batch_id: int) -> tuple[ColumnElement[bool], ...]:
     mine = select(BatchGroupModel.group_id).where(BatchGroupModel.batch_id == batch_id)
     copies = select(IndependentAnnotationModel.copy_id).where(
         IndependentAnnotationModel.batch_id == batch_id

@@ -30,12 +30,11 @@ from app.features.people.logins import Login
 from app.features.people.roles import role_allows
 from app.http.access import current_login
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees, Services
 from app.http.documents import as_document, document, no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.route import Route
-from app.http.services import Services
 from app.soccer.actors import LOCAL_USER
 
 router = APIRouter(tags=["work"], route_class=Route)
@@ -60,14 +59,14 @@ class BatchMembers:
         return self.here(batches.dataset_of_batch(store, batch))
 
 
-async def _workers(request: Request) -> BatchMembers:
+async def _batch_workers(request: Request) -> BatchMembers:
     return BatchMembers(current_login(request.scope))
 
 
-Members = Annotated[BatchMembers, Depends(_workers)]
+Members = Annotated[BatchMembers, Depends(_batch_workers)]
 
 
-def _announced(services: Services, lease: Lease) -> Lease:
+def _announce_lease(services: Services, lease: Lease) -> Lease:
     """A lease of which everybody has been told who looks."""
     services.events.publish_lease(lease)
     return lease
@@ -89,7 +88,7 @@ def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
     return WorkBatchList.model_validate({"items": own_annotations.seen_batches(store, dataset)})
 
 
-def _made(batch: Batch) -> Response:
+def _created_response(batch: Batch) -> Response:
     headers = {"Location": f"/api/v1/batches/{batch.id}"}
     return document(WorkBatchDocument.model_validate(batch), 201, headers)
 
@@ -108,7 +107,7 @@ def _made(batch: Batch) -> Response:
     },
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_made)
+@responds(_created_response)
 def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, actor: Actor) -> Batch:
     """Give out the groups that a query finds now, in its order."""
     wanted = NewBatch(query=new.q, **new.model_dump(exclude={"q"}))
@@ -185,7 +184,7 @@ def open_next_group(batch: Id, origin: NextGroup, services: AppServices, members
     The lease lasts three minutes, and three more each time that it is taken again.
     """
     worker = members.of_batch(services.store, batch)
-    return _announced(services, Leases(services.store).next(batch, worker, after=origin.after))
+    return _announce_lease(services, Leases(services.store).next(batch, worker, after=origin.after))
 
 
 @router.put(
@@ -201,7 +200,7 @@ def open_group(
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
     worker = members.of_batch(services.store, batch)
     taken = Leases(services.store).take(batch, group, worker, take_over=how.take_over)
-    return _announced(services, taken)
+    return _announce_lease(services, taken)
 
 
 @router.delete(
@@ -214,7 +213,7 @@ def open_group(
 def give_back(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
     worker = members.of_batch(services.store, batch)
-    _announced(services, Leases(services.store).give_back(batch, group, worker))
+    _announce_lease(services, Leases(services.store).give_back(batch, group, worker))
 
 
 @router.put(
@@ -236,7 +235,9 @@ def submit_group(
     """Say that a group is annotated, so that a reviewer gets it."""
     worker = members.of_batch(services.store, batch)
     background.add_task(after_submission, services.store, group, services.paint)
-    return _announced(services, Leases(services.store).submit(batch, group, worker, actor=actor))
+    return _announce_lease(
+        services, Leases(services.store).submit(batch, group, worker, actor=actor)
+    )
 
 
 @router.delete(
@@ -253,7 +254,7 @@ def withdraw_submission(
     """Say that a group is not annotated yet, after all; 409 for one's own copy that is submitted."""
     worker = members.of_batch(services.store, batch)
     lease = Leases(services.store).submit(batch, group, worker, actor=actor, done=False)
-    return _announced(services, lease)
+    return _announce_lease(services, lease)
 
 
 @router.post(
@@ -270,4 +271,4 @@ def return_group(
     """Give a group back to the annotator who submitted it, and tell them why."""
     worker = members.of_batch(services.store, batch)
     lease = Leases(services.store).return_group(batch, group, worker, why.reason, actor=actor)
-    return _announced(services, lease)
+    return _announce_lease(services, lease)

@@ -216,20 +216,20 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         ConflictError: The dataset has as many batches as it may, or no gold group to mix in.
     """
     query = parse_query(new.query, longest=MAX_LISTED_LENGTH)
-    _check(new)
+    _check_request(new)
     if new.tracks is not None:
         _check_tracks(new)
     number = dataset_id(store, dataset)
     people = {
-        Part.ANNOTATOR: _ids(store, number, Part.ANNOTATOR, new.annotators),
-        Part.REVIEWER: _ids(store, number, Part.REVIEWER, new.reviewers),
+        Part.ANNOTATOR: _person_ids(store, number, Part.ANNOTATOR, new.annotators),
+        Part.REVIEWER: _person_ids(store, number, Part.REVIEWER, new.reviewers),
     }
     with store.write() as session:
         if len(find_dataset_batches(session, [number])) >= MOST_BATCHES:
             raise ConflictError(
                 f"a dataset has at most {MOST_BATCHES} batches", hint="Delete one that is closed."
             )
-        ids = _chosen(session, number, new, query)
+        ids = _choose_ids(session, number, new, query)
         if new.gold_every is not None:
             _require_gold(session, number)
         values = {
@@ -251,14 +251,14 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
         for part, chosen in people.items():
             set_people(session, made, part, chosen)
         batch = read_batch(session, made)
-        _log(session, batch, "made", actor)
+        _log_change(session, batch, "made", actor)
         _notify_people(session, batch, (*batch.annotators, *batch.reviewers), actor)
         announce_batch(session, made, GIVEN_OUT, actor=actor, at=batch.created)
         session.respond(batch)
         return batch
 
 
-def _chosen(session: Session, dataset: int, new: NewBatch, query: Query) -> list[int]:
+def _choose_ids(session: Session, dataset: int, new: NewBatch, query: Query) -> list[int]:
     """Ids of the groups or tracks that are given out."""
     if new.tracks is None:
         found = Listing(session, dataset, query.conditions).ids(query.order)
@@ -311,7 +311,7 @@ def change_batch(
         values["gold_every"] = gold_every
     named = {Part.ANNOTATOR: annotators, Part.REVIEWER: reviewers}
     people = {
-        part: _ids(store, before.dataset_id, part, names)
+        part: _person_ids(store, before.dataset_id, part, names)
         for part, names in named.items()
         if names is not None
     }
@@ -324,7 +324,7 @@ def change_batch(
         for part, chosen in people.items():
             set_people(session, batch_id, part, chosen)
         batch = read_batch(session, batch_id)
-        _log(session, batch, "closed" if state == CLOSED else "changed", actor)
+        _log_change(session, batch, "closed" if state == CLOSED else "changed", actor)
         known = (*before.annotators, *before.reviewers)
         new = [name for name in (*batch.annotators, *batch.reviewers) if name not in known]
         _notify_people(session, batch, new, actor)
@@ -339,7 +339,7 @@ def remove_batch(store: Store, batch_id: int, *, actor: str) -> Batch:
     with store.write() as session:
         batch = read_batch(session, batch_id)
         delete_batch(session, batch_id)
-        _log(session, batch, "deleted", actor)
+        _log_change(session, batch, "deleted", actor)
         session.respond(batch)
         return batch
 
@@ -352,15 +352,17 @@ def read_batch(session: Session, batch_id: int, *, with_here: bool = True) -> Ba
     row = find_batch(session, batch_id)
     if row is None:
         raise NotFoundError(f"there is no batch {batch_id}")
-    return _batches(session, [row], with_here)[0]
+    return _batches_from_rows(session, [row], with_here)[0]
 
 
 def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
     """The batches of datasets within a session."""
-    return _batches(session, find_dataset_batches(session, dataset_ids))
+    return _batches_from_rows(session, find_dataset_batches(session, dataset_ids))
 
 
-def _batches(session: Session, rows: Sequence[Any], with_here: bool = True) -> list[Batch]:
+def _batches_from_rows(
+    session: Session, rows: Sequence[Any], with_here: bool = True
+) -> list[Batch]:
     ids = [row.id for row in rows]
     counts = count_work(session, ids)
     names: dict[tuple[int, str], list[str]] = defaultdict(list)
@@ -388,7 +390,7 @@ def _batches(session: Session, rows: Sequence[Any], with_here: bool = True) -> l
     return found
 
 
-def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[int]:
+def _person_ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[int]:
     """Ids of people who may do a part in a dataset."""
     wanted = {name.strip().lower() for name in names}
     if not wanted:
@@ -408,7 +410,7 @@ def _ids(store: Store, dataset: int, part: Part, names: Iterable[str]) -> list[i
     return [able[name] for name in sorted(wanted)]
 
 
-def _check(new: NewBatch) -> None:
+def _check_request(new: NewBatch) -> None:
     checked_title(new.name, "a batch")
     if not 1 <= new.verdicts <= MOST_VERDICTS:
         raise InputError(
@@ -480,7 +482,7 @@ def _notify_people(session: Session, batch: Batch, people: Iterable[str], actor:
         )  # fmt: skip
 
 
-def _log(session: Session, batch: Batch, did: str, actor: str) -> None:
+def _log_change(session: Session, batch: Batch, did: str, actor: str) -> None:
     """Write what became of a batch into the log."""
     body = {
         "batch": batch.id,

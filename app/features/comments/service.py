@@ -182,7 +182,7 @@ def edit_comment(
             entry = {"comment": comment_id, "text": text}
             _log_comment(session, group, actor, time, did="edited", thread=thread_id, **entry)
             new = [name for name in people if name not in comment.mentions]
-            _notify(session, group, thread_id, actor, new, ())
+            _notify_people(session, group, thread_id, actor, new, ())
         return _respond_with_thread(session, group_id, thread_id)
 
 
@@ -224,10 +224,10 @@ def _insert_comment(
     set_mentions(session, comment_id, people.values())
     entry = {"comment": comment_id, "text": text, **where}
     _log_comment(session, group, actor, time, did="said", thread=thread_id, **entry)
-    _notify(session, group, thread_id, actor, people, before)
+    _notify_people(session, group, thread_id, actor, people, before)
 
 
-def _notify(
+def _notify_people(
     session: Session,
     group: ThreadGroup,
     thread_id: int,

@@ -22,13 +22,12 @@ from app.features.jobs.schemas import ACCEPTED, JobDocument, job_address
 from app.features.versions.schemas import VersionId
 from app.formats.export_formats import options_used_by
 from app.http.cursor import paged, parse_cursor
-from app.http.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole
+from app.http.deps import Actor, AppServices, AppStore, DatasetPath, SeesWhole, Services
 from app.http.documents import Document, ListDocument, document, no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
-from app.http.services import Services
 from app.http.stored_file import stored_file
 from app.soccer.choices import BoxKind, ExportFormat, JobState, PicturesSent, TrainingViews
 

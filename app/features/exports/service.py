@@ -202,7 +202,7 @@ def export_dataset(
             # A version is the same every time; unassigned frames are the dataset's as it is.
             run.tracks = _open_track_source(session, store.settings, source, options)
             if format == "parquet" and source.tracks:
-                run.kept = frozen_records(_frozen(session, source))
+                run.kept = frozen_records(_read_frozen_tracks(session, source))
             if format == "issia" and isinstance(source, LiveSource):
                 run.unassigned = unassigned_persons(session, dataset)
             with _open_view_files(root, out) as put:
@@ -391,7 +391,7 @@ def _open_track_source(
     """What makes the tracks of an export; None where its format holds none."""
     if options.format not in TRACKS:
         return None
-    frozen = None if source.tracks is None else _frozen(session, source)
+    frozen = None if source.tracks is None else _read_frozen_tracks(session, source)
     found = track_source(
         session, settings, source.dataset_id, source.dataset, source.policy, frozen
     )
@@ -399,7 +399,7 @@ def _open_track_source(
     return replace(found, everything=everything, try_only=try_only)
 
 
-def _frozen(
+def _read_frozen_tracks(
     session: Session, source: LiveSource | VersionSource | _SampleSource
 ) -> dict[str, Json]:
     """The tracks of a version by stretch, as they were frozen."""

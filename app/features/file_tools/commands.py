@@ -211,7 +211,7 @@ def link(
     ball that belong together meet: t_live = offset + speed * t_replay. A ball that does not tell
     the times is refused with a reason (outcome unobservable).
     """
-    from app.features.file_tools.link import link_files, parse_hint
+    from app.features.file_tools.shots import link_files, parse_hint
 
     try:
         hints = [parse_hint(text) for text in at or ()]

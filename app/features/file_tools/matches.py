@@ -234,7 +234,7 @@ def share_tripods(
     if tripod is None:
         return
     by_camera: dict[str, list[DrawnFrame]] = {}
-    named = None if tripod == ONE else _named(Path(tripod), rows)
+    named = None if tripod == ONE else _read_camera_names(Path(tripod), rows)
     for each in drawn:
         name = ONE if named is None else named.get(each.frame, "")
         if name:
@@ -252,10 +252,10 @@ def share_tripods(
         for each, covariance in zip(frames, covariances, strict=True):
             by_frame[each.frame]["shown"] = pitch_row(shown, on_shown=False)
             text = camera_file_text(each.camera, row_by_row(covariance), each.size)
-            _write(resolve_inside(out, camera_file_name(each.frame)), text)
+            _write_camera_file(resolve_inside(out, camera_file_name(each.frame)), text)
 
 
-def _named(file: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _read_camera_names(file: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """The camera of each frame, as ``calibrate --matches`` reads matches."""
     if not file.is_file():
         raise InputError(
@@ -268,7 +268,7 @@ def _named(file: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     return named
 
 
-def _write(file: Path, text: str) -> None:
+def _write_camera_file(file: Path, text: str) -> None:
     try:
         replace_file(file, text.encode(), durable=False, private=False)
     except OSError as error:

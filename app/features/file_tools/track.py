@@ -71,7 +71,7 @@ def track_files(
             hint="Name the lines for the other half, or leave one of the two out.",
         )
     named = _parse_names(lines)
-    contents = {number: _read(path) for number, path in named.items()}
+    contents = {number: _read_file(path) for number, path in named.items()}
     shown = {number: str(path) for number, path in named.items()}
 
     def tell(done: Any) -> None:
@@ -111,13 +111,13 @@ def track_video(
     """
     opened, report = Clip.open(clip), Report()
     lines = {
-        number: _lines(content, shown[number], opened.size, report)
+        number: _parse_lines(content, shown[number], opened.size, report)
         for number, content in contents.items()
     }
     return track_clip(opened, lines, tell=send)
 
 
-def _lines(content: bytes, shown: str, size: ImageSize, report: Report) -> Lines:
+def _parse_lines(content: bytes, shown: str, size: ImageSize, report: Report) -> Lines:
     documents = read_line_documents(content, shown, report)
     if len(documents) != 1:
         raise InputError(f"{shown} has the lines of {len(documents)} frames; give a file of one")
@@ -142,7 +142,7 @@ def _parse_names(lines: Sequence[str]) -> dict[int, Path]:
     return named
 
 
-def _read(path: Path) -> bytes:
+def _read_file(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST_LINES + 1)
@@ -172,11 +172,11 @@ def frame_row(frame: FrameCamera) -> dict[str, Any]:
         row["focal_px"] = camera.focal_length[0]
         row["position"] = [float(item) for item in camera.position]
         if frame.covariance is not None:
-            row["sigma"] = _sigma(frame.covariance, camera.focal_length[0])
+            row["sigma"] = _standard_deviations(frame.covariance, camera.focal_length[0])
     return row
 
 
-def _sigma(covariance: Sequence[float], focal: float) -> dict[str, float]:
+def _standard_deviations(covariance: Sequence[float], focal: float) -> dict[str, float]:
     """Standard deviations: angles in degrees, focal length in pixels, position in metres."""
     matrix = np.reshape(covariance, (PARAMETERS, PARAMETERS))
     each = np.sqrt(np.diag(matrix))

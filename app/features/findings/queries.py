@@ -65,10 +65,10 @@ def findings_from_rows(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
         rows: Of the group, as ``features.queue.refresh_queries.read_import_findings`` has them.
         inputs_hash: Of the group now; what was said of another state of it is left out.
     """
-    return [_noticed(row) for row in rows if row.of_inputs in (None, inputs_hash)]
+    return [_finding_from_row(row) for row in rows if row.of_inputs in (None, inputs_hash)]
 
 
-def _noticed(row: Any) -> Finding:
+def _finding_from_row(row: Any) -> Finding:
     if row.kind != TRACK_DISAGREES:
         return Finding(row.kind, row.sentence, view=row.view)
     with as_written():

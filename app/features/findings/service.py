@@ -62,7 +62,7 @@ def count_groups(
 ) -> int:
     """How many groups of a dataset have findings, of a kind, open or dismissed, where these are named."""
     with store.read() as session:
-        return Listing(session, dataset_id, _where(kind, dismissed)).count()
+        return Listing(session, dataset_id, _finding_conditions(kind, dismissed)).count()
 
 
 def read_findings(
@@ -79,7 +79,7 @@ def read_findings(
     ``dismissed`` names those that people have checked (True) or have not (False); None: all.
     """
     with store.read() as session:
-        where = [*_where(kind, dismissed), compare_condition("number", ">", after)]
+        where = [*_finding_conditions(kind, dismissed), compare_condition("number", ">", after)]
         ids = Listing(session, dataset_id, where).ids(Order("number"), limit)
         states = read_states(session, ids)
     return [_group_findings(state, kind, dismissed) for state in states]
@@ -94,7 +94,7 @@ def finding_values(store: Store, dataset: str) -> Iterator[dict[str, Any]]:
             yield from group.values
 
 
-def _where(kind: str | None, dismissed: bool | None) -> list[Condition]:
+def _finding_conditions(kind: str | None, dismissed: bool | None) -> list[Condition]:
     """What holds of groups with findings that can be read: those of an earlier solver cannot."""
     columns = {None: ("findings", "dismissed"), False: ("findings",), True: ("dismissed",)}
     has = any_of(
@@ -172,7 +172,7 @@ def set_dismissal(
             )
             # Under another policy other things may be found.
             if policy_hash == stored.policy.hash:
-                dismissal = _dismissal_of(finding, actor, note)
+                dismissal = _make_dismissal(finding, actor, note)
                 insert_dismissal(
                     session, stored.dataset_id, group_id, dismissal, dismissed=dismissed
                 )
@@ -199,7 +199,7 @@ def _meant_finding(findings: Sequence[Finding], named: FindingName) -> Finding:
     return min(fitting, key=lambda one: abs((one.number or 0.0) - number))
 
 
-def _dismissal_of(finding: Finding, actor: str, note: str | None) -> Dismissal:
+def _make_dismissal(finding: Finding, actor: str, note: str | None) -> Dismissal:
     return Dismissal(
         finding.kind,
         finding.view,

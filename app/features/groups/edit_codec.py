@@ -53,20 +53,13 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
     """An edit with its name under ``edit``."""
     match edit:
         case SetLines(view, lines, proposed, not_visible):
-            fields = {
-                "lines": _lines_to_json(lines),
-                **_line_sources_to_json(proposed, not_visible),
-            }
+            fields = _lines_to_json(lines, proposed, not_visible)
             return {"edit": "set_lines", "view": view, **fields}
         case SetBalls(view, balls, noise):
             fields = {"balls": [*map(ball_to_json, balls)], **_noise_to_json(noise)}
             return {"edit": "set_balls", "view": view, **fields}
         case SetBall(view, ball, noise):
-            fields = {
-                "balls": [] if ball is None else [ball_to_json(ball)],
-                **_noise_to_json(noise),
-            }
-            return {"edit": "set_balls", "view": view, **fields}
+            return edit_to_json(SetBalls(view, () if ball is None else (ball,), noise))
         case IncludeView(view, included, reason, note):
             why = {} if reason is None else {"reason": reason, "note": note}
             return {"edit": "include_view", "view": view, "included": included, **why}
@@ -84,12 +77,14 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
             return {"edit": "several", "edits": [*map(edit_to_json, edits)]}
         case SetPaint(paint):
             return {"edit": "set_paint", "paint": paint_to_json(paint)}
+        case _:
+            return _station_edit_to_json(edit)
+
+
+def _station_edit_to_json(edit: Edit | StationEdit) -> Json:
+    match edit:
         case SetStationLines(lines, proposed, not_visible):
-            fields = {
-                "lines": _lines_to_json(lines),
-                **_line_sources_to_json(proposed, not_visible),
-            }
-            return {"edit": "set_station_lines", **fields}
+            return {"edit": "set_station_lines", **_lines_to_json(lines, proposed, not_visible)}
         case SetStationCalibration(calibration):
             return {"edit": "set_station_calibration", "calibration": calibration}
         case SetStationCamera(given, covariance, calibration):
@@ -150,15 +145,8 @@ def station_edit_from_json(value: Mapping[str, Any]) -> StationEdit:
 
 
 def _noise_to_json(noise: float) -> Json:
-    """Only where there is something to say, as of ``_line_sources_to_json``."""
+    """Only where there is something to say, as of ``_lines_to_json``."""
     return {} if noise == 1 else {"noise": float(noise)}
-
-
-def _line_sources_to_json(proposed: tuple[str, ...], not_visible: tuple[str, ...]) -> Json:
-    """Where lines come from, or why there are none, only where there is something to say: all other
-    entries are as ever."""
-    sources = dict.fromkeys(proposed, "proposed") | dict.fromkeys(not_visible, "not_visible")
-    return {"source": sources} if sources else {}
 
 
 def _line_sources_from_json(value: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -171,11 +159,17 @@ def _line_sources_from_json(value: Mapping[str, Any]) -> tuple[tuple[str, ...], 
     return proposed, not_visible
 
 
-def _lines_to_json(lines: LineChanges) -> Json:
-    return {
+def _lines_to_json(
+    lines: LineChanges, proposed: tuple[str, ...], not_visible: tuple[str, ...]
+) -> Json:
+    """Lines, and where they come from, or why there are none, only where there is something to say:
+    all other entries are as ever."""
+    points_of = {
         marking: None if points is None else [[float(x), float(y)] for x, y in points]
         for marking, points in lines.items()
     }
+    sources = dict.fromkeys(proposed, "proposed") | dict.fromkeys(not_visible, "not_visible")
+    return {"lines": points_of, **({"source": sources} if sources else {})}
 
 
 def _lines_from_json(value: Mapping[str, Any]) -> LineChanges:

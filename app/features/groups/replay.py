@@ -298,7 +298,7 @@ def _rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
         for group, station, view, sentence in sorted(snapshot.noticed, key=repr)
     ]
     unassigned = [
-        {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": _pack_extras(extras)}
+        {"dataset_id": key[0], "camera": key[1], "frame": key[2], "extras": pack(extras.values())}
         for key, extras in snapshot.unassigned.items()
     ]
     groups = [_group_row(snapshot, key) for key in snapshot.groups]
@@ -322,10 +322,6 @@ def _group_row(snapshot: StateSnapshot, group_id: int) -> dict[str, Any]:
         "changed": record.changed,
         "source_hash": record.source_hash,
     }
-
-
-def _pack_extras(extras: Any) -> bytes:
-    return pack(extras.values())
 
 
 _STEPS: dict[str, Callable[[StateSnapshot, LogEntry], None]] = {

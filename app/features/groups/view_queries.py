@@ -222,7 +222,7 @@ def stored_station(row: Any) -> StoredStation:
         size=ImageSize(row.width, row.height),
         shared=row.shared,
         lines=_lines_from_text(row.lines),
-        given=None if row.given is None else _camera(row.given),
+        given=None if row.given is None else _parse_camera(row.given),
         calibration=row.calibration,
         flipped=row.flipped,
         given_covariance=None if row.given is None else _covariance_from_text(row.given),
@@ -279,7 +279,7 @@ def _not_visible_from_text(text: str) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=1024)
-def _camera(text: str) -> Camera:
+def _parse_camera(text: str) -> Camera:
     with as_written():
         return codecs.camera_from_json(parse(text))
 

@@ -34,14 +34,13 @@ from app.features.groups.submit import FoundView, find_view, submit_view
 from app.features.groups.view_paint import NO_FRAME_HINT
 from app.features.solutions.service import Solve, solve_encoded
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, Id, IfMatch, etag_matches
+from app.http.deps import Actor, AppServices, Id, IfMatch, Services, etag_matches
 from app.http.documents import responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, is_large, limit
 from app.http.route import Route
-from app.http.services import Services
 from app.media.frames import Frames, SentPicture
 from app.soccer.group import FARTHEST, Media
 from app.worker_process import WorkerEnded

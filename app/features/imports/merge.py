@@ -335,7 +335,7 @@ def _groups_only_in_other(
     """What the other's dataset brought and this one's never did: groups as they came."""
     stored = read_groups(session, list(known.values()))
     chains = RevisionChains(session, origin.dataset_id).of(stored.values())
-    shared = _shared(session, origin.dataset_id)
+    shared = _read_static_cameras(session, origin.dataset_id)
     upstream = []
     for key, item in items.items():
         base = _with_own_stations(item.base, shared)
@@ -367,7 +367,7 @@ def _with_media(group: Group, stored: Group) -> Group:
     return replace(group, views=tuple(views))
 
 
-def _shared(session: Session, dataset_id: int) -> dict[str, Station]:
+def _read_static_cameras(session: Session, dataset_id: int) -> dict[str, Station]:
     """The static cameras as the dataset last brought them, by key."""
     return {
         item.station.key: station_revision_chain(session, item).base

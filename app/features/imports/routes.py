@@ -33,13 +33,12 @@ from app.features.jobs.queries import Job
 from app.features.jobs.schemas import by_job, job_answer
 from app.finite import MAX_ID
 from app.http.cursor import paged
-from app.http.deps import Actor, AppServices, DryRun, Sees
+from app.http.deps import Actor, AppServices, DryRun, Sees, Services
 from app.http.documents import no_content, responds
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
-from app.http.services import Services
 
 imports_router = APIRouter(prefix="/imports", tags=["imports"], route_class=Route)
 

@@ -32,7 +32,7 @@ def used_bytes(settings: Settings, actor: str, but: Path | None = None) -> int:
         but: A folder that does not count.
     """
     return sum(
-        _bytes_for(record, person_of(actor))
+        _count_bytes(record, person_of(actor))
         for record in settings.uploads.glob("*/upload.json")
         if record.parent != but
     )
@@ -51,7 +51,7 @@ def require_quota(settings: Settings, size: int, quota: int, used: int) -> None:
     )
 
 
-def _bytes_for(record: Path, person: str) -> int:
+def _count_bytes(record: Path, person: str) -> int:
     """How many bytes an upload counts for a person; 0: it is not theirs."""
     try:
         values = json.loads(record.read_bytes())

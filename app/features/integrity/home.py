@@ -24,9 +24,9 @@ from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.features.comments.service import examine_threads
 from app.features.datasets.queries import unread_uploads, unused_calibrations, unused_frames
 from app.features.integrity.database import examine_database
+from app.features.integrity.records import examine_versions
 from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import linked_admins, read_rules
-from app.features.versions.check import examine_versions
 from app.features.what_if.service import examine_yields
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store

@@ -1,4 +1,4 @@
-"""Whether accounts, roles and solutions are what was written."""
+"""Whether accounts, roles, solutions and frozen versions are what was written."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.db.check import Check, compare_records, compare_with_log
+from app.db.dialects.dialect import dialect_in
+from app.db.json_columns import as_written, parse, unpack
 from app.db.log import LogEntry, entries_of_kinds
 from app.db.session import Session
+from app.db.store import Store
 from app.errors import StorageError
 from app.features.datasets.queries import policy_from_row
-from app.features.groups.codecs import paint_to_json
+from app.features.groups.codecs import paint_to_json, policy_from_json
 from app.features.groups.digest import group_inputs_hash
 from app.features.groups.queries import read_groups
 from app.features.people.queries import all_dataset_roles, all_people
 from app.features.people.roles import PERSON
-from app.features.people.visibility_queries import given_aliases
+from app.features.people.visibility_queries import given_aliases, shown_entries
 from app.features.solutions.codec import SolutionSummary, summarize
 from app.features.solutions.queries import read_summary
 from app.features.solutions.stored_queries import (
@@ -27,6 +30,19 @@ from app.features.solutions.stored_queries import (
     decode_row,
     solution_batches,
 )
+from app.features.versions.frozen_queries import (
+    SAID,
+    SOLUTION,
+    fitting_key,
+    frozen_batches,
+    known_frozen,
+    lost_calibrations,
+    members_without_content,
+    named_texts,
+    read_json,
+)
+from app.features.versions.queries import all_versions, annotation_rows
+from app.features.versions.service import calibration_names, version_hash
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
@@ -34,6 +50,12 @@ from app.solving.calibrate import view_keys
 from app.solving.facts_codec import facts_from_bytes
 
 DATASET, DELETED = "dataset", "dataset_deleted"
+
+
+WRONG = "not as it was written"
+_EQUAL = 1e-6
+"""Relative; the same figures of another machine may differ in their last digits."""
+WRONG_VERSION = "not as it was frozen"
 
 
 @dataclass
@@ -161,11 +183,6 @@ def _record_name(key: str | tuple[str, int]) -> str:
     return key if isinstance(key, str) else f"{key[0]} in dataset {key[1]}"
 
 
-WRONG = "not as it was written"
-_EQUAL = 1e-6
-"""Relative; the same figures of another machine may differ in their last digits."""
-
-
 def examine_computed(session: Session, restore: str) -> list[Check]:
     """Read every calibration, every reading of paint, and every solution of this solver.
 
@@ -262,3 +279,125 @@ def _are_equal_values(stored: SolutionSummary, computed: SolutionSummary) -> boo
         else ours == theirs
         for ours, theirs in zip(vars(stored).values(), vars(computed).values(), strict=True)
     )
+
+
+def examine_versions(store: Store) -> list[Check]:
+    """Compare each version with its groups and the log, and each frozen content with its key.
+
+    Whether solutions would come out as they were frozen is what ``verify`` tells.
+    """
+    with store.read() as session:
+        restore = dialect_in(session).restoring
+        versions = all_versions(session)
+        apart = [*_differing_versions(session, versions)]
+        count, changed = _check_frozen_contents(session)
+        return [
+            compare_records(
+                "frozen versions", f"{len(versions):,}, as frozen", apart, WRONG_VERSION, restore
+            ),
+            compare_records(
+                "frozen content", f"{count:,}, as frozen", changed, WRONG_VERSION, restore
+            ),
+        ]
+
+
+def _differing_versions(session: Session, versions: Any) -> Iterator[str]:
+    """Each version that is not what was frozen, with what is wrong with it."""
+    try:
+        with as_written():
+            logged = _logged_freezes(session)
+    except StorageError:
+        # Nothing follows from a log that cannot be read, which is named by itself.
+        logged = None
+    for row in versions:
+        entry = None if logged is None else logged.pop(row.id, None)
+        why = None
+        if logged is not None and not _matches_log(row, entry):
+            why = "the log says otherwise"
+        why = why or _fault_of_version(session, row)
+        if why is not None:
+            yield f"{row.dataset}/{row.name} ({why})"
+    for entry in (logged or {}).values():
+        yield f"{entry.body.get('name')} of dataset {entry.dataset_id} (it is gone)"
+
+
+def _logged_freezes(session: Session) -> dict[int, LogEntry]:
+    """What the log says of each version by its id, but for datasets that were deleted."""
+    found: dict[int, LogEntry] = {}
+    entries = entries_of_kinds(session, ("freeze", "dataset_deleted"))
+    for entry in shown_entries(session, entries):
+        if entry.kind == "freeze":
+            found[entry.body["version"]] = entry
+        else:
+            found = {key: at for key, at in found.items() if at.dataset_id != entry.dataset_id}
+    return found
+
+
+def _matches_log(row: Any, entry: LogEntry | None) -> bool:
+    if entry is None:
+        return False
+    logged = (
+        entry.dataset_id,
+        entry.body.get("name"),
+        entry.body.get("hash"),
+        entry.at,
+        entry.actor,
+    )
+    return logged == (row.dataset_id, row.name, row.hash, row.created, row.actor)
+
+
+def _fault_of_version(session: Session, row: Any) -> str | None:
+    """What in a version does not follow from its groups; None: all of it does."""
+    rows = [item._mapping for item in annotation_rows(session, row.id)]
+    try:
+        with as_written():
+            counts, policy = parse(row.counts), policy_from_json(parse(row.policy))
+            members = sum(item["member"] for item in rows)
+            left_out = sum(counts["left_out"].values())
+            tracks = parse(row.tracks) if row.tracks else {}
+            found = version_hash(policy, row.solver_version, rows, tracks)
+    except StorageError:
+        return "it cannot be read"
+    if (members, len(rows) - members) != (counts["groups"], left_out):
+        return f"{len(rows):,} groups of {counts['groups'] + left_out:,} are there"
+    if found != row.hash or policy.hash != row.policy_hash:
+        return "its hash does not follow from its groups"
+    lost = set(tracks.values()) - known_frozen(session, row.dataset_id, tracks.values())
+    if lost:
+        return f"{len(lost):,} of its tracks are missing"
+    without = members_without_content(session, row.id)
+    return f"frozen content is missing, of {without[0]} first" if without else None
+
+
+def _check_frozen_contents(session: Session) -> tuple[int, list[str]]:
+    """How many frozen contents there are, and which of them are damaged or missing."""
+    count, apart = 0, lost_calibrations(session)
+    for rows in frozen_batches(session):
+        count += len(rows)
+        named: dict[int, set[str]] = {}
+        for row in rows:
+            try:
+                named.setdefault(row.dataset_id, set()).update(_referenced_keys(row.key, row.body))
+            except StorageError:
+                apart.append(row.key)
+        for dataset_id, keys in named.items():
+            apart += sorted(keys - known_frozen(session, dataset_id, keys))
+    return count, list(dict.fromkeys(apart))
+
+
+def _referenced_keys(key: str, body: bytes | None) -> set[str]:
+    """Keys of what a content names.
+
+    Raises:
+        DamagedError: The content is not what its key says.
+    """
+    if body is None:
+        return set()
+    with as_written():
+        if not key.startswith((SAID, SOLUTION)):
+            unpack(body)
+        if fitting_key(key, body) != key:
+            raise ValueError(f"{key} is the key of other content")
+        if key.startswith(SAID):
+            return named_texts(read_json(body))
+        return calibration_names(read_json(body)) if key.startswith(SOLUTION) else set()

@@ -7,13 +7,16 @@ from datetime import UTC, datetime
 from urllib.parse import urlsplit
 
 from app.config import Settings, is_local
+from app.db.json_columns import parse
 from app.db.session import now, text_of
 from app.db.store import Store
 from app.errors import InputError
 from app.features.audit.audit_events import add_audit_event
-from app.features.maintenance.queries import find_banner, put_banner
-from app.finite import Moment
+from app.features.people.queries import read_team_setting, write_team_setting
+from app.finite import Moment, json_text
 
+_BANNER = "maintenance"
+"""Name of the setting."""
 LONGEST = 300
 """Characters of a notice."""
 
@@ -35,8 +38,8 @@ class Banner:
 def read_banner(store: Store) -> Banner | None:
     """The notice that is or will be shown; None: there is none, or its time is over."""
     with store.read() as session:
-        found = find_banner(session)
-    banner = None if found is None else Banner(**found)
+        found = read_team_setting(session, _BANNER)
+    banner = None if found is None else Banner(**parse(found))
     return None if banner is None or (banner.until or "~") <= now() else banner
 
 
@@ -65,7 +68,7 @@ def set_banner(
     begin, end = (None if time is None else text_of(time) for time in (starts, until))
     banner = Banner(text, begin, end)
     with store.write() as session:
-        put_banner(session, asdict(banner))
+        write_team_setting(session, _BANNER, json_text(asdict(banner)))
         add_audit_event(session, actor, "maintenance notice set", None, text=text)
     return banner
 
@@ -73,9 +76,9 @@ def set_banner(
 def clear_banner(store: Store, *, actor: str) -> bool:
     """Take the notice away; whether there was one."""
     with store.write() as session:
-        if find_banner(session) is None:
+        if read_team_setting(session, _BANNER) is None:
             return False
-        put_banner(session, None)
+        write_team_setting(session, _BANNER, None)
         add_audit_event(session, actor, "maintenance notice cleared", None)
         return True
 

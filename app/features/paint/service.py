@@ -264,18 +264,13 @@ def _make_tasks(
     """What is to be read for each group; groups without a view that takes paint have none."""
     with store.read() as session:
         stored = read_groups(session, ids)
-        clicks = replace(
-            dataset.policy, calibration=_policy_without_paint(dataset.policy.calibration)
-        )
+        of_lines = replace(dataset.policy.calibration, source="lines")
+        clicks = replace(dataset.policy, calibration=of_lines)
         known = known_calibrations(session, [item.group for item in stored.values()], clicks)
     return {
         number: list(_group_tasks(item, dataset.policy.calibration, known))
         for number, item in stored.items()
     }
-
-
-def _policy_without_paint(policy: CalibrationPolicy) -> CalibrationPolicy:
-    return replace(policy, source="lines")
 
 
 def _group_tasks(

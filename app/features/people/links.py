@@ -71,13 +71,13 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
         )
     if password.casefold() == name.casefold():
         raise InputError("a password must differ from the name", pointer=pointer)
-    if _with_hashing_turn(lambda: _is_easy_to_guess(password, name)):
+    if _hash_in_turn(lambda: _is_easy_to_guess(password, name)):
         raise InputError(
             "this password is easy to guess: it is common, or repeats a few parts",
             hint="Three or four unrelated words are easy to remember.",
             pointer=pointer,
         )
-    return _with_hashing_turn(lambda: HASHER.hash(password))
+    return _hash_in_turn(lambda: HASHER.hash(password))
 
 
 def _is_easy_to_guess(password: str, name: str) -> bool:
@@ -91,9 +91,7 @@ def _is_easy_to_guess(password: str, name: str) -> bool:
 
 def is_password(password: str, known: str | None) -> bool:
     """Whether a password belongs to a hash; without one it takes as long, and is not."""
-    fits = _with_hashing_turn(
-        lambda: HASHER.verify(password[:LONGEST], known or _placeholder_hash())
-    )
+    fits = _hash_in_turn(lambda: HASHER.verify(password[:LONGEST], known or _placeholder_hash()))
     return fits and known is not None and len(password) <= LONGEST
 
 
@@ -103,7 +101,7 @@ def _placeholder_hash() -> str:
     return HASHER.hash("a placeholder password, as long as others")
 
 
-def _with_hashing_turn(work: Callable[[], T]) -> T:
+def _hash_in_turn(work: Callable[[], T]) -> T:
     if not _turns.acquire(timeout=PATIENCE):
         raise OverloadedError(
             "too many people are logging in at this moment", hint="Try again in a while."

@@ -377,15 +377,24 @@ def delete_second_factor(session: Session, person_id: int) -> bool:
 
 def is_required(session: Session) -> bool:
     """Whether everybody needs a second factor."""
-    found = session.scalar(select(TeamSettingModel.value).where(TeamSettingModel.name == REQUIRED))
-    return found == "on"
+    return read_team_setting(session, REQUIRED) == "on"
 
 
 def set_required(session: Session, on: bool) -> None:
     """Let everybody need one, or not."""
-    session.execute(delete(TeamSettingModel).where(TeamSettingModel.name == REQUIRED))
-    values = {"name": REQUIRED, "value": "on" if on else "off"}
-    session.execute(insert(TeamSettingModel), values)
+    write_team_setting(session, REQUIRED, "on" if on else "off")
+
+
+def read_team_setting(session: Session, name: str) -> str | None:
+    """A setting that an admin made for everybody; None: nobody did."""
+    return session.scalar(select(TeamSettingModel.value).where(TeamSettingModel.name == name))
+
+
+def write_team_setting(session: Session, name: str, value: str | None) -> None:
+    """Make a setting for everybody; None takes it away."""
+    session.execute(delete(TeamSettingModel).where(TeamSettingModel.name == name))
+    if value is not None:
+        session.execute(insert(TeamSettingModel), {"name": name, "value": value})
 
 
 def has_second_factor(session: Session, person_id: int) -> bool:

@@ -141,7 +141,7 @@ def read_noise(store: Store, dataset: str | int) -> Noise:
     )
     with store.read() as session:
         used = read_factors(session, state.dataset_id)
-    advice = _advice_of(noise, state.policy)
+    advice = _make_advice(noise, state.policy)
     return Noise(
         dataset_id=state.dataset_id,
         dataset=state.dataset,
@@ -184,7 +184,7 @@ def follow_noise(store: Store, dataset: str | int, actor: str) -> bool:
     """
     state = read_policy(store, dataset)
     noise = _estimate_noise(store, _solved_group_ids(store, state.dataset_id), state.policy)[2]
-    advice = _advice_of(noise, state.policy)
+    advice = _make_advice(noise, state.policy)
     if not any(item.moved for item in advice):
         return False
     values = {item.name: item.estimate for item in advice}
@@ -254,7 +254,7 @@ def _groups_with_ball_actors(
         yield from ((state, placed.get(state.id, {})) for state in states)
 
 
-def _sources_of(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[BallSource]]:
+def _noise_sources(state: GroupState, placed: Mapping[str, str]) -> dict[str, list[BallSource]]:
     """The static camera of each view, and who placed its ball, by the view's key."""
     found: dict[str, list[BallSource]] = {}
     for view in state.group.views:
@@ -306,21 +306,21 @@ def _estimate_noise(
     for state, placed in _groups_with_ball_actors(store, noise_sample(ids)):
         if state.solution is not None:
             seen.append(NoiseGroup.of(state.group, state.solution, state.policy))
-            sources.append(_sources_of(state, placed))
+            sources.append(_noise_sources(state, placed))
     return len(seen), sources, estimate_noise(seen, policy)
 
 
-def _advice_of(noise: DatasetNoise, policy: Policy) -> tuple[Advice, ...]:
+def _make_advice(noise: DatasetNoise, policy: Policy) -> tuple[Advice, ...]:
     return (*_ball_advice(noise.ball, policy), *_line_advice(noise.lines, policy))
 
 
 def _ball_advice(ball: BallNoise, policy: Policy) -> Iterator[Advice]:
     if ball.click is not None:
-        yield _threshold_advice("click_sigma_px", _interval_of(ball.click), policy)
+        yield _threshold_advice("click_sigma_px", _make_interval(ball.click), policy)
     if ball.share is not None and ball.share_interval is not None:
         yield _threshold_advice("box_sigma_share", (ball.share, *ball.share_interval), policy)
     if ball.given is not None:
-        yield _threshold_advice("given_sigma_px", _interval_of(ball.given), policy)
+        yield _threshold_advice("given_sigma_px", _make_interval(ball.given), policy)
 
 
 def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]:
@@ -330,7 +330,7 @@ def _line_advice(found: LineEstimate | None, policy: Policy) -> Iterator[Advice]
             yield _threshold_advice(f"{CALIBRATION}.{name}", ends, policy)
 
 
-def _interval_of(sigma: Sigma) -> tuple[float, float, float]:
+def _make_interval(sigma: Sigma) -> tuple[float, float, float]:
     return sigma.value, sigma.low, sigma.high
 
 

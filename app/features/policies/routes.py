@@ -61,14 +61,14 @@ def list_policies() -> PolicyCatalogue:
 def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
     """What judges the dataset, and what judged it before."""
     policy = PolicyStateDocument.of(read_policy(store, dataset))
-    response.headers.update(_tagged(policy))
+    response.headers.update(_tagged_response(policy))
     return policy
 
 
-def _judged(judged: PolicyJob) -> Response:
+def _judged_response(judged: PolicyJob) -> Response:
     policy, job = PolicyStateDocument.of(judged.state), JobDocument.model_validate(judged.job)
     job.result = {"policy": policy.model_dump(mode="json"), "to_solve": judged.to_solve}
-    return document(job, 202, {**_tagged(policy), **job_address(judged.job)})
+    return document(job, 202, {**_tagged_response(policy), **job_address(judged.job)})
 
 
 @router.put(
@@ -79,7 +79,7 @@ def _judged(judged: PolicyJob) -> Response:
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-@responds(_judged)
+@responds(_judged_response)
 def put_policy(
     dataset: DatasetPath,
     change: PolicyChange,
@@ -127,5 +127,5 @@ def wanted(change: PolicyChange, present: Policy) -> Policy:
     return policy_with(present, change.values or {}, name=name, pointer="/values")
 
 
-def _tagged(policy: PolicyStateDocument) -> dict[str, str]:
+def _tagged_response(policy: PolicyStateDocument) -> dict[str, str]:
     return {"ETag": policy.etag, "Cache-Control": "private, no-cache"}

@@ -145,7 +145,7 @@ def policy_from_yaml(text: str) -> Policy:
         value = yaml.load(text, _PlainLoader)
     except (yaml.YAMLError, ValueError) as error:
         # ValueError: a scalar that looks like a date and is none.
-        raise InputError(f"this is not a policy in YAML: {_place(error)}") from error
+        raise InputError(f"this is not a policy in YAML: {_describe_yaml_error(error)}") from error
     except RecursionError as error:
         raise InputError("this is not a policy in YAML: it is nested too deeply") from error
     if not isinstance(value, dict):
@@ -167,11 +167,11 @@ def unknown_policy(name: str, otherwise: str, *, pointer: str | None = None) -> 
 
 def policy_to_yaml(policy: Policy) -> str:
     """A policy as YAML with every threshold, each with a comment that says what it is."""
-    lines = [f"name: {_scalar(policy.name)}", ""]
+    lines = [f"name: {_yaml_scalar(policy.name)}", ""]
     inner = [""]
     for threshold in THRESHOLDS:
         name = threshold.name.removeprefix(f"{CALIBRATION}.")
-        line = f"{name}: {_scalar(threshold.value(policy))}"
+        line = f"{name}: {_yaml_scalar(threshold.value(policy))}"
         if name == threshold.name:
             lines.append(f"{line:30}  # {threshold.text}")
         else:
@@ -203,10 +203,12 @@ def policy_with(
     Raises:
         InputError: Unknown or impossible.
     """
-    flat = dict(_flat(values, pointer))
+    flat = dict(_flatten_values(values, pointer))
     for key, value in flat.items():
-        flat[key] = _checked(_BY_NAME[key], value, pointer)
-    if "noise" not in flat and any(flat.get(key, there) != there for key, there in _sigmas(policy)):
+        flat[key] = _check_threshold(_BY_NAME[key], value, pointer)
+    if "noise" not in flat and any(
+        flat.get(key, there) != there for key, there in _noise_by_name(policy)
+    ):
         # Who says a number means it: no estimate takes its place.
         flat["noise"] = FIXED
     inner = {key.partition(".")[2]: flat.pop(key) for key in list(flat) if "." in key}
@@ -217,20 +219,20 @@ def policy_with(
     return changed
 
 
-def _sigmas(policy: Policy) -> Iterator[tuple[str, float | None]]:
+def _noise_by_name(policy: Policy) -> Iterator[tuple[str, float | None]]:
     """The noise of a policy by name."""
     for name in (*SIGMAS, *(f"{CALIBRATION}.{name}" for name in LINE_SIGMAS)):
         yield name, _BY_NAME[name].value(policy)
 
 
-def _flat(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[str, Any]]:
+def _flatten_values(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[str, Any]]:
     for key, value in values.items():
         if key == CALIBRATION:
             if not isinstance(value, dict):
                 raise InputError(
                     f"{CALIBRATION} is a mapping of thresholds", pointer=f"{pointer}/{CALIBRATION}"
                 )
-            yield from _flat(
+            yield from _flatten_values(
                 {f"{CALIBRATION}.{inner}": item for inner, item in value.items()}, pointer
             )
         elif key not in _BY_NAME:
@@ -244,7 +246,9 @@ def _flat(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[str, Any]]:
             yield key, value
 
 
-def _checked(threshold: Threshold, value: object, pointer: str) -> float | bool | str | None:
+def _check_threshold(
+    threshold: Threshold, value: object, pointer: str
+) -> float | bool | str | None:
     name, place = threshold.name, f"{pointer}/{threshold.name.replace('.', '/')}"
     if isinstance(threshold.default, bool):
         if not isinstance(value, bool):
@@ -286,13 +290,13 @@ def _require_honest(policy: Policy) -> None:
         )
 
 
-def _scalar(value: object) -> str:
+def _yaml_scalar(value: object) -> str:
     """A value as YAML; names are quoted where YAML would read something else."""
     text: str = yaml.safe_dump(value, allow_unicode=True, width=1000)
     return text.removesuffix("\n").removesuffix("...").strip()
 
 
-def _place(error: Exception) -> str:
+def _describe_yaml_error(error: Exception) -> str:
     mark = getattr(error, "problem_mark", None)
     problem = str(getattr(error, "problem", None) or "it cannot be read")
     return problem if mark is None else f"line {mark.line + 1}: {problem}"

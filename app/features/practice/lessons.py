@@ -144,8 +144,8 @@ def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feed
     if verdict.state == "deferred":
         return words.say(ALMOST, "You put this group off. That is fine when you are not sure.")
     if verdict.state == "accepted":
-        return _accepted(truth, group, words)
-    return _rejected(truth, verdict.reason, words)
+        return _judge_accepted(truth, group, words)
+    return _judge_rejected(truth, verdict.reason, words)
 
 
 def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
@@ -155,7 +155,7 @@ def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
     if _is_corrected(truth, group):
         return Feedback(MENDED, f"Right: {words.done} Press A to accept the group.")
     if _views_turned(truth, group):
-        letter = view_letter(_place(group, _views_turned(truth, group)[0]))
+        letter = view_letter(_view_index(group, _views_turned(truth, group)[0]))
         return Feedback(
             OPEN,
             f"Look again: view {letter} was labelled rightly, and now its sides are exchanged. "
@@ -164,7 +164,7 @@ def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
     return Feedback(OPEN)
 
 
-def _accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
+def _judge_accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
     kind = lesson_kind(truth)
     if kind == CLEAN:
         if _is_sound(truth, group):
@@ -181,7 +181,7 @@ def _accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Feedback:
     return words.say(WRONG, "The group was accepted with its fault.")
 
 
-def _rejected(truth: SceneTruth, reason: str | None, words: _LessonTexts) -> Feedback:
+def _judge_rejected(truth: SceneTruth, reason: str | None, words: _LessonTexts) -> Feedback:
     kind = lesson_kind(truth)
     if kind == CLEAN:
         return words.say(WRONG, "A good group was lost.")
@@ -197,7 +197,7 @@ class _LessonTexts:
 
     def __init__(self, truth: SceneTruth, group: Group):
         self._words = WORDS[lesson_kind(truth)]
-        self._values = _values(truth.faults, group)
+        self._values = _fault_values(truth.faults, group)
 
     @property
     def done(self) -> str:
@@ -222,12 +222,12 @@ _PLAIN = ("You ", "The ", "It ", "A ", "Leaving ", "Nothing ")
 """Beginnings that are written small behind a colon."""
 
 
-def _values(faults: Sequence[PlantedFault], group: Group) -> dict[str, object]:
+def _fault_values(faults: Sequence[PlantedFault], group: Group) -> dict[str, object]:
     if not faults:
         return {}
     first = faults[0]
     return {
-        "view": view_letter(_place(group, first.view)),
+        "view": view_letter(_view_index(group, first.view)),
         "marking": first.marking,
         "true_marking": first.true_marking,
         "amount": first.amount or 0.0,
@@ -235,7 +235,7 @@ def _values(faults: Sequence[PlantedFault], group: Group) -> dict[str, object]:
     }
 
 
-def _place(group: Group, view: str) -> int:
+def _view_index(group: Group, view: str) -> int:
     return [item.key for item in group.views].index(view)
 
 

@@ -110,22 +110,22 @@ def make_recording_practice(
     film = settings.home / FILM
     with practice_lock(settings, lambda: progress(0, 1, "Somebody else makes it.")):
         require_own_recording(store, person)
-        there = _recording(store, person)
-        if there is not None and not again and _truth(settings) and there.problem is None:
+        there = _find_recording(store, person)
+        if there is not None and not again and _read_truth(settings) and there.problem is None:
             return {"dataset": name, "recording": there.id, "made": False}
-        if _truth(settings) is None or not film.is_file():
+        if _read_truth(settings) is None or not film.is_file():
             film.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             drawing = partial_progress(progress, "Drawing the film.")
             in_worker(film, draw_film, PARTS, progress=drawing, stop=stop)
         if there is not None:
             delete_dataset(store, name, confirm=name, actor=actor)
-        _open(store, person, actor)
+        _open_dataset(store, person, actor)
         recording = add_recording(store, name, film.absolute(), actor=actor)
         reading = partial_progress(progress, "Finding its shots.")
         recording = index_now(store, recording.id, progress=reading, stop=stop)
-        truth = _truth(settings)
+        truth = _read_truth(settings)
         assert truth is not None
-        _plant(store, recording, truth, progress, actor, stop)
+        _plant_faults(store, recording, truth, progress, actor, stop)
     return {"dataset": name, "recording": recording.id, "made": True}
 
 
@@ -144,7 +144,7 @@ def draw_film(path: Path, parts: Sequence[Sequence[Any]], send: Send) -> None:
     )
 
 
-def _plant(
+def _plant_faults(
     store: Store,
     recording: Recording,
     truth: FilmTruth,
@@ -187,7 +187,7 @@ def _plant(
     put_shots(store, recording.id, planted, None, actor=actor)
 
 
-def _open(store: Store, person: str | None, actor: str) -> None:
+def _open_dataset(store: Store, person: str | None, actor: str) -> None:
     """Make the practice dataset, empty, where it is missing; a person leads in their own."""
     with store.write() as session:
         name = recording_practice_name(person)
@@ -204,8 +204,8 @@ def read_recording_practice(
     store: Store, settings: Settings, visibility: Visibility = EVERYTHING, person: str | None = None
 ) -> RecordingPractice:
     """What is right of the practice recording; no lessons where it is not made yet, or not seen."""
-    name, truth = recording_practice_name(person), _truth(settings)
-    recording = _recording(store, person)
+    name, truth = recording_practice_name(person), _read_truth(settings)
+    recording = _find_recording(store, person)
     if recording is None or truth is None or not recording.indexed:
         return RecordingPractice(name, None, ())
     if not visibility.sees(recording.dataset_id):
@@ -220,7 +220,7 @@ def read_recording_practice(
     return RecordingPractice(name, recording.id, lessons)
 
 
-def _recording(store: Store, person: str | None) -> Recording | None:
+def _find_recording(store: Store, person: str | None) -> Recording | None:
     """The practice recording of a person, if it is there."""
     with store.read() as session:
         row = find_dataset(session, recording_practice_name(person))
@@ -245,22 +245,22 @@ def require_own_recording(store: Store, person: str | None) -> None:
     if row is None:
         return
     is_empty = not groups and not list_recordings(store, int(row.id))
-    if _is_ordinary(row, person) or not (is_empty or _recording(store, person)):
+    if _is_ordinary(row, person) or not (is_empty or _find_recording(store, person)):
         raise ConflictError(
             f'there is a dataset "{name}" of your own',
             hint="The practice needs that name. Rename or delete your dataset first.",
         )
 
 
-def _truth(settings: Settings) -> FilmTruth | None:
+def _read_truth(settings: Settings) -> FilmTruth | None:
     """What is true of the film; None where it is not drawn."""
     file = (settings.home / FILM).with_suffix(".json")
     try:
-        return _read(file, file.stat().st_mtime_ns)
+        return _read_file(file, file.stat().st_mtime_ns)
     except FileNotFoundError:
         return None
 
 
 @lru_cache(maxsize=4)
-def _read(file: Path, _changed: int) -> FilmTruth:
+def _read_file(file: Path, _changed: int) -> FilmTruth:
     return FilmTruth.of(json.loads(file.read_text(encoding="utf-8")))

@@ -203,8 +203,8 @@ def judge_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Recording
 def judge_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingLesson:
     """How far the times of the replay are from the truth."""
     live, replay = truth.shots[truth.live], truth.shots[truth.replay]
-    mine = [one for one in links if _meets(one.replay.frames, replay)]
-    fitting = [one for one in mine if _meets(one.live.frames, live)]
+    mine = [one for one in links if _overlaps_shot(one.replay.frames, replay)]
+    fitting = [one for one in mine if _overlaps_shot(one.live.frames, live)]
     known = next((one for one in fitting if one.map.is_usable), None)
     state: State = "open"
     off = None
@@ -243,7 +243,7 @@ def judge_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingLesson:
     )
 
 
-def _meets(frames: range, shot: Shot) -> bool:
+def _overlaps_shot(frames: range, shot: Shot) -> bool:
     """Whether most of a shot's frames are among some."""
     both = min(frames[-1], shot.last) - max(frames[0], shot.first) + 1
     return both > (shot.last - shot.first + 1) / 2

@@ -100,13 +100,13 @@ class RecordingPracticeDocument(Document):
     lessons: list[RecordingLessonDocument]
 
 
-async def _person(request: Request) -> str | None:
+async def _practice_person(request: Request) -> str | None:
     """Whose practice it is; None where nobody logs in."""
     login = current_login(request.scope)
     return None if login is None else login.name
 
 
-Person = Annotated[str | None, Depends(_person)]
+Person = Annotated[str | None, Depends(_practice_person)]
 
 
 @router.get(

@@ -169,11 +169,11 @@ def make_practice_dataset(
         ids = _group_ids(store, name)
         if len(ids) == len(LESSONS) and not again and _is_drawn(settings):
             return {"dataset": name, "groups": len(ids), "first": ids[0], "made": False}
-        ids = _made(store, settings, progress, again and bool(ids), actor, person)
+        ids = _make_lessons(store, settings, progress, again and bool(ids), actor, person)
     return {"dataset": name, "groups": len(ids), "first": ids[0], "made": True}
 
 
-def _made(
+def _make_lessons(
     store: Store,
     settings: Settings,
     progress: ReportProgress,
@@ -189,7 +189,7 @@ def _made(
         afresh = PAPER if person is None else None
         delete_dataset(store, name, confirm=name, actor=actor, afresh=afresh)
     if person is not None:
-        _open_for(store, person, actor)
+        _open_dataset(store, person, actor)
     progress(0, 1, "Reading the groups.")
     source = Source("soccernet-v3", folder.resolve(), name="the practice groups")
     import_source(store, name, source, settings, None, actor=actor)
@@ -197,7 +197,7 @@ def _made(
     return _group_ids(store, name)
 
 
-def _open_for(store: Store, person: str, actor: str) -> None:
+def _open_dataset(store: Store, person: str, actor: str) -> None:
     """Make a person's practice dataset, empty, where it is missing: they judge in it."""
     with store.write() as session:
         row = person_by_name(session, person)
@@ -213,7 +213,7 @@ def read_practice(
     store: Store, settings: Settings, visibility: Visibility = EVERYTHING, person: str | None = None
 ) -> Practice:
     """Every lesson with what has come of it; none where the dataset is not made yet, or not seen."""
-    truths, name = _truths(settings), practice_name(person)
+    truths, name = _read_truths(settings), practice_name(person)
     with store.read() as session:
         row = find_dataset(session, name)
         # An ordinary dataset that is called so is nobody's practice.
@@ -221,7 +221,9 @@ def read_practice(
             return Practice(name, ())
         states = read_states(session, _group_ids(store, name))
     lessons = [
-        _lesson(state, truths) for state in states if truths is not None and state.key in truths
+        _make_lesson(state, truths)
+        for state in states
+        if truths is not None and state.key in truths
     ]
     return Practice(name, tuple(sorted(lessons, key=lambda lesson: lesson.number)))
 
@@ -232,14 +234,14 @@ def read_lesson(settings: Settings, state: GroupState) -> PracticeLesson:
     Raises:
         NotFoundError: The group is no lesson.
     """
-    truths = _truths(settings)
+    truths = _read_truths(settings)
     practised = state.dataset == DATASET or state.dataset.startswith(f"{DATASET} ")
     if not practised or truths is None or state.key not in truths:
         raise NotFoundError(f"group {state.id} is not a practice group")
-    return _lesson(state, truths)
+    return _make_lesson(state, truths)
 
 
-def _lesson(state: GroupState, truths: dict[str, SceneTruth]) -> PracticeLesson:
+def _make_lesson(state: GroupState, truths: dict[str, SceneTruth]) -> PracticeLesson:
     truth = truths[state.key]
     words = WORDS[lesson_kind(truth)]
     return PracticeLesson(
@@ -280,7 +282,7 @@ def _require_own(store: Store, settings: Settings, person: str | None) -> None:
                 hint="Your practice needs that name. Ask an admin to rename or delete the dataset.",
             )
         keys = {group.key for group in known_groups(session, row.id)}
-    known = _truths(settings)
+    known = _read_truths(settings)
     if keys and not keys <= set(known or ()):
         raise ConflictError(
             f'there is a dataset "{name}" with groups of your own',
@@ -290,24 +292,24 @@ def _require_own(store: Store, settings: Settings, person: str | None) -> None:
 
 def _is_drawn(settings: Settings) -> bool:
     """Whether labels, truth and frames of all lessons are there."""
-    truths = _truths(settings)
+    truths = _read_truths(settings)
     if truths is None or len(truths) != len(LESSONS):
         return False
     archives = {settings.home / DATASET / Path(key).parent / ARCHIVE for key in truths}
     return all(archive.is_file() and zipfile.is_zipfile(archive) for archive in archives)
 
 
-def _truths(settings: Settings) -> dict[str, SceneTruth] | None:
+def _read_truths(settings: Settings) -> dict[str, SceneTruth] | None:
     """The truth of every lesson by the key of its group, in order; None where none is written."""
     file = settings.home / DATASET / TRUTH
     try:
-        return _read(file, file.stat().st_mtime_ns)
+        return _read_file(file, file.stat().st_mtime_ns)
     except FileNotFoundError:
         return None
 
 
 @lru_cache(maxsize=4)
-def _read(file: Path, _changed: int) -> dict[str, SceneTruth]:
+def _read_file(file: Path, _changed: int) -> dict[str, SceneTruth]:
     return read_truth(file)
 
 
@@ -363,7 +365,7 @@ def make_sample_dataset(
     Raises:
         InputError: As ``write_sample`` and ``import_source`` say.
     """
-    found = _present(store, name)
+    found = _find_sample_dataset(store, name)
     if found.is_complete:
         return found
     drawing = partial_progress(progress, "Drawing the pictures.")
@@ -373,10 +375,10 @@ def make_sample_dataset(
     import_source(store, name, source, store.settings, reading, actor=actor)
     with pool() as executor:
         solve_dataset(store, name, executor, partial_progress(progress, "Solving the groups."))
-    found = _present(store, name)
+    found = _find_sample_dataset(store, name)
     return SampleDataset(found.dataset, found.groups, found.solved, written)
 
 
-def _present(store: Store, name: str) -> SampleDataset:
+def _find_sample_dataset(store: Store, name: str) -> SampleDataset:
     found = next((item for item in list_datasets(store) if item.name == name), None)
     return SampleDataset(name, *((found.groups, found.solved) if found else (0, 0)))

@@ -121,12 +121,12 @@ def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> Acc
         if predictions.dataset_id != found.id:
             raise NotFoundError(f"dataset {found.name} has no set of predictions {request.set_id}")
         boxes = read_boxes(session, request.set_id)
-        rows = [row for row in _views(session, found.id, request) if row.id in boxes]
+        rows = [row for row in _read_views(session, found.id, request) if row.id in boxes]
     wanted = set(request.views or ())
     missing = wanted - {row.id for row in rows}
     if missing:
         raise NotFoundError(f"the set has no prediction for view {min(missing)}")
-    judged = [_judge(row, boxes[row.id], predictions.name, request) for row in rows]
+    judged = [_judge_box(row, boxes[row.id], predictions.name, request) for row in rows]
     return AcceptPlan(
         predictions,
         tuple(item for item in judged if item.why is None),
@@ -167,7 +167,7 @@ def accept_predicted_balls(
         for item in items:
             if item is groups[-1][1][-1]:
                 done = AcceptReport(views + 1, len(changed | {group_id}), dict(refused))
-            why = _accept(store, item, plan.predictions.name, request, actor, done)
+            why = _accept_edit(store, item, plan.predictions.name, request, actor, done)
             if why is None:
                 views += 1
                 changed.add(group_id)
@@ -214,7 +214,7 @@ def accept_box(
             # Whoever saw an older state is told so first.
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise NotFoundError(f"view {view_id} has no prediction {prediction_id}")
-        if problem := _problem(box, view):
+        if problem := _box_problem(box, view):
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise InputError(f"the prediction {problem}")
         name = read_set(session, box.set_id).name
@@ -245,12 +245,12 @@ def accepted_ball(box: PredictedBox, name: str) -> BallAnnotation:
     return BallAnnotation(box=place, predicted_by=name)
 
 
-def _views(session: Session, dataset_id: int, request: AcceptRequest) -> list[StoredView]:
+def _read_views(session: Session, dataset_id: int, request: AcceptRequest) -> list[StoredView]:
     conditions = () if request.query is None else parse_query(request.query).conditions
     return dataset_views(session, dataset_id, conditions, ids=request.views)
 
 
-def _judge(
+def _judge_box(
     row: StoredView, boxes: Sequence[PredictedBox], name: str, request: AcceptRequest
 ) -> Accepted:
     best = max(boxes, key=lambda box: (box.score, -box.id))
@@ -258,7 +258,7 @@ def _judge(
     why = None
     if best.score < request.min_score:
         why = "below_score"
-    elif _problem(best, row) is not None:
+    elif _box_problem(best, row) is not None:
         why = "not_a_ball"
     elif balls == [accepted_ball(best, name)]:
         why = "the_same"
@@ -267,7 +267,7 @@ def _judge(
     return Accepted(row.id, row.key, row.group_id, row.group, best, why)
 
 
-def _problem(box: PredictedBox, view: StoredView) -> str | None:
+def _box_problem(box: PredictedBox, view: StoredView) -> str | None:
     """Why a box cannot be a ball in its view."""
     place = Box(box.x, box.y, box.width, box.height)
     return box_problem(place, ImageSize(view.width, view.height))
@@ -280,7 +280,7 @@ def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]
     yield from groups.items()
 
 
-def _accept(
+def _accept_edit(
     store: Store,
     item: Accepted,
     name: str,
@@ -363,16 +363,16 @@ def group_predictions(store: Store, group_id: int) -> GroupPredictions:
         dataset = group_dataset(session, group_id)
         if dataset is None:
             raise NotFoundError.group(group_id)
-        boxes = _with_sets(session, read_group_boxes(session, group_id))
-        taken = list(_taken(session, group_id))
+        boxes = _pair_with_sets(session, read_group_boxes(session, group_id))
+        taken = list(_list_accepted_balls(session, group_id))
         entries = group_entries(session, group_id) if taken else []
         count = count_prediction_sets(session, dataset)
     return GroupPredictions(
-        count, boxes, tuple(_accepted(row, ball, boxes, entries) for row, ball in taken)
+        count, boxes, tuple(_make_accepted_ball(row, ball, boxes, entries) for row, ball in taken)
     )
 
 
-def _with_sets(
+def _pair_with_sets(
     session: Session, boxes: Sequence[PredictedBox]
 ) -> tuple[tuple[PredictionSet, PredictedBox], ...]:
     found = read_prediction_sets(session, {box.set_id for box in boxes})
@@ -380,12 +380,14 @@ def _with_sets(
     return tuple((sets[box.set_id], box) for box in boxes)
 
 
-def _taken(session: Session, group_id: int) -> Iterator[tuple[StoredView, BallAnnotation]]:
+def _list_accepted_balls(
+    session: Session, group_id: int
+) -> Iterator[tuple[StoredView, BallAnnotation]]:
     for view in group_views(session, group_id):
         yield from ((view, ball) for ball in view.balls if ball.predicted_by)
 
 
-def _accepted(
+def _make_accepted_ball(
     row: StoredView,
     ball: BallAnnotation,
     boxes: Iterable[tuple[PredictionSet, PredictedBox]],

@@ -1,16 +1,20 @@
-"""Commands on predictions: predictions, accept, detect."""
+"""Commands on predictions: predictions, accept, detect, evaluate."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.plural import plural
-from app.terminal.options import Dataset, Json, Workers, current_actor, read_settings
-from app.terminal.server import opened_store
+from app.progress import ReportProgress
+from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
+from app.soccer.frames import ImageSize
+from app.terminal.options import Dataset, Json, Workers, current_actor, parse_size, read_settings
+from app.terminal.server import ServerPlace, connect_to_server, current_server, opened_store
 from app.terminal.terminal import (
     print_error,
     print_json,
@@ -20,11 +24,98 @@ from app.terminal.terminal import (
     show_progress,
 )
 
+if TYPE_CHECKING:
+    from app.evaluation.result import Cell, Table
+    from app.features.predictions.sources import SourcesRequest
+
+
 commands = typer.Typer()
 
 Query = Annotated[
     str, typer.Option("--query", help="Which groups, in the query language of the queue.")
 ]
+
+
+BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
+CAREFUL, TRUTH, RESULT = "Reference boxes", "The truth", "The result"
+Predictions = Annotated[
+    Path | None,
+    typer.Argument(
+        help="File, folder or zip of ball boxes, or of tracks (ball.csv, events.csv), or the name of a set."
+    ),
+]
+Format = Annotated[
+    AnyPredictionFormat,
+    typer.Option("--format", rich_help_panel=BALLS, help="auto goes by the files' endings."),
+]
+Images = Annotated[
+    Path | None,
+    typer.Option(
+        exists=True,
+        rich_help_panel=BALLS,
+        help="COCO: the document that image numbers refer to.",
+    ),
+]
+Category = Annotated[
+    int | None,
+    typer.Option(
+        min=0, rich_help_panel=BALLS, help="The class that is the ball, where there are several."
+    ),
+]
+MinScore = Annotated[
+    float,
+    typer.Option(
+        min=0,
+        max=1,
+        rich_help_panel=BALLS,
+        help="Detections with a lower score take no part in localisation.",
+    ),
+]
+Cameras = Annotated[
+    Path | None,
+    typer.Option(
+        exists=True, rich_help_panel=CAMERAS, help="Folder or zip of SoccerNet camera JSON."
+    ),
+]
+Careful = Annotated[
+    Path | None,
+    typer.Option(
+        rich_help_panel=CAREFUL,
+        help="Reference boxes, one a frame, which the dataset's are measured with: a file, folder or "
+        "zip, or the name of a set. Only the --careful options apply to them.",
+    ),
+]
+CarefulFormat = Annotated[
+    AnyPredictionFormat,
+    typer.Option(rich_help_panel=CAREFUL, help="As --format, of the reference boxes."),
+]
+CarefulCategory = Annotated[
+    int | None,
+    typer.Option(min=0, rich_help_panel=CAREFUL, help="As --category, of the reference boxes."),
+]
+Version = Annotated[
+    str | None,
+    typer.Option(
+        rich_help_panel=TRUTH,
+        help="Name, id or hash of a frozen version; default: the dataset as it is now.",
+    ),
+]
+Groups = Annotated[
+    LiveRule,
+    typer.Option(rich_help_panel=TRUTH, help="Without a version: which groups take part."),
+]
+SplitName = Annotated[
+    str | None, typer.Option("--split", rich_help_panel=TRUTH, help="Frames of this split alone.")
+]
+Boxes = Annotated[
+    BoxKind, typer.Option(rich_help_panel=TRUTH, help="Which box of the dataset is the truth.")
+]
+Name = Annotated[str, typer.Option(rich_help_panel=RESULT, help="Name of the evaluation.")]
+Out = Annotated[
+    Path | None,
+    typer.Option(rich_help_panel=RESULT, help="Folder for tables and figures (CSV, JSON, PNG)."),
+]
+_Values = dict[str, Any]
 
 
 @commands.command("predictions")
@@ -153,3 +244,152 @@ def _print_problems(report: Mapping[str, Any]) -> None:
     rest = len(problems) - 5 + report["more_problems"]
     if rest > 0:
         print_error(f"  and {rest} more problems")
+
+
+def _size_option(panel: str, text: str, *names: str) -> Any:
+    """An option that is the size of images."""
+    return typer.Option(*names, parser=parse_size, metavar="WxH", rich_help_panel=panel, help=text)
+
+
+PixelSize = Annotated[
+    ImageSize | None,
+    _size_option(BALLS, "Size of the images that boxes in pixels refer to.", "--size"),
+]
+CamerasSize = Annotated[
+    ImageSize | None,
+    _size_option(CAMERAS, "Size of the images of these cameras."),
+]
+CarefulSize = Annotated[
+    ImageSize | None,
+    _size_option(CAREFUL, "As --size, of the reference boxes."),
+]
+
+
+@commands.command()
+def evaluate(
+    dataset: Dataset,
+    predictions: Predictions = None,
+    format_: Format = "auto",
+    images: Images = None,
+    category: Category = None,
+    size: PixelSize = None,
+    min_score: MinScore = 0.0,
+    cameras: Cameras = None,
+    cameras_size: CamerasSize = None,
+    careful: Careful = None,
+    careful_format: CarefulFormat = "auto",
+    careful_size: CarefulSize = None,
+    careful_category: CarefulCategory = None,
+    version: Version = None,
+    groups: Groups = "passing",
+    split: SplitName = None,
+    boxes: Boxes = "optimized",
+    name: Name = "",
+    out: Out = None,
+    json_: Json = False,
+) -> None:
+    """Measure predictions against a dataset: AP, MAE, P_2m, boxes, cameras, sensitivity; or tracks.
+
+    What was read is kept in the dataset as predictions, and the result as an evaluation.
+    """
+    if predictions is None and careful is None and cameras is None:
+        raise typer.BadParameter("name predictions, --cameras or --careful")
+    from app.features.predictions.evaluation_run import EvaluationRequest
+    from app.features.predictions.reader import PredictionFiles
+    from app.features.predictions.sources import SourcesRequest
+
+    request = SourcesRequest(
+        EvaluationRequest(name=name, groups=groups, split=split, boxes=boxes, min_score=min_score),
+        PredictionFiles(predictions, format_, images, cameras, category, size, cameras_size),
+        PredictionFiles(careful, careful_format, category=careful_category, size=careful_size),
+        version,
+    )
+    request.check()
+    server = current_server()
+    run = _evaluate_here if server is None else partial(_evaluate_at, server)
+    with show_progress("Evaluating") as progress:
+        values, sets = run(dataset, request, out, progress)
+    if json_:
+        print_json({**values, "sets": [_set_values(item) for item in sets]})
+        return
+    for item in sets:
+        print_set(item)
+    _print_evaluation(values)
+
+
+def _evaluate_here(
+    dataset: str, request: SourcesRequest, out: Path | None, progress: ReportProgress
+) -> tuple[_Values, list[_Values]]:
+    """The evaluation and the sets that were made or found for it, as plain values."""
+    from app.features.predictions.evaluation import evaluation_values, write_evaluation
+    from app.features.predictions.sources import evaluate_sources
+
+    with opened_store() as store:
+        done = evaluate_sources(store, dataset, request, actor=current_actor(), progress=progress)
+        if out is not None:
+            write_evaluation(store, done.evaluation, out)
+    return evaluation_values(done.evaluation), [vars(item) for item in done.sets]
+
+
+def _evaluate_at(
+    server: ServerPlace,
+    dataset: str,
+    request: SourcesRequest,
+    out: Path | None,
+    progress: ReportProgress,
+) -> tuple[_Values, list[_Values]]:
+    """As ``_evaluate_here``, by a server."""
+    from app.terminal import remote_files
+
+    with connect_to_server(server) as client:
+        values, sets = remote_files.evaluate(client, dataset, request, progress)
+        if out is not None:
+            remote_files.write_evaluation(client, values, out)
+    return values, sets
+
+
+def _print_evaluation(values: _Values) -> None:
+    from app.features.predictions.evaluation import read_tables
+
+    for table in read_tables(values["tables"]):
+        say("")
+        _print_table(table)
+    pins = values["pins"]
+    version = pins["version_name"] or f"the dataset as it is ({pins['state'][:12]})"
+    say("")
+    say(
+        f"evaluation {values['id']}: {version}, policy {pins['policy_hash']}, "
+        f"solver {pins['solver_version']}, software {pins['software_version']}"
+    )
+
+
+def _print_table(table: Table) -> None:
+    """A table with its denominators; intervals of 95 % stand in brackets."""
+    say(f"{table.title}. {table.note}")
+    heads = [f"{item.label} [{item.unit}]" if item.unit else item.label for item in table.columns]
+    lines = [["", *heads]]
+    lines += [[row.label, *map(_format_number, row.cells)] for row in table.rows]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        cells = (text.ljust(width) for text, width in zip(line, widths, strict=True))
+        say("  " + "  ".join(cells).rstrip())
+
+
+def _format_number(cell: Cell) -> str:
+    counts = f"{cell.count}" if cell.count == cell.of else f"{cell.count} of {cell.of}"
+    if cell.value is None:
+        return f"- (n {counts})"
+    spread = "" if cell.low is None else f" [{cell.low:.3g}, {cell.high:.3g}]"
+    return f"{cell.value:.3g}{spread} (n {counts})"
+
+
+def _set_values(found: _Values) -> _Values:
+    """What is printed of a set, with what could not be read of it."""
+    return {
+        "id": found["id"],
+        "name": found["name"],
+        "unknown": found["unknown"],
+        # Only what a detector of ours found has one.
+        "model": None,
+        **found["report"],
+    }

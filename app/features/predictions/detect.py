@@ -67,10 +67,10 @@ class OnnxModel:
             InputError: onnxruntime is not installed, the file is no such model, or its ball class
                 cannot be told.
         """
-        session = _session(path, threads)
+        session = _open_model(path, threads)
         (first, *_) = session.get_inputs()
         meta = dict(session.get_modelmeta().custom_metadata_map)
-        names = _names(meta.get("names", ""))
+        names = _parse_class_names(meta.get("names", ""))
         chosen = ball_category(names) if category is None else category
         if chosen is None and names:
             raise InputError(
@@ -96,12 +96,12 @@ class OnnxModel:
             (output, *_) = self._session.run(None, {self._input_name: box.prepare(picture)})
         except Exception as error:
             raise InputError(
-                f"{self.path.name} does not run on a picture ({_first(error)})"
+                f"{self.path.name} does not run on a picture ({_first_line(error)})"
             ) from error
         return decode_output(np.asarray(output), box, self.category, min_score, most)
 
 
-def _session(path: Path, threads: int) -> Any:
+def _open_model(path: Path, threads: int) -> Any:
     try:
         import onnxruntime
     except ImportError as error:
@@ -120,17 +120,17 @@ def _session(path: Path, threads: int) -> Any:
         return onnxruntime.InferenceSession(str(path), options, ["CPUExecutionProvider"])
     except Exception as error:
         raise InputError(
-            f"{path.name} is no ONNX model that can be run ({_first(error)})",
+            f"{path.name} is no ONNX model that can be run ({_first_line(error)})",
             hint="docs/detector.md has the command that exports one.",
         ) from error
 
 
-def _first(error: Exception) -> str:
+def _first_line(error: Exception) -> str:
     """The first line of what the runtime says, without its address in the source."""
     return str(error).strip().splitlines()[0].split(" : ")[-1][:200]
 
 
-def _names(text: str) -> tuple[str, ...]:
+def _parse_class_names(text: str) -> tuple[str, ...]:
     """Class names as Ultralytics writes them into a model: ``{0: 'ball', 1: 'player'}``."""
     if not text or len(text) > 1_000_000:
         return ()
@@ -203,16 +203,16 @@ def run_detector(
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         require_free(session, found.id, request.name)
-        rows = _views(session, found.id, request)
+        rows = _read_views(session, found.id, request)
     detections: dict[int, list[Detection]] = {}
     problems: list[dict[str, Any]] = []
     for number, row in enumerate(rows):
         if progress is not None:
             progress(number, len(rows), f"Looking for balls with {model.path.name}.")
         try:
-            picture = _picture(row, store.settings)
+            picture = _read_frame(row, store.settings)
         except (NotFoundError, ImageError, TooLargeError, StorageError) as error:
-            problems.append(_problem(row, error.message))
+            problems.append(_make_problem(row, error.message))
             continue
         detections[row.id] = _in_annotated(row, picture, model, request)
     if not detections:
@@ -238,12 +238,12 @@ def run_detector(
     )
 
 
-def _views(session: Session, dataset_id: int, request: DetectRequest) -> list[StoredView]:
+def _read_views(session: Session, dataset_id: int, request: DetectRequest) -> list[StoredView]:
     conditions = parse_query(request.query).conditions
     return dataset_views(session, dataset_id, conditions, without_ball=request.missing)
 
 
-def _picture(row: StoredView, settings: Settings) -> Any:
+def _read_frame(row: StoredView, settings: Settings) -> Any:
     if row.media is None:
         raise NotFoundError("this view has no frame that could be read")
     return decode_frame(row.media, row.flipped, settings)[:, :, ::-1]
@@ -267,7 +267,7 @@ def _in_annotated(
     ]
 
 
-def _problem(row: StoredView, problem: str) -> dict[str, Any]:
+def _make_problem(row: StoredView, problem: str) -> dict[str, Any]:
     return {"file": row.group, "record": row.key, "field": None, "problem": problem}
 
 

@@ -179,7 +179,7 @@ def list_frames(
     """
     if not 1 <= limit <= MAX_PAGE:
         raise InputError(f"a page has 1 to {MAX_PAGE} frames", pointer="/limit")
-    where = _conditions(query)
+    where = _frame_conditions(query)
     sort = _checked_field(query.sort.removesuffix("-desc"), "/sort") if query.sort else None
     descending = query.sort.endswith("-desc")
     with store.read() as session:
@@ -237,7 +237,7 @@ def read_evaluation(session: Session, evaluation_id: int) -> StoredEvaluation:
     return found
 
 
-def _conditions(query: FrameQuery) -> list[FrameCondition]:
+def _frame_conditions(query: FrameQuery) -> list[FrameCondition]:
     where = [] if query.match is None else [frame_rows.is_of_match(query.match)]
     if query.field is not None:
         field = _checked_field(query.field, "/field")
@@ -274,9 +274,9 @@ def write_evaluation(store: Store, evaluation: StoredEvaluation, out: Path) -> N
             file.write_text(table_csv(tables[name]), encoding="utf-8")
             return
         title, _, ending = name.rpartition(".")
-        file.write_bytes(_figure_as(figure(title), ending))
+        file.write_bytes(_figure_content(figure(title), ending))
 
-    frames = (vars(frame) for frame in _frames(store, evaluation.id))
+    frames = (vars(frame) for frame in _read_frames(store, evaluation.id))
     write_parts(out, evaluation_values(evaluation), frames, fetch)
 
 
@@ -311,7 +311,7 @@ def write_parts(
         raise InputError(f"{out} cannot hold the evaluation ({error.strerror})") from error
 
 
-def _figure_as(figure: Figure, ending: str) -> bytes:
+def _figure_content(figure: Figure, ending: str) -> bytes:
     """A figure as the content of a file: ``csv``, ``json`` or ``png``."""
     if ending == "png":
         return figure_png(figure)
@@ -324,7 +324,7 @@ def evaluation_values(evaluation: StoredEvaluation) -> dict[str, Any]:
     return {**vars(evaluation), "figures": list(evaluation.figures)}
 
 
-def _frames(store: Store, evaluation_id: int) -> Iterator[FrameResult]:
+def _read_frames(store: Store, evaluation_id: int) -> Iterator[FrameResult]:
     place: int | None = 0
     while place is not None:
         page = list_frames(store, evaluation_id, FrameQuery(), MAX_PAGE, place)
@@ -362,11 +362,11 @@ def track_evaluation(
             hint="Make and accept its tracks, then freeze a version.",
             pointer="/version",
         )
-    truth = [_true(key, value) for key, value in sorted(values.items())]
+    truth = [_true_track(key, value) for key, value in sorted(values.items())]
     return evaluate_tracks(truth, read_predicted_tracks(session, predictions.id)), pins
 
 
-def _true(key: str, value: Json) -> TrueTrack:
+def _true_track(key: str, value: Json) -> TrueTrack:
     track = track_from_json(value["track"])
     return TrueTrack(
         key,

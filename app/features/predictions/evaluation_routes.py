@@ -110,7 +110,7 @@ class EvaluationBody(BaseModel):
         return EvaluationRequest(**{**self.model_dump(), "version": version})
 
 
-def _headline(tables: list[Any]) -> dict[str, Cell | None]:
+def _headline_numbers(tables: list[Any]) -> dict[str, Cell | None]:
     found = {table.name: table for table in read_tables(tables)}
     return {
         column: found[name].cell(row, column) for name, row, column in _HEADLINE if name in found
@@ -129,7 +129,7 @@ class EvaluationRow(Document):
     careful: int | None = Field(validation_alias="careful_set_id")
     version: int | None = Field(validation_alias="version_id")
     counts: dict[str, int]
-    headline: Annotated[dict[str, Cell], BeforeValidator(_headline)] = Field(
+    headline: Annotated[dict[str, Cell], BeforeValidator(_headline_numbers)] = Field(
         validation_alias="tables",
         description="ap_50, mae_m, mae_percent, p_2m and f1 (of events), those that the run has.",
     )
@@ -208,7 +208,7 @@ class ComparisonDocument(Document):
         )
 
 
-def _files(description: str, document: type[object], *others: str) -> Responses:
+def _file_responses(description: str, document: type[object], *others: str) -> Responses:
     """What a route answers that gives a document as JSON, and as files of other types."""
     content: dict[str, object] = {}
     for kind in others:
@@ -217,10 +217,10 @@ def _files(description: str, document: type[object], *others: str) -> Responses:
     return {200: {"description": description, "model": document, "content": content}}
 
 
-FIGURE_FILES = _files(
+FIGURE_FILES = _file_responses(
     "The figure: its values as JSON or CSV, or drawn as PNG.", Figure, CSV_FILE, PNG_FILE
 )
-TABLE_FILES = _files(
+TABLE_FILES = _file_responses(
     "The table: as JSON, or as CSV with intervals and denominators.", Table, CSV_FILE
 )
 
@@ -305,7 +305,7 @@ def get_figure(
     if ending == "json":
         return document(found)
     if ending == "csv":
-        return _csv(figure_csv(found), name)
+        return _csv_response(figure_csv(found), name)
     shown = {"Content-Disposition": content_disposition(name, "inline")}
     return Response(figure_png(found), media_type=PNG_FILE, headers=shown)
 
@@ -331,7 +331,7 @@ def get_table(
         )
     if ending == "json":
         return document(found)
-    return _csv(table_csv(found), f"touchline-{evaluation}-{table}.csv")
+    return _csv_response(table_csv(found), f"touchline-{evaluation}-{table}.csv")
 
 
 @router.get(
@@ -386,6 +386,6 @@ def compare_evaluations(
     return ComparisonDocument.of(found, limit, parse_cursor(cursor) or 0)
 
 
-def _csv(text: str, name: str) -> Response:
+def _csv_response(text: str, name: str) -> Response:
     saved = {"Content-Disposition": content_disposition(name)}
     return Response(text, media_type=f"{CSV_FILE}; charset=utf-8", headers=saved)

@@ -201,15 +201,15 @@ def run_evaluation(
             for name in ("predictions", "careful")
             if (identity := getattr(request, name)) is not None
         }
-        if (tracks := _tracks(request, sets)) is not None:
+        if (tracks := _find_track_set(request, sets)) is not None:
             version = None
             if request.version is not None:
                 version = _own_version(session, found, request.version)
             result, pins = track_evaluation(session, found, version, tracks)
             options, more = Options(), {}
         else:
-            truth = _truth(session, found, request)
-            inputs = _inputs(session, sets)
+            truth = _read_truth(session, found, request)
+            inputs = _read_inputs(session, sets)
             pins = truth.pins
     if tracks is None:
         if not truth.frames:
@@ -228,7 +228,7 @@ def run_evaluation(
         more = {
             "gone": truth.gone,
             "accepted_predictions": accepted.frames,
-            **_set_counts(sets),
+            **{f"unknown_{name}_frames": item.unknown for name, item in sets.items()},
         }
     values = {
         "dataset_id": found.id,
@@ -238,11 +238,11 @@ def run_evaluation(
         "prediction_set_id": request.predictions,
         "careful_set_id": request.careful,
         "version_id": request.version,
-        "pins": {**pins, **_pins(request, options, sets)},
+        "pins": {**pins, **_pinned_options(request, options, sets)},
         "counts": {**result.counts, **more},
         "tables": [to_json(table) for table in result.tables],
     }
-    return _save(store, values, result)
+    return _save_evaluation(store, values, result)
 
 
 def check_evaluation(store: Store, dataset: str | int, request: EvaluationRequest) -> None:
@@ -256,14 +256,16 @@ def check_evaluation(store: Store, dataset: str | int, request: EvaluationReques
                 own = sets[name] = _own_set(session, found, identity, name)
                 if name == "careful":
                     careful_boxes(session, own)
-        _tracks(request, sets)
+        _find_track_set(request, sets)
         if request.version is not None:
             _own_version(session, found, request.version)
         elif request.groups not in LIVE_RULES:
             raise unknown_rule(request.groups)
 
 
-def _tracks(request: EvaluationRequest, sets: Mapping[str, PredictionSet]) -> PredictionSet | None:
+def _find_track_set(
+    request: EvaluationRequest, sets: Mapping[str, PredictionSet]
+) -> PredictionSet | None:
     """The set of tracks that is evaluated; None where it is one of boxes or cameras.
 
     Raises:
@@ -283,7 +285,7 @@ def _tracks(request: EvaluationRequest, sets: Mapping[str, PredictionSet]) -> Pr
     return found
 
 
-def _truth(session: Session, dataset: DatasetHead, request: EvaluationRequest) -> Truth:
+def _read_truth(session: Session, dataset: DatasetHead, request: EvaluationRequest) -> Truth:
     if request.version is None:
         return live_truth(session, dataset, request.groups, request.split)
     version = _own_version(session, dataset, request.version)
@@ -306,7 +308,7 @@ def _own_set(session: Session, dataset: DatasetHead, set_id: int, pointer: str) 
     return found
 
 
-def _inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Inputs:
+def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Inputs:
     predictions, careful = sets.get("predictions"), sets.get("careful")
     detections = cameras = boxes = None
     if predictions is not None:
@@ -322,7 +324,7 @@ def _inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Inputs:
     return Inputs(detections, boxes, cameras)
 
 
-def _pins(
+def _pinned_options(
     request: EvaluationRequest, options: Options, sets: Mapping[str, PredictionSet]
 ) -> dict[str, Json]:
     """What was asked for, beside what the truth pins."""
@@ -334,10 +336,6 @@ def _pins(
         "seed": options.seed,
         **{name: {part: getattr(item, part) for part in _SET_PINS} for name, item in sets.items()},
     }
-
-
-def _set_counts(sets: Mapping[str, PredictionSet]) -> dict[str, int]:
-    return {f"unknown_{name}_frames": item.unknown for name, item in sets.items()}
 
 
 def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
@@ -364,7 +362,9 @@ def _require_common_frames(truth: Truth, inputs: Inputs, sets: Mapping[str, Pred
             )
 
 
-def _save(store: Store, values: Mapping[str, Any], result: Evaluation) -> StoredEvaluation:
+def _save_evaluation(
+    store: Store, values: Mapping[str, Any], result: Evaluation
+) -> StoredEvaluation:
     figures = {figure.name: to_json(figure) for figure in result.figures}
     with store.write() as session:
         identity = insert_evaluation(session, values, figures, result.frames)

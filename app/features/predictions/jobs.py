@@ -87,7 +87,7 @@ def resume_evaluations(jobs: Jobs, store: Store) -> None:
 def evaluation_work(store: Store, progress: JobProgress) -> Json:
     """The work of evaluating; its result names the evaluation."""
     request = EvaluationRequest(**progress.job.request)
-    return _in_worker(store, "evaluating", "the evaluation", _evaluate, request, progress)
+    return _in_worker(store, "evaluating", "the evaluation", _run_evaluation, request, progress)
 
 
 def accept_work(store: Store, progress: JobProgress) -> Json:
@@ -95,7 +95,7 @@ def accept_work(store: Store, progress: JobProgress) -> Json:
     values = progress.job.request["accept"]
     views = None if values["views"] is None else tuple(values["views"])
     request = AcceptRequest(**{**values, "views": views})
-    return _in_worker(store, "accepting", "the acceptance", _accept, request, progress)
+    return _in_worker(store, "accepting", "the acceptance", _run_accept, request, progress)
 
 
 def _in_worker(
@@ -112,7 +112,7 @@ def _in_worker(
     )
 
 
-def _evaluate(
+def _run_evaluation(
     store: Store, dataset_id: int, request: EvaluationRequest, actor: str, progress: ReportProgress
 ) -> Json:
     return evaluation_result(
@@ -120,7 +120,7 @@ def _evaluate(
     )
 
 
-def _accept(
+def _run_accept(
     store: Store, dataset_id: int, request: AcceptRequest, actor: str, progress: ReportProgress
 ) -> Json:
     return accept_result(

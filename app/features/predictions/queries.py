@@ -160,12 +160,12 @@ def delete_prediction_set(session: Session, set_id: int) -> None:
 
 def dataset_prediction_sets(session: Session, dataset_id: int) -> list[PredictionSet]:
     """The sets of a dataset, the newest first."""
-    return _sets(session, PredictionSetModel.dataset_id == dataset_id)
+    return _read_sets(session, PredictionSetModel.dataset_id == dataset_id)
 
 
 def read_prediction_sets(session: Session, ids: Collection[int]) -> list[PredictionSet]:
     """Sets by their ids, the newest first; those that are not there are left out."""
-    return _sets(session, PredictionSetModel.id.in_(ids)) if ids else []
+    return _read_sets(session, PredictionSetModel.id.in_(ids)) if ids else []
 
 
 def has_prediction_set(session: Session, dataset_id: int, name: str) -> bool:
@@ -179,14 +179,14 @@ def has_prediction_set(session: Session, dataset_id: int, name: str) -> bool:
 def read_boxes(session: Session, set_id: int) -> dict[int, list[PredictedBox]]:
     """Every box of a set, by id of the view, as they came."""
     found: dict[int, list[PredictedBox]] = {}
-    for box in _boxes(session, PredictionModel.set_id == set_id):
+    for box in _read_boxes(session, PredictionModel.set_id == set_id):
         found.setdefault(box.view_id, []).append(box)
     return found
 
 
 def read_view_boxes(session: Session, view_id: int) -> list[PredictedBox]:
     """Every box of a view over all sets, the newest set first, the surest box first."""
-    found = _boxes(session, PredictionModel.view_id == view_id)
+    found = _read_boxes(session, PredictionModel.view_id == view_id)
     return sorted(found, key=lambda box: (-box.set_id, -box.score, box.id))
 
 
@@ -194,13 +194,13 @@ def read_group_boxes(session: Session, group_id: int) -> list[PredictedBox]:
     """Every box of a group: by view, then as ``read_view_boxes``."""
     views = select(ViewModel.id, ViewModel.position).where(ViewModel.group_id == group_id)
     places = {row.id: row.position for row in session.execute(views)}
-    found = _boxes(session, PredictionModel.view_id.in_(places))
+    found = _read_boxes(session, PredictionModel.view_id.in_(places))
     return sorted(found, key=lambda box: (places[box.view_id], -box.set_id, -box.score, box.id))
 
 
 def read_box(session: Session, prediction_id: int) -> PredictedBox | None:
     """A box by its id."""
-    return next(iter(_boxes(session, PredictionModel.id == prediction_id)), None)
+    return next(iter(_read_boxes(session, PredictionModel.id == prediction_id)), None)
 
 
 def count_prediction_sets(session: Session, dataset_id: int) -> int:
@@ -226,7 +226,7 @@ def read_predicted_tracks(session: Session, set_id: int) -> dict[str, PredictedT
         return {row.stretch: PredictedTrack.from_json(unpack(row.body)) for row in rows}
 
 
-def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
+def _read_sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
     statement = (
         select(*columns_shown(PredictionSetModel))
         .where(where)
@@ -238,7 +238,7 @@ def _sets(session: Session, where: ColumnElement[bool]) -> list[PredictionSet]:
     ]
 
 
-def _boxes(session: Session, *where: Any) -> Iterable[PredictedBox]:
+def _read_boxes(session: Session, *where: Any) -> Iterable[PredictedBox]:
     statement = (
         select(*PredictionModel.__table__.columns).where(*where).order_by(PredictionModel.id)
     )
@@ -300,14 +300,14 @@ def dataset_evaluations(session: Session, dataset_id: int) -> list[StoredEvaluat
     """The runs of a dataset, the newest first."""
     statement = _EVALUATIONS.where(EvaluationModel.dataset_id == dataset_id)
     rows = session.execute(statement.order_by(EvaluationModel.id.desc()).limit(_MOST))
-    return [_stored(row) for row in rows]
+    return [_evaluation_from_row(row) for row in rows]
 
 
 def find_evaluation(session: Session, evaluation_id: int) -> StoredEvaluation | None:
     """A run by its id."""
     statement = _EVALUATIONS.where(EvaluationModel.id == evaluation_id)
     row = session.execute(statement).one_or_none()
-    return None if row is None else _stored(row)
+    return None if row is None else _evaluation_from_row(row)
 
 
 def read_figure(session: Session, evaluation_id: int, name: str) -> Json | None:
@@ -317,7 +317,7 @@ def read_figure(session: Session, evaluation_id: int, name: str) -> Json | None:
     return None if packed is None else unpack(packed).get(name)
 
 
-def _stored(row: Any) -> StoredEvaluation:
+def _evaluation_from_row(row: Any) -> StoredEvaluation:
     values = {item.name: getattr(row, item.name) for item in fields(StoredEvaluation)}
     for name in ("pins", "counts", "tables"):
         values[name] = parse(values[name])
@@ -331,7 +331,7 @@ def is_of_match(match: str) -> FrameCondition:
 
 def is_between(column: str, low: float | None, high: float | None) -> FrameCondition:
     """The frame has a number, and it lies in [low, high)."""
-    value = _column(column)
+    value = _frame_column(column)
     where: list[FrameCondition] = [value.is_not(None)]
     if low is not None:
         where.append(value >= low)
@@ -342,7 +342,7 @@ def is_between(column: str, low: float | None, high: float | None) -> FrameCondi
 
 def is_missing(column: str) -> FrameCondition:
     """The frame has a ball and no such number."""
-    return and_(_column(column).is_(None), EvaluationFrameModel.ball.is_(True))
+    return and_(_frame_column(column).is_(None), EvaluationFrameModel.ball.is_(True))
 
 
 def count_frame_rows(
@@ -371,7 +371,7 @@ def read_frame_rows(
     model = EvaluationFrameModel
     order: list[ColumnElement[Any]] = []
     if sort is not None:
-        value = _column(sort)
+        value = _frame_column(sort)
         order = [value.is_(None), value.desc() if descending else value.asc()]
     columns = [item for item in model.__table__.columns if item.name not in _KEEPING]
     statement = (
@@ -385,6 +385,6 @@ def read_frame_rows(
         yield dict(row._mapping)
 
 
-def _column(name: str) -> InstrumentedAttribute[Any]:
+def _frame_column(name: str) -> InstrumentedAttribute[Any]:
     column: InstrumentedAttribute[Any] = getattr(EvaluationFrameModel, name)
     return column

@@ -58,7 +58,7 @@ def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList
     return PredictionSetList(items=found)
 
 
-def _added(found: review.PredictionSet) -> Response:
+def _added_response(found: review.PredictionSet) -> Response:
     headers = {"Location": f"/api/v1/predictions/{found.id}"}
     return document(PredictionSetDocument.model_validate(found), 201, headers)
 
@@ -82,7 +82,7 @@ def _added(found: review.PredictionSet) -> Response:
         "cameras_upload": OwnedKind.UPLOAD,
     },
 )
-@responds(_added)
+@responds(_added_response)
 def add_predictions(
     dataset: DatasetPath, request: PredictionRequest, services: AppServices, actor: Actor
 ) -> review.PredictionSet:
@@ -96,13 +96,13 @@ def add_predictions(
         services.store,
         dataset,
         request.name,
-        _files(services.settings, request),
+        _prediction_files(services.settings, request),
         actor=actor,
         read=services.predictions.read,
     )
 
 
-def _accepted(found: AcceptReport | Job) -> Response:
+def _accepted_response(found: AcceptReport | Job) -> Response:
     return job_answer(found) if isinstance(found, Job) else document(AcceptOutcome.done(found))
 
 
@@ -120,7 +120,7 @@ def _accepted(found: AcceptReport | Job) -> Response:
     },
 )
 @may(Action.LEAD, body={"dataset": OwnedKind.DATASET, "predictions": OwnedKind.PREDICTIONS})
-@responds(_accepted)
+@responds(_accepted_response)
 def accept_predictions(
     request: AcceptBody, services: AppServices, actor: Actor, dry_run: DryRun = False
 ) -> AcceptReport | Job | Response:
@@ -209,7 +209,7 @@ def accept_prediction(
         return accept_box(store, view, prediction, if_match=if_match, actor=actor, replace=replace)
 
 
-def _files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
+def _prediction_files(settings: Settings, request: PredictionRequest) -> PredictionFiles:
     how = PredictionFiles(
         None,
         format=request.format,

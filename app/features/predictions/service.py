@@ -80,7 +80,7 @@ def add_predictions(
     names = frame_names(store, dataset)
     boxes, cameras = read(files, names, Limits.of(store.settings))
     nothing = not boxes.detections and not cameras.cameras and not boxes.tracks
-    if nothing and _is_for_another(boxes, cameras):
+    if nothing and (boxes.unknown or cameras.unknown or boxes.report.problems):
         raise _nothing_known(boxes, cameras, names)
     if boxes.tracks and not any(track.position for track in boxes.tracks.values()):
         raise next(iter(boxes.report.problems), InputError(f"{first.name} holds no ball"))
@@ -94,7 +94,7 @@ def add_predictions(
         names=names,
         format=boxes.format if files.path is not None else "cameras",
         source=first.name,
-        report=_report(boxes, cameras),
+        report=_reading_report(boxes, cameras),
         unknown=len(boxes.unknown) + len(cameras.unknown),
         actor=actor,
         reuse=name is None,
@@ -180,7 +180,7 @@ def frame_names(store: Store, dataset: str | int) -> FrameNames:
             match=row.match,
             size=ImageSize(row.width, row.height),
             station=row.station if row.shared else "",
-            picture=_picture(row.media),
+            picture=_picture_name(row.media),
         )
         for row in rows
     )
@@ -284,10 +284,6 @@ def _free_name(name: str, taken: set[str]) -> str:
     )
 
 
-def _is_for_another(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> bool:
-    return bool(boxes.unknown or cameras.unknown or boxes.report.problems)
-
-
 def _nothing_known(
     boxes: ReadPredictions, cameras: ReadPredictedCameras, names: FrameNames
 ) -> InputError:
@@ -304,14 +300,14 @@ def _nothing_known(
     )
 
 
-def _picture(media: Media | None) -> str:
+def _picture_name(media: Media | None) -> str:
     """Name of the file of a picture with its last folder; empty where a view has none of its own."""
     if media is None or media.frame is not None:
         return ""
     return "/".join(PurePosixPath(media.member or unseal_address(media.path)[0]).parts[-2:])
 
 
-def _report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
+def _reading_report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
     return {
         "read": boxes.report.read,
         "without_score": boxes.without_score,
@@ -319,11 +315,11 @@ def _report(boxes: ReadPredictions, cameras: ReadPredictedCameras) -> Json:
         "unknown_boxes": sum(boxes.unknown.values()),
         "unknown_frames": list(list_unknown_frames(boxes.unknown, boxes.reasons, LISTED)),
         "unknown_cameras": list(list_unknown_frames(cameras.unknown, cameras.reasons, LISTED)),
-        **_problems(boxes.report, cameras.report),
+        **_list_problems(boxes.report, cameras.report),
     }
 
 
-def _problems(*reports: Report) -> dict[str, Any]:
+def _list_problems(*reports: Report) -> dict[str, Any]:
     every = [problem for report in reports for problem in report.problems]
     dropped = sum(report.dropped for report in reports)
     return {

@@ -299,7 +299,9 @@ class Listing:
         """Some columns of each group."""
         names = list(names)
         needed = _column_names(self.conditions) | set(names)
-        statement = _with_index(_index_for(needed), _select_columns(names).where(*self._conditions))
+        statement = _with_index(
+            _choose_index(needed), _select_columns(names).where(*self._conditions)
+        )
         if by_number:
             statement = statement.order_by(QueueModel.number)
         return self.session.execute(statement).all()
@@ -354,14 +356,14 @@ class Listing:
         names = _column_names(self.conditions) | (
             set() if order is None else _column_names(order.keys)
         )
-        return filtered if _is_sorted(names) else _with_index(_index_for(names), filtered)
+        return filtered if _is_sorted(names) else _with_index(_choose_index(names), filtered)
 
     def _page_of_ids(self, order: Order, reach: int, total: int) -> Select[int]:
         """Ids of which ``reach`` are read in order, out of ``total``."""
         few = self.conditions and reach * _FEW > total
         if few:
             return _with_index(
-                _index_for(_column_names(self.conditions) | _column_names(order.keys)),
+                _choose_index(_column_names(self.conditions) | _column_names(order.keys)),
                 self._ids_statement,
             )
         return _with_index(order.index, self._ids_statement)
@@ -385,7 +387,7 @@ def _is_sorted(names: set[str]) -> bool:
     return names <= SORTED and len(names - {"number"}) <= 1
 
 
-def _index_for(names: set[str]) -> str:
+def _choose_index(names: set[str]) -> str:
     """The index through which all groups are read by their number, for these columns."""
     return _SCAN if names <= {*QUEUE_SCANNED, "dataset_id", "group_id"} else _FILE_ORDER
 

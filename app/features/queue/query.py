@@ -75,7 +75,7 @@ class Query:
 
 
 @dataclass(frozen=True)
-class _Term:
+class _QueryTerm:
     field: str
     op: str
     value: str
@@ -113,7 +113,7 @@ def parse_query(text: str, longest: int = MAX_LENGTH) -> Query:
     return Query(tuple(found), sort or "number", descending, None if sort else batch, text)
 
 
-def _parse_terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
+def _parse_terms(text: str, longest: int) -> Iterator[tuple[bool, _QueryTerm]]:
     if len(text) > longest:
         raise InputError(f"a query has at most {longest} characters", pointer="/q")
     place, count = 0, 0
@@ -128,11 +128,14 @@ def _parse_terms(text: str, longest: int) -> Iterator[tuple[bool, _Term]]:
         if len(value) > MAX_LENGTH and found["field"] != "id":
             problem = f"only a list of ids may be longer than {MAX_LENGTH} characters"
             raise InputError(problem, pointer=pointer)
-        yield bool(found["minus"]), _Term(found["field"] or "", found["op"] or ":", value, pointer)
+        yield (
+            bool(found["minus"]),
+            _QueryTerm(found["field"] or "", found["op"] or ":", value, pointer),
+        )
         place = found.end()
 
 
-def _parse_sort(term: _Term) -> tuple[str, bool]:
+def _parse_sort(term: _QueryTerm) -> tuple[str, bool]:
     name = term.value.removesuffix("-desc")
     if name not in SORTS:
         raise InputError(
@@ -143,7 +146,7 @@ def _parse_sort(term: _Term) -> tuple[str, bool]:
     return name, term.value.endswith("-desc")
 
 
-def _require_operator(term: _Term) -> None:
+def _require_operator(term: _QueryTerm) -> None:
     """Refuse a field that there is not, and an operator that a field has not."""
     field_ = BY_NAME.get(term.field)
     if field_ is None:
@@ -162,7 +165,7 @@ def _require_operator(term: _Term) -> None:
         )
 
 
-def _condition_of_term(term: _Term) -> Condition:
+def _condition_of_term(term: _QueryTerm) -> Condition:
     field_ = BY_NAME.get(term.field)
     if field_ is not None and field_.name != term.field:
         term = replace(term, field=field_.name)
@@ -173,7 +176,7 @@ def _condition_of_term(term: _Term) -> Condition:
     if term.field == "submissions":
         return conditions.has_annotations("=" if term.op == ":" else term.op, _parse_number(term))
     if term.field == "id":
-        return _listed_ids_condition(term)
+        return conditions.has_group_id(_parse_id(term, text) for text in term.value.split(","))
     if term.field == "batch":
         return conditions.is_in_batch(_parse_id(term, text) for text in term.value.split(","))
     if field_ is not None and field_.kind == "flag":
@@ -184,11 +187,7 @@ def _condition_of_term(term: _Term) -> Condition:
     return conditions.any_of(test(term, value) for value in values)
 
 
-def _listed_ids_condition(term: _Term) -> Condition:
-    return conditions.has_group_id(_parse_id(term, text) for text in term.value.split(","))
-
-
-def _parse_id(term: _Term, text: str) -> int:
+def _parse_id(term: _QueryTerm, text: str) -> int:
     what = "batch" if term.field == "batch" else "group"
     digits = text.isascii() and text.isdigit() and len(text) <= len(str(MAX_ID))
     if not digits or not 1 <= int(text) <= MAX_ID:
@@ -200,7 +199,7 @@ def _parse_id(term: _Term, text: str) -> int:
     return int(text)
 
 
-def _number_condition(term: _Term) -> Condition:
+def _number_condition(term: _QueryTerm) -> Condition:
     column = NUMBERS[term.field]
     if term.value == "none":
         return conditions.is_absent(column)
@@ -209,7 +208,7 @@ def _number_condition(term: _Term) -> Condition:
     )
 
 
-def _parse_number(term: _Term) -> float:
+def _parse_number(term: _QueryTerm) -> float:
     try:
         value = float(term.value)
     except ValueError:
@@ -223,7 +222,7 @@ def _parse_number(term: _Term) -> float:
     return value
 
 
-def _require_choice(term: _Term, value: str) -> str:
+def _require_choice(term: _QueryTerm, value: str) -> str:
     choices = BY_NAME[term.field].values
     if value not in choices:
         raise InputError(
@@ -239,18 +238,18 @@ def _any_or_none_condition(value: str, some: Condition) -> Condition:
     return conditions.negate(some) if value == "none" else some
 
 
-def _status_condition(term: _Term, value: str) -> Condition:
+def _status_condition(term: _QueryTerm, value: str) -> Condition:
     return conditions.compare_condition("status", "=", _require_choice(term, value))
 
 
-def _finding_condition(term: _Term, value: str) -> Condition:
+def _finding_condition(term: _QueryTerm, value: str) -> Condition:
     column = "dismissed" if term.field == "dismissed" else "findings"
     if value in ("any", "none"):
         return conditions.compare_condition(column, "=" if value == "none" else ">", "")
     return conditions.has_list_item(column, _require_choice(term, value))
 
 
-def _gate_condition(term: _Term, value: str) -> Condition:
+def _gate_condition(term: _QueryTerm, value: str) -> Condition:
     """The first failing gate; ``none`` for groups that pass, ``unsolved`` for neither."""
     if value == "unsolved":
         return conditions.is_flag("solved", False)
@@ -259,7 +258,7 @@ def _gate_condition(term: _Term, value: str) -> Condition:
     return conditions.compare_condition("gate", "=", _require_choice(term, value))
 
 
-def _pictures_condition(term: _Term, value: str) -> Condition:
+def _pictures_condition(term: _QueryTerm, value: str) -> Condition:
     """Whether views have a picture: ``none`` of them, ``any``, or ``all``."""
     choice = _require_choice(term, value)
     if choice == "all":
@@ -267,7 +266,7 @@ def _pictures_condition(term: _Term, value: str) -> Condition:
     return conditions.compare_condition("pictures", "=" if choice == "none" else ">", 0)
 
 
-def _proposal_condition(term: _Term, value: str) -> Condition:
+def _proposal_condition(term: _QueryTerm, value: str) -> Condition:
     """What was proposed for a view that has no camera yet."""
     choice = _require_choice(term, value)
     if choice in ("any", "none"):
@@ -275,7 +274,7 @@ def _proposal_condition(term: _Term, value: str) -> Condition:
     return conditions.has_open_proposal(choice)
 
 
-def _comments_condition(term: _Term, value: str) -> Condition:
+def _comments_condition(term: _QueryTerm, value: str) -> Condition:
     """Whether people say something to each other about it, and whether that is settled."""
     choice = _require_choice(term, value)
     if choice in ("any", "none"):
@@ -283,7 +282,7 @@ def _comments_condition(term: _Term, value: str) -> Condition:
     return conditions.has_thread(choice)
 
 
-def _annotations_condition(term: _Term, value: str) -> Condition:
+def _annotations_condition(term: _QueryTerm, value: str) -> Condition:
     """What people's own annotations of it came to."""
     choice = _require_choice(term, value)
     if choice in ("any", "none"):
@@ -291,38 +290,38 @@ def _annotations_condition(term: _Term, value: str) -> Condition:
     return conditions.has_outcome("open" if choice == "waiting" else choice)
 
 
-def _mentions_condition(_term: _Term, value: str) -> Condition:
+def _mentions_condition(_term: _QueryTerm, value: str) -> Condition:
     """Whom an open thread mentions."""
     if value in ("any", "none"):
         return _any_or_none_condition(value, conditions.mentions_person())
     return conditions.mentions_person(value.lower())
 
 
-def _view_condition(_term: _Term, value: str) -> Condition:
+def _view_condition(_term: _QueryTerm, value: str) -> Condition:
     """A view's key (``cam3``, ``7_1.png``), or how many views there are."""
     if value.isascii() and value.isdigit():
         return conditions.compare_condition("views", "=", int(value[:9]))
     return conditions.has_list_item("view_keys", value)
 
 
-def _match_condition(_term: _Term, value: str) -> Condition:
+def _match_condition(_term: _QueryTerm, value: str) -> Condition:
     return conditions.contains_text("match", value)
 
 
-def _text_condition(_term: _Term, value: str) -> Condition:
+def _text_condition(_term: _QueryTerm, value: str) -> Condition:
     return conditions.any_of(
         (conditions.contains_text("label", value), conditions.contains_text("key", value))
     )
 
 
-def _exact_text_condition(term: _Term, value: str) -> Condition:
+def _exact_text_condition(term: _QueryTerm, value: str) -> Condition:
     if value in ("any", "none"):
         missing = conditions.is_empty(term.field)
         return missing if value == "none" else conditions.negate(missing)
     return conditions.is_text(term.field, value)
 
 
-_TESTS: dict[str, Callable[[_Term, str], Condition]] = {
+_TESTS: dict[str, Callable[[_QueryTerm, str], Condition]] = {
     "status": _status_condition,
     "finding": _finding_condition,
     "dismissed": _finding_condition,

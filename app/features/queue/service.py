@@ -395,14 +395,14 @@ def summarize_groups(store: Store, dataset_id: int, query: str = "") -> Summary:
         solved=sum(solved),
         stale=sum(stale),
         histograms={
-            name: _histogram(column, values)
+            name: _make_histogram(column, values)
             for (name, column), values in zip(COLUMNS.items(), numbers, strict=True)
         },
         **{state: states[state] for state in STATUSES},
     )
 
 
-def _histogram(column: HistogramColumn, values: Sequence[float | None]) -> Histogram:
+def _make_histogram(column: HistogramColumn, values: Sequence[float | None]) -> Histogram:
     numbers = np.array(values, float)
     place = bin_indices(column.edges, numbers, open_low=True, open_high=column.open_high)
     counts = np.bincount(place[place >= 0], minlength=len(column.edges) - 1)

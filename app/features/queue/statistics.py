@@ -195,9 +195,12 @@ def count_rows(rows: Sequence[Any]) -> Counted:
         match=np.array([of_match[name] for name in match], np.int32),
         passes=np.array([bool(value) for value in passes], bool),
         accepted=np.array([state == "accepted" for state in status], bool),
-        cell=_cells(x, y),
+        cell=_pitch_cells(x, y),
         bins=np.array(
-            [_bins(measure, column) for measure, column in zip(MEASURES, values, strict=True)],
+            [
+                _bin_values(measure, column)
+                for measure, column in zip(MEASURES, values, strict=True)
+            ],
             np.int8,
         ).reshape(len(MEASURES), -1),
     )
@@ -208,11 +211,12 @@ def make_statistics(found: Counted) -> Statistics:
     return Statistics(
         groups=found.groups,
         histograms=tuple(
-            _histogram(measure, found.bins[place], found) for place, measure in enumerate(MEASURES)
+            _make_histogram(measure, found.bins[place], found)
+            for place, measure in enumerate(MEASURES)
         ),
-        positions=_positions(found.cell),
-        matches=_shares(found, found.match, found.matches),
-        splits=_shares(found, np.zeros_like(found.match), ("",)),
+        positions=_make_positions(found.cell),
+        matches=_make_shares(found, found.match, found.matches),
+        splits=_make_shares(found, np.zeros_like(found.match), ("",)),
     )
 
 
@@ -230,14 +234,14 @@ def bin_query(measure: Measure, place: int) -> str:
     return " ".join(parts)
 
 
-def _bins(measure: Measure, values: FloatArray) -> IntArray:
+def _bin_values(measure: Measure, values: FloatArray) -> IntArray:
     place = bin_indices(
         measure.edges, values, open_low=measure.open_low, open_high=measure.open_high
     )
     return np.where(np.isnan(values), UNKNOWN, np.where(place < 0, NOWHERE, place))
 
 
-def _cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
+def _pitch_cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
     column, row = (
         bin_indices(edges, values, open_low=False, open_high=False)
         for edges, values in ((X_EDGES, x), (Y_EDGES, y))
@@ -247,7 +251,9 @@ def _cells(x: FloatArray, y: FloatArray) -> npt.NDArray[np.int16]:
     return np.where(np.isnan(x) | np.isnan(y), UNKNOWN, outside).astype(np.int16)
 
 
-def _histogram(measure: Measure, place: npt.NDArray[np.int8], found: Counted) -> MeasureHistogram:
+def _make_histogram(
+    measure: Measure, place: npt.NDArray[np.int8], found: Counted
+) -> MeasureHistogram:
     bins = len(measure.edges) - 1
     # NOWHERE, UNKNOWN, and the bins, of each split.
     width = bins + 2
@@ -255,18 +261,18 @@ def _histogram(measure: Measure, place: npt.NDArray[np.int8], found: Counted) ->
     counts = np.bincount(code, minlength=len(found.splits) * width).reshape(-1, width)
     series = tuple(
         MeasureSeries(split, tuple(row[2:].tolist()), int(row[UNKNOWN - NOWHERE]))
-        for split, row in sorted(zip(found.splits, counts, strict=True), key=_name)
+        for split, row in sorted(zip(found.splits, counts, strict=True), key=_pair_name)
         if row.any()
     )
     queries = tuple(bin_query(measure, number) for number in range(bins))
     return MeasureHistogram(measure, queries, series)
 
 
-def _name(pair: tuple[str, Any]) -> str:
+def _pair_name(pair: tuple[str, Any]) -> str:
     return pair[0]
 
 
-def _positions(cell: npt.NDArray[np.int16]) -> Positions:
+def _make_positions(cell: npt.NDArray[np.int16]) -> Positions:
     rows, columns = len(Y_EDGES) - 1, len(X_EDGES) - 1
     counts = np.bincount(cell.astype(np.int64) - NOWHERE, minlength=rows * columns + 2)
     whole = counts[2:].reshape(rows, columns)
@@ -278,7 +284,7 @@ def _positions(cell: npt.NDArray[np.int16]) -> Positions:
     )
 
 
-def _shares(
+def _make_shares(
     found: Counted, match: npt.NDArray[np.int32], matches: Sequence[str]
 ) -> tuple[Share, ...]:
     width = max(len(found.splits), 1)
@@ -351,12 +357,12 @@ def read_timeline(
     return timeline
 
 
-def _frame(row: Any) -> int | None:
+def _frame_number(row: Any) -> int | None:
     key = row.key
     return int(key) if key.isascii() and key.isdigit() and len(key) <= _FRAME_DIGITS else None
 
 
-def _point(row: Any) -> tuple[float, float, float] | None:
+def _ball_point(row: Any) -> tuple[float, float, float] | None:
     place = (row.x_m, row.y_m, row.height_m)
     return None if None in place else (row.x_m, row.y_m, -row.height_m)
 
@@ -368,12 +374,12 @@ _SOURCES = (
 _COLUMNS: dict[str, Callable[[Any], Any]] = {
     "id": lambda row: row.group_id,
     "number": lambda row: row.number,
-    "frame": _frame,
+    "frame": _frame_number,
     "error_px": lambda row: row.error_px,
     "passes": lambda row: row.passes,
     "gate": lambda row: row.gate,
     "status": lambda row: row.status,
     "stale": lambda row: row.stale,
     "sigma_m": lambda row: row.sigma_m,
-    "point": _point,
+    "point": _ball_point,
 }

@@ -161,7 +161,9 @@ def rethreshold_task(task: RethresholdTask) -> list[Result]:
     What is damaged is left out, like all others: it is solved.
     """
     try:
-        return [result for kept in _kept_by_policy(task) for result in _rethreshold(task, kept)]
+        return [
+            result for kept in _kept_by_policy(task) for result in _apply_thresholds(task, kept)
+        ]
     except DamagedError:
         return []
 
@@ -173,7 +175,7 @@ def _kept_by_policy(task: RethresholdTask) -> Iterator[list[KeptSolution]]:
             yield kept
 
 
-def _rethreshold(task: RethresholdTask, kept: Sequence[KeptSolution]) -> Iterator[Result]:
+def _apply_thresholds(task: RethresholdTask, kept: Sequence[KeptSolution]) -> Iterator[Result]:
     policy = task.policy
     facts = facts_from_bytes([item.facts for item in kept])
     same = has_unchanged_pairs(facts, task.before[kept[0].policy_hash], policy)

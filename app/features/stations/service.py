@@ -94,7 +94,7 @@ def load_station(store: Store, station_id: int) -> StationState:
         NotFoundError: There is no such station.
     """
     with store.read() as session:
-        return _read(session, station_id)
+        return _read_state(session, station_id)
 
 
 def submit_station(
@@ -164,7 +164,7 @@ def _save_all(session: Session, steps: Iterable[tuple[int, _Plan, str]], actor: 
     for station_id, plan, etag in steps:
         state, change = _plan_change(session, station_id, plan, etag)
         if change.station != state.station:
-            _save(session, state, change, actor)
+            _save_change(session, state, change, actor)
             groups.update(state.groups)
     refresh_queue(session, sorted(groups))
 
@@ -193,11 +193,11 @@ def _change_station(
         if change.station == state.station:
             return state
         trial = None if shown is None else _trial_group(session, shown, change.station)
-    solutions = [] if trial is None else [_solved(*trial)]
+    solutions = [] if trial is None else [_solve_encoded(*trial)]
     with store.write() as session:
         # Planned once more: others may have edited it while the group was solved.
         state, change = _plan_change(session, station_id, plan, if_match)
-        _save(session, state, change, actor)
+        _save_change(session, state, change, actor)
         insert_solutions(session, solutions)
         refresh_queue(session, state.groups)
         saved = None if shown is None else read_state(session, shown)
@@ -209,7 +209,7 @@ def _change_station(
 def _plan_change(
     session: Session, station_id: int, plan: _Plan, if_match: str
 ) -> tuple[StationState, _StationChange]:
-    state = _read(session, station_id)
+    state = _read_state(session, station_id)
     if not state.station.shared:
         raise ConflictError(
             f"station {state.station.key} belongs to a single view",
@@ -227,21 +227,21 @@ def _trial_group(session: Session, group_id: int, station: Station) -> _Trial:
     return stored, group, known_calibrations(session, [group], stored.policy)
 
 
-def _solved(
+def _solve_encoded(
     stored: StoredGroup, group: Group, known: Mapping[str, Calibration]
 ) -> tuple[SolutionKey, EncodedSolution]:
     key = SolutionKey(stored.id, group_inputs_hash(group), stored.policy.hash)
     return key, solve_encoded(group, stored.policy, known)[1]
 
 
-def _save(session: Session, state: StationState, change: _StationChange, actor: str) -> None:
+def _save_change(session: Session, state: StationState, change: _StationChange, actor: str) -> None:
     save_station(session, state.stored, change.station)
     refresh_inputs_hashes(session, state.groups)
     entry = Entry(change.kind, actor, now(), change.body, state.dataset_id, station_id=state.id)
     append(session, [entry])
 
 
-def _read(session: Session, station_id: int) -> StationState:
+def _read_state(session: Session, station_id: int) -> StationState:
     stored = read_stations(session, [station_id]).get(station_id)
     if stored is None:
         raise NotFoundError(f"there is no station {station_id}")

@@ -18,7 +18,7 @@ from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, TooLargeError
-from app.features.file_tools.link import read_ball
+from app.features.file_tools.shots import read_ball
 from app.features.groups.queries import read_groups
 from app.features.imports.upload_queries import get_upload, upload_path
 from app.features.jobs.queries import Job

@@ -178,7 +178,7 @@ def give_verdicts(
         if not left:
             return BatchReport(None, 0, refused)
     else:
-        left = _remaining(found.change, begun)
+        left = _remaining_rows(found.change, begun)
         refused = tuple(Refusal(*item) for item in begun["refused"])
     places = [(row.number, row.group_id) for row in left]
     # Of a million groups, what the queue says of each is much.
@@ -199,7 +199,7 @@ def give_verdicts(
     return report
 
 
-def _remaining(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
+def _remaining_rows(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
     """Those of some groups that a run which was stopped had left.
 
     It remembers the numbers between which they lie, so that whatever was imported since is not
@@ -260,7 +260,7 @@ def select_groups(
     reasons = (SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE)
     change, refused = [], dict.fromkeys(reasons, 0)
     closed = closed_copies(session, dataset_id) if dataset_id > COPIES else ()
-    unsolved = _unsolved(session, dataset_id, rows) if verdict.state == "accepted" else ()
+    unsolved = _unsolved_groups(session, dataset_id, rows) if verdict.state == "accepted" else ()
     for row in rows:
         if _has_verdict(row, verdict):
             continue
@@ -280,7 +280,7 @@ def select_groups(
     return VerdictSelection(change, tuple(refusals))
 
 
-def _unsolved(session: Session, dataset_id: int, rows: Sequence[Any]) -> set[int]:
+def _unsolved_groups(session: Session, dataset_id: int, rows: Sequence[Any]) -> set[int]:
     """Groups that this solver has not solved as they are: their rows may tell of an earlier one."""
     few = [row.group_id for row in rows] if len(rows) <= CHUNK else None
     return set(unsolved_groups(session, dataset_id, few))
@@ -356,7 +356,7 @@ class BatchRun:
         if not rows:
             return
         at = now()
-        verdicts = _verdicts(session, rows, self._verdict, self._actor, at)
+        verdicts = _make_verdicts(session, rows, self._verdict, self._actor, at)
         save_verdicts(session, self._dataset_id, verdicts, actor=self._actor, at=at)
         self.changed += len(verdicts)
         spans = [] if given is None else given.spans
@@ -398,7 +398,7 @@ class BatchRun:
         self.batch = insert_batch(session, query=self._query, **asdict(self._verdict), **values)
 
 
-def _verdicts(
+def _make_verdicts(
     session: Session, rows: Sequence[Any], verdict: Verdict, actor: str, at: str
 ) -> list[StoredVerdict]:
     ids = [row.group_id for row in rows]

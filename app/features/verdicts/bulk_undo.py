@@ -62,7 +62,7 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
     with store.read() as session:
         before = read_batch(session, batch_id).undo_spans or ()
         restored = _count_groups(session, before)
-    known, number = _verdicts_in(before), 0
+    known, number = _read_verdicts(before), 0
     while True:
         with store.write() as session:
             batch = _active_batch(session, batch_id)
@@ -75,11 +75,11 @@ def undo_batch(store: Store, batch_id: int, *, actor: str) -> UndoReport:
             known += len(verdicts)
             number += 1
             if len(left) <= 1:
-                if _verdicts_in(spans) != known:
+                if _read_verdicts(spans) != known:
                     # Another run has been at it meanwhile.
                     restored = _count_groups(session, spans)
                 report = UndoReport(batch_id, restored, batch.changed - restored)
-                _close(session, batch, report, actor)
+                _close_batch(session, batch, report, actor)
                 session.respond(report)
                 return report
 
@@ -89,7 +89,7 @@ def _count_groups(session: Session, spans: Spans) -> int:
     return len({group for span in spans for group in judged_between(session, *span)})
 
 
-def _verdicts_in(spans: Spans) -> int:
+def _read_verdicts(spans: Spans) -> int:
     return sum(last - first + 1 for first, last in spans)
 
 
@@ -106,7 +106,9 @@ def _active_batch(session: Session, batch_id: int) -> StoredBulkVerdict:
     return batch
 
 
-def _close(session: Session, batch: StoredBulkVerdict, report: UndoReport, actor: str) -> None:
+def _close_batch(
+    session: Session, batch: StoredBulkVerdict, report: UndoReport, actor: str
+) -> None:
     """Say of a batch, and in the log, that it was taken back."""
     at = now()
     update_batch(session, batch.id, undone=at, undone_by=actor)

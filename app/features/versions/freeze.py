@@ -138,7 +138,7 @@ def plan_freeze(
     return FreezePlan(
         groups=len(members),
         splits=dict(sorted(sides.items())),
-        left_out=_reasons(candidates),
+        left_out=_count_reasons(candidates),
         unsolved=sum(item.unsolved for item in candidates),
     )
 
@@ -171,17 +171,17 @@ def freeze_dataset(
         candidates = read_candidates(session, found.id, request.groups)
         require_solved(candidates, found.name)
         _require_some(found, candidates, request.groups)
-        run = _Run(store, session, found, request, candidates, progress)
+        run = _FreezeRun(store, session, found, request, candidates, progress)
         rows = run.rows()
         run.freeze_tracks()
     values = run.values(rows, actor)
     with store.write() as session:
         _require_free(session, found, request.name)
         name = request.name or next_name(session, found.id)
-        return _save(session, {**values, "name": name}, rows)
+        return _save_version(session, {**values, "name": name}, rows)
 
 
-class _Run:
+class _FreezeRun:
     """One freeze under way: rows of the version, and content brought into the database."""
 
     def __init__(
@@ -210,7 +210,7 @@ class _Run:
             for position, item in enumerate(batch, start):
                 member = members.get(item.id, {})
                 dismissed = member.pop("dismissed", [])
-                rows.append({**_row(item, position, dismissed), **member})
+                rows.append({**_version_row(item, position, dismissed), **member})
             if self._progress is not None:
                 self._progress(start + len(batch), len(self._candidates))
         self._require_cameras()
@@ -267,8 +267,8 @@ class _Run:
             rows[number] = self._member(item.group, annotations.key, key, solved)
             if number in dismissals:
                 own = findings_from_rows(noticed[number], item.inputs_hash)
-                found = [*(_finding(value) for value in solved["findings"]), *own]
-                rows[number]["dismissed"] = _dismissed(found, dismissals[number])
+                found = [*(_finding_from_json(value) for value in solved["findings"]), *own]
+                rows[number]["dismissed"] = _dismissed_findings(found, dismissals[number])
         self._freeze_new(texts, bodies, names)
         return rows
 
@@ -285,7 +285,7 @@ class _Run:
             # As ``soccer.ball_boxes.has_ball_3d``: what every format counts as a ball.
             ball = solved["ball"] is not None and view["included"]
             self._balls[side] = self._balls.get(side, 0) + bool(ball)
-        frames = frame_places(group, _facts(group))
+        frames = frame_places(group, _media_facts_by_view(group))
         return {
             "split": split,
             "splits": None if splits is None else canonical(splits),
@@ -344,12 +344,12 @@ class _Run:
             "balls": sum(self._balls.values()),
             "overrides": sum(bool(item.overrides) for item in self._candidates),
             "splits": splits,
-            "left_out": _reasons(self._candidates),
+            "left_out": _count_reasons(self._candidates),
             **({"tracks": len(self._tracks)} if self._tracks else {}),
         }
 
 
-def _row(item: Candidate, position: int, dismissed: Json) -> dict[str, Any]:
+def _version_row(item: Candidate, position: int, dismissed: Json) -> dict[str, Any]:
     """What every row has; that of a member is completed.
 
     Findings that people dismissed are a part of what they decided; a group without any has the
@@ -373,13 +373,13 @@ def _row(item: Candidate, position: int, dismissed: Json) -> dict[str, Any]:
     }
 
 
-def _finding(value: Json) -> Finding:
+def _finding_from_json(value: Json) -> Finding:
     """A finding as far as a dismissal asks, from the body of a solution."""
     names = ("kind", "sentence", "view", "marking", "suggested", "number")
     return Finding(**{name: value.get(name) for name in names})
 
 
-def _dismissed(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json:
+def _dismissed_findings(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json:
     """What of a group's findings was dismissed, without people and times."""
     pairs = zip(findings, dismissals.of(findings), strict=True)
     return [
@@ -396,11 +396,11 @@ def _dismissed(findings: Sequence[Finding], dismissals: GroupDismissals) -> Json
     ]
 
 
-def _facts(group: Group) -> dict[str, dict[str, int]]:
+def _media_facts_by_view(group: Group) -> dict[str, dict[str, int]]:
     return {view.key: media_facts(view.media) for view in group.views if view.media is not None}
 
 
-def _reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
+def _count_reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
     counts: dict[str, int] = {}
     for item in candidates:
         if item.why is not None:
@@ -419,7 +419,7 @@ def _require_free(session: Session, dataset: DatasetHead, name: str | None) -> N
 def _require_some(dataset: DatasetHead, candidates: Sequence[Candidate], rule: str) -> None:
     if any(item.why is None for item in candidates):
         return
-    reasons = ", ".join(f"{count} {reason}" for reason, count in _reasons(candidates).items())
+    reasons = ", ".join(f"{count} {reason}" for reason, count in _count_reasons(candidates).items())
     hint = None
     if rule == "accepted":
         hint = "Accept groups first, or freeze with groups=passing what the policy alone passes."
@@ -429,7 +429,7 @@ def _require_some(dataset: DatasetHead, candidates: Sequence[Candidate], rule: s
     )
 
 
-def _save(
+def _save_version(
     session: Session, values: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]
 ) -> Version:
     identity = insert_version(session, values, rows)

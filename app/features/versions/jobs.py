@@ -40,7 +40,7 @@ def request_freeze(
         partial(freeze_work, store),
         dataset_id=found.id,
         actor=actor,
-        request=_request_values(request),
+        request={**vars(request), "split": request.split.values()},
     )
 
 
@@ -62,7 +62,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
 
     def freezing(progress: JobProgress) -> Json:
         # The server may have stopped between the version and the record of its job.
-        done = _find_version_of_job(jobs, store, progress.job, _request_of(progress.job))
+        done = _find_version_of_job(jobs, store, progress.job, _request_from_job(progress.job))
         return freeze_work(store, progress) if done is None else version_result(done)
 
     jobs.register_resume(FREEZE, freezing)
@@ -71,7 +71,7 @@ def resume_versions(jobs: Jobs, store: Store) -> None:
 
 def freeze_work(store: Store, progress: JobProgress) -> Json:
     """The work of freezing; its result names the version."""
-    job, request = progress.job, _request_of(progress.job)
+    job, request = progress.job, _request_from_job(progress.job)
     progress(0, None, f"Freezing {_version_title(request)}.")
     return run_job_in_worker(
         store,
@@ -131,11 +131,7 @@ def _verify_in_worker(store: Store, version_id: int, actor: str, progress: Repor
     return {"version_id": version_id, **report.values()}
 
 
-def _request_values(request: FreezeRequest) -> Json:
-    return {**vars(request), "split": request.split.values()}
-
-
-def _request_of(job: Job) -> FreezeRequest:
+def _request_from_job(job: Job) -> FreezeRequest:
     return FreezeRequest(**{**job.request, "split": Split.of(job.request["split"])})
 
 

@@ -138,7 +138,7 @@ def version_manifest(store: Store, version_id: int) -> dict[str, Json]:
     """
     with store.read() as session:
         version = read_version(session, version_id)
-        verdicts, overrides = _verdicts(session, version_id)
+        verdicts, overrides = _read_verdicts(session, version_id)
         return {
             "dataset": version.dataset,
             "version": version.name,
@@ -180,13 +180,13 @@ def version_stamp(session: Session, version: Version) -> dict[str, Json]:
             "software_version": version.software_version,
             "counts": dict(version.counts),
             "changelog": read_changelog(session, version),
-            "rejected": list(_rejected(session, version.id)),
-            **_dismissed(session, version.id),
+            "rejected": list(_read_rejected(session, version.id)),
+            **_read_dismissed(session, version.id),
         }
     }
 
 
-def _dismissed(session: Session, version_id: int) -> dict[str, Json]:
+def _read_dismissed(session: Session, version_id: int) -> dict[str, Json]:
     """Findings of its groups that people had checked; nothing of a version without any."""
     found = [
         {"group": key, **one}
@@ -196,13 +196,13 @@ def _dismissed(session: Session, version_id: int) -> dict[str, Json]:
     return {"dismissed": found} if found else {}
 
 
-def _rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
+def _read_rejected(session: Session, version_id: int) -> Iterator[dict[str, Json]]:
     for key, verdict in version_verdicts(session, version_id, member=False):
         if verdict is not None and verdict["state"].startswith("rejected"):
             yield {"group": key, "reason": verdict["reason"], "note": verdict["note"]}
 
 
-def _verdicts(session: Session, version_id: int) -> tuple[dict[str, int], list[Json]]:
+def _read_verdicts(session: Session, version_id: int) -> tuple[dict[str, int], list[Json]]:
     counts: Counter[str] = Counter()
     overrides: list[Json] = []
     for key, stored in version_verdicts(session, version_id, member=True):

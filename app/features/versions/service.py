@@ -94,7 +94,7 @@ def list_versions(store: Store, dataset: str | int) -> list[Version]:
     """The versions of a dataset, newest first."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-        return _versions(session, dataset_versions(session, found.id))
+        return _versions_from_rows(session, dataset_versions(session, found.id))
 
 
 def get_version(store: Store, version_id: int) -> Version:
@@ -145,7 +145,7 @@ def find_version_id(store: Store, version: str, dataset: str | None = None) -> i
     if dataset is not None:
         return find_version(store, dataset, version).id
     with store.read() as session:
-        found = _versions(session, all_versions(session))
+        found = _versions_from_rows(session, all_versions(session))
     fitting: list[Version] = find_versions(found, version)
     if not fitting:
         raise NotFoundError(f"there is no version {quoted(version)}")
@@ -184,7 +184,7 @@ def read_version(session: Session, version_id: int) -> Version:
     row = version_row(session, version_id)
     if row is None:
         raise NotFoundError(f"there is no version {version_id}")
-    return _versions(session, [row])[0]
+    return _versions_from_rows(session, [row])[0]
 
 
 def read_frozen_groups(
@@ -196,10 +196,10 @@ def read_frozen_groups(
     Raises:
         StorageError: Content is missing.
     """
-    bodies = _frozen(session, version, {row.solution or "" for row in rows})
+    bodies = _read_contents(session, version, {row.solution or "" for row in rows})
     solved = [read_json(bodies[row.solution or ""]) for row in rows]
     names = {name for value in solved for name in calibration_names(value)}
-    more = _frozen(session, version, names)
+    more = _read_contents(session, version, names)
     calibrations = {name.removeprefix(CALIBRATION): decode_camera(more[name]) for name in names}
     groups = thaw_groups(session, version, rows)
     return [
@@ -214,10 +214,10 @@ def thaw_groups(session: Session, version: Version, rows: Sequence[VersionGroup]
     Raises:
         StorageError: Content is missing.
     """
-    bodies = _frozen(session, version, {row.said or "" for row in rows})
+    bodies = _read_contents(session, version, {row.said or "" for row in rows})
     annotations = [read_json(bodies[row.said or ""]) for row in rows]
     shared = {key for value in annotations for key in named_texts(value)}
-    more = _frozen(session, version, shared)
+    more = _read_contents(session, version, shared)
     texts = {key: read_json(more[key]) for key in shared}
     return [
         thaw_group(value, texts, row.frames) for row, value in zip(rows, annotations, strict=True)
@@ -230,19 +230,19 @@ def thaw_outlines(session: Session, version: Version, rows: Sequence[VersionGrou
     Raises:
         StorageError: Content is missing.
     """
-    bodies = _frozen(session, version, {row.said or "" for row in rows})
+    bodies = _read_contents(session, version, {row.said or "" for row in rows})
     outlines = [parse_as(decompress(bodies[row.said or ""]), FrozenOutline) for row in rows]
     shared = {
         view.station for one in outlines for view in one.views if isinstance(view.station, str)
     }
-    more = _frozen(session, version, shared)
+    more = _read_contents(session, version, shared)
     stations = {key: parse_as(decompress(more[key]), OutlineStation) for key in shared}
     return [
         thaw_outline(one, stations, row.frames) for row, one in zip(rows, outlines, strict=True)
     ]
 
 
-def _frozen(session: Session, version: Version, keys: set[str]) -> Mapping[str, bytes]:
+def _read_contents(session: Session, version: Version, keys: set[str]) -> Mapping[str, bytes]:
     found = read_frozen(session, version.dataset_id, keys)
     require_frozen(keys, found)
     return found
@@ -263,12 +263,12 @@ def require_frozen(keys: set[str], found: Mapping[str, bytes]) -> None:
         )
 
 
-def _versions(session: Session, rows: Sequence[Any]) -> list[Version]:
+def _versions_from_rows(session: Session, rows: Sequence[Any]) -> list[Version]:
     verified = read_verifications(session, [row.id for row in rows])
-    return [replace(_version(row), verified=verified.get(row.id)) for row in rows]
+    return [replace(_version_from_row(row), verified=verified.get(row.id)) for row in rows]
 
 
-def _version(row: Any) -> Version:
+def _version_from_row(row: Any) -> Version:
     values = dict(row._mapping)
     del values["policy_hash"]
     return Version(
@@ -305,17 +305,17 @@ def version_hash(
     """
     values = digested_values(policy)
     digest = hashlib.sha256()
-    _add(digest, [HASH_FORMAT, values, solver_version])
+    _add_to_digest(digest, [HASH_FORMAT, values, solver_version])
     for row in rows:
         if row["member"] or row["verdict"] is not None:
             verdict = None if row["verdict"] is None else json.loads(row["verdict"])
             splits = None if row["splits"] is None else json.loads(row["splits"])
             side = [row["split"], splits] if row["member"] else None
-            _add(digest, [row["key"], row["said"], side, verdict])
+            _add_to_digest(digest, [row["key"], row["said"], side, verdict])
     if tracks:
-        _add(digest, ["tracks", dict(tracks)])
+        _add_to_digest(digest, ["tracks", dict(tracks)])
     return digest.hexdigest()
 
 
-def _add(digest: Any, value: Json) -> None:
+def _add_to_digest(digest: Any, value: Json) -> None:
     digest.update(canonical(value).encode() + b"\n")

@@ -141,7 +141,11 @@ def change_webhook(
         if kinds is not None:
             values["kinds"] = canonical(_checked_kinds(kinds))
         if on is not None and on != (found.off is None):
-            values |= _turn_on_columns(session) if on else {"off": OFF}
+            values |= (
+                {"off": None, "log_id": newest_entry(session), "jobs_until": now()}
+                if on
+                else {"off": OFF}
+            )
         if values:
             update_webhook(session, webhook_id, values)
             did = "webhook turned off" if on is False else "webhook changed"
@@ -185,7 +189,7 @@ def send_again(store: Store, dataset: str, webhook_id: int, delivery_id: int) ->
     """Send a message once more, at once; its tries are counted anew."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_turned_on(_read_webhook(session, number, webhook_id))
+        _require_on(_read_webhook(session, number, webhook_id))
         if find_delivery(session, webhook_id, delivery_id) is None:
             raise NotFoundError(f"this webhook has no delivery {delivery_id}")
         update_delivery(session, delivery_id, {"state": WAITING, "attempts": 0, "next_at": now()})
@@ -196,7 +200,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
     """Send a message that says nothing, to see whether messages arrive; one that waits is sent now."""
     number = dataset_id(store, dataset)
     with store.write() as session:
-        _require_turned_on(_read_webhook(session, number, webhook_id))
+        _require_on(_read_webhook(session, number, webhook_id))
         waiting = waiting_of_kind(session, webhook_id, Kind.PING)
         if waiting is not None:
             update_delivery(session, waiting.id, {"next_at": now()})
@@ -206,15 +210,11 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
         return _delivery_from_row(read_deliveries(session, webhook_id, None, 1)[0])
 
 
-def _require_turned_on(webhook: Webhook) -> None:
+def _require_on(webhook: Webhook) -> None:
     if webhook.off is not None:
         raise ConflictError(
             f"the server does not send to this address: {webhook.off}", hint="Turn it on first."
         )
-
-
-def _turn_on_columns(session: Session) -> Mapping[str, Any]:
-    return {"off": None, "log_id": newest_entry(session), "jobs_until": now()}
 
 
 def _checked_kinds(kinds: Iterable[Kind]) -> list[str]:

@@ -191,12 +191,16 @@ def _join_counted(parts: Sequence[Counted]) -> Counted:
     joined = {
         name: np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in _ARRAYS
     }
-    joined["split"] = np.concatenate([_recode(part.splits, part.split, splits) for part in parts])
-    joined["match"] = np.concatenate([_recode(part.matches, part.match, matches) for part in parts])
+    joined["split"] = np.concatenate(
+        [_recode_names(part.splits, part.split, splits) for part in parts]
+    )
+    joined["match"] = np.concatenate(
+        [_recode_names(part.matches, part.match, matches) for part in parts]
+    )
     return Counted(tuple(splits), tuple(matches), **joined)
 
 
-def _recode(before: Sequence[str], codes: Any, names: Sequence[str]) -> Any:
+def _recode_names(before: Sequence[str], codes: Any, names: Sequence[str]) -> Any:
     places = {name: place for place, name in enumerate(names)}
     return np.array([places[name] for name in before], np.int32)[codes] if len(codes) else codes
 

@@ -12,7 +12,7 @@ from app.features.independent_annotations.service import begin_annotation, submi
 from app.features.people.queries import person_by_name, update_person
 from app.features.people.roles import Role
 from app.features.people.service import invite
-from app.http.services import Services
+from app.http.deps import Services
 from tests.waiting import SECONDS
 
 API = "/api/v1"

@@ -16,8 +16,8 @@ from app.db.store import Store
 from app.features.imports import upload_queries as uploads
 from app.features.independent_annotations.service import begin_annotation
 from app.http import idempotency
+from app.http.deps import Services
 from app.http.documents import no_content, responds
-from app.http.services import Services
 from tests.databases import content
 from tests.unit.http import dataset_requests, group_requests
 from tests.unit.http.group_requests import API, Made, Request, ball, store_of, verdict

@@ -25,8 +25,8 @@ from app.errors import DamagedError, StorageError
 from app.features.groups.preview_routes import LargeGroupSolver, PreviewSolver
 from app.features.imports.ingest import ingest
 from app.http import metrics
+from app.http.deps import Services
 from app.http.request_limits import REQUEST_CLASSES, WRITE
-from app.http.services import Services
 from app.worker_pool import WorkerPool
 from app.worker_process import KINDS, WorkerEnded
 from tests.waiting import SECONDS

@@ -9,7 +9,7 @@ import pytest
 from app.db.log import read_log
 from app.features.groups.bulk_edits import MAX_ITEMS
 from app.features.groups.edit_codec import REQUEST_POINTS
-from app.http.services import Services
+from app.http.deps import Services
 from tests.databases import content
 from tests.unit.http.group_requests import etag_of, send, take_handed_in
 from tests.unit.http.test_documents_respond import stopped_after_a_commit

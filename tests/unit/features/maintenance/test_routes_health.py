@@ -19,7 +19,7 @@ from structlog.testing import capture_logs
 
 from app.config import Settings
 from app.errors import StorageError
-from app.http.services import Services
+from app.http.deps import Services
 
 API = "/api/v1"
 SLOW = ("/events", "/suggestions", "/influence", "/yield")

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.features.imports.ingest import ingest
-from app.http.services import Services
+from app.http.deps import Services
 from tests.rigs import groups
 
 ADDRESS = "/api/v1/datasets/rig/rig"

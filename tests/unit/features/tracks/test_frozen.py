@@ -12,8 +12,8 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
 from app.features.exports.service import export_dataset
+from app.features.integrity.records import examine_versions
 from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
-from app.features.versions.check import examine_versions
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, read_frozen, read_json
 from app.features.versions.service import Version

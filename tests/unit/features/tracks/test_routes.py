@@ -8,7 +8,7 @@ import pytest
 
 from app.features.imports.ingest import ingest
 from app.features.solutions.service import solve_dataset
-from app.http.services import Services
+from app.http.deps import Services
 from tests.flights import FIRST, flight_groups
 from tests.waiting import SECONDS
 

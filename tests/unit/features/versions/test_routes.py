@@ -10,7 +10,7 @@ import pytest
 from app.features.jobs.service import Jobs
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.jobs import request_freeze, resume_versions
-from app.http.services import Services
+from app.http.deps import Services
 
 API = "/api/v1"
 

@@ -14,8 +14,8 @@ from app.config import Settings
 from app.errors import BusyError
 from app.features.maintenance import upkeep as upkeep
 from app.features.match_estimates.jobs import MatchJob
-from app.http import services as module
-from app.http.services import STOP_SECONDS, Services
+from app.http import deps as module
+from app.http.deps import STOP_SECONDS, Services
 
 
 class TestServices:

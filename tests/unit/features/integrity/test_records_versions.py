@@ -9,7 +9,7 @@ from app.db.check import Check
 from app.db.dialects.dialect import dialect_of
 from app.db.store import Store
 from app.features.datasets.service import delete_dataset
-from app.features.versions.check import examine_versions
+from app.features.integrity.records import examine_versions
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text
 from tests.databases import said_for_sqlite

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.errors import ReviewError
-from app.features.file_tools.link import link_files, parse_hint
+from app.features.file_tools.shots import link_files, parse_hint
 from tests.bench.link import Filmed, made_ball, plant
 from tests.cameras import write_cameras
 
