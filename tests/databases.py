@@ -15,8 +15,7 @@ import pytest
 from sqlalchemy import Connection, event, inspect, select
 
 from app.config import Settings
-from app.db.dialects.dialect import WRITE, dialect_in, dialect_of
-from app.db.engine import make_engine
+from app.db.dialects.dialect import WRITE, dialect_in, dialect_of, make_engine
 from app.db.idempotency import StoredResponseModel
 from app.db.session import Session
 from app.db.store import Store

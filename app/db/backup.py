@@ -23,8 +23,7 @@ import pysqlite3.dbapi2
 from sqlalchemy import inspect, text
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_in, dialect_of
-from app.db.engine import make_engine, report_storage_errors
+from app.db.dialects.dialect import dialect_in, dialect_of, make_engine, report_storage_errors
 from app.db.home import is_half_written, refused_file_error
 from app.db.locks import DatabaseInUse
 from app.db.log import verify_chain

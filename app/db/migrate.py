@@ -9,8 +9,7 @@ from sqlalchemy import Connection, Engine, inspect, text
 
 from app.config import Settings, own_folder
 from app.db.backup import write_backup
-from app.db.dialects.dialect import WRITE, Dialect, dialect_of
-from app.db.engine import make_engine, report_storage_errors
+from app.db.dialects.dialect import WRITE, Dialect, dialect_of, make_engine, report_storage_errors
 from app.db.home import make_file
 from app.db.locks import DatabaseInUse
 from app.db.recovery.anchor import renew_anchor, require_own_database

@@ -13,8 +13,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.config import Settings
-from app.db.dialects.dialect import AGAIN, WRITE, dialect_of
-from app.db.engine import make_engine, report_storage_errors
+from app.db.dialects.dialect import AGAIN, WRITE, dialect_of, make_engine, report_storage_errors
 from app.db.home import make_file
 from app.db.locks import DatabaseInUse
 from app.db.migrate import (

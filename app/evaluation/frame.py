@@ -1,14 +1,25 @@
-"""Frame: one image of a dataset as evaluation sees it, what was predicted for it, and how boxes overlap."""
+"""Frame: one image of a dataset as evaluation sees it, how boxes overlap, and which frame a name means."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from app.formats.fields import id_text
+from app.formats.frame_names import (
+    frame_path_by_match,
+    frame_path_in_split,
+    key_in_group,
+    with_export_key,
+)
+from app.formats.gamestate_reader import sequence_frame_path
+from app.formats.sn_calibration import line_frame_path
 from app.geometry.camera import Camera
 from app.soccer.annotation import Lines
 from app.soccer.frames import Box, ImageSize
+from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
 
 
@@ -110,3 +121,222 @@ def judge_detections(
         found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
         judged.append(JudgedFrame(frame, None if frame.absent else truth, tuple(found)))
     return judged
+
+
+_SUFFIX = re.compile(r"\.(png|jpe?g|webp|bmp|txt|json)$", re.IGNORECASE | re.ASCII)
+_NUMBER = re.compile(r"(?:frame|image|img)?[ _-]?(\d{1,9})", re.IGNORECASE | re.ASCII)
+_DIGITS = re.compile(r"\d{1,9}", re.ASCII)
+_MATCH = " - "
+"""Stands in the name of every SoccerNet match."""
+_HOLDER = re.compile(
+    r"(labels?|images?|imgs?|frames?|frames-v3|pred(iction)?s?|predict|results?|detect(ion)?s?"
+    r"|out(put)?s?|runs?|exp|train(ing)?|val(id|idation)?|test|challenge|data(sets?)?|coco|yolo"
+    r"|csv|txt|json|box(es)?|balls?|careful|cameras?|calib(ration)?s?|\.)[-_]?[0-9]*",
+    re.IGNORECASE | re.ASCII,
+)
+"""Folders that hold predictions of any match; every other folder may be the name of one."""
+_SEVERAL = -1
+"""Stands in the index for a name that fits several frames."""
+
+
+@dataclass(frozen=True)
+class NamedFrame:
+    """A frame of a dataset by its names.
+
+    Attributes:
+        station: Key of a static camera, or empty.
+        picture: Name of its picture's file with the last folder, ``images/0004.jpg``, or empty.
+    """
+
+    id: int
+    group: str
+    view: str
+    match: str
+    size: ImageSize
+    station: str = ""
+    picture: str = ""
+
+
+@dataclass(frozen=True)
+class FrameNames:
+    """Every spelling by which exactly one frame is meant.
+
+    A broadcast frame is ``<match>/7_1.png``, with or without the folders before the match, its
+    ending, or (where only one match has it) the match. A frame of a static camera is
+    ``<camera>/<frame>`` or ``<frame>/<camera>``. Slashes may be spelt ``_``, ``__`` or ``-``.
+    The names that exports give to frames are known, too.
+
+    A name that does not tell the match means a frame only where no folder before it could be
+    another match: ``7_1.png`` and ``labels/test/7_1.txt``, but not ``epl/Arsenal/7_1.png``.
+    """
+
+    frames: Mapping[int, NamedFrame]
+    stations: Mapping[str, tuple[int, ...]]
+    _index: Mapping[str, int] = field(repr=False)
+    _telling: frozenset[str] = field(repr=False)
+    """Names of the index that tell the match, whatever stands before them."""
+    _numbered: Mapping[int, int] = field(default_factory=dict, repr=False)
+    _views: Mapping[str, tuple[int, ...]] = field(default_factory=dict, repr=False)
+
+    @staticmethod
+    def of(frames: Iterable[NamedFrame]) -> FrameNames:
+        """The index of a dataset's frames."""
+        known = {frame.id: frame for frame in frames}
+        index: dict[str, int] = {}
+        telling: set[str] = set()
+        stations: dict[str, list[int]] = {}
+        numbered: dict[int, int] = {}
+        views: dict[str, list[int]] = {}
+        for frame in known.values():
+            if frame.station:
+                stations.setdefault(frame.station, []).append(frame.id)
+            own = _distinguishing_names(frame)
+            telling |= own
+            for name in own | _names_within_dataset(frame):
+                other = index.setdefault(name, frame.id)
+                if other != frame.id:
+                    index[name] = _SEVERAL
+            for number in _numbers_of_frame(frame):
+                if numbered.setdefault(number, frame.id) != frame.id:
+                    numbered[number] = _SEVERAL
+            if not frame.station:
+                views.setdefault(_without_ending(frame.view), []).append(frame.id)
+        by_station = {key: tuple(ids) for key, ids in stations.items()}
+        rigs = {
+            key: tuple(ids)
+            for key, ids in views.items()
+            if len(ids) > 1 and len({known[identity].match for identity in ids}) == 1
+        }
+        return FrameNames(known, by_station, index, frozenset(telling), numbered, rigs)
+
+    def find(self, name: str) -> NamedFrame | None:
+        """The one frame that a name means, or None.
+
+        Folders before a known match do not matter: ``/data/labels/test/<match>/7_1.txt``.
+        """
+        identity = self._lookup(name)
+        return self.frames[identity] if identity is not None and identity != _SEVERAL else None
+
+    def find_number(self, text: str) -> NamedFrame | None:
+        """The one frame whose view or picture has a number for its name, ``4`` for ``0004.jpg``."""
+        number = _parse_number(text)
+        identity = None if number is None else self._numbered.get(number)
+        return self.frames[identity] if identity is not None and identity != _SEVERAL else None
+
+    def why_not_number(self, text: str) -> str:
+        """Why ``find_number`` found nothing, in words."""
+        if _parse_number(text) in self._numbered:
+            return "is the number of several frames of the dataset; name the picture or the camera, too"
+        return "is not a number that the name of a picture of the dataset has"
+
+    def examples(self, most: int = 3) -> list[str]:
+        """How some frames of the dataset are called."""
+        found = list(self.frames.values())[:most]
+        return [
+            f"{frame.station}/{frame.group}" if frame.station else frame.view for frame in found
+        ]
+
+    def why_not(self, name: str) -> str:
+        """Why ``find`` found nothing, in words."""
+        if self._lookup(name) == _SEVERAL:
+            return "fits several frames of the dataset; name its match, too"
+        if _without_ending(name).rsplit("/", 1)[-1] in self._index:
+            return "is not a frame of the dataset: its folders name none of the matches"
+        return "is not a frame of the dataset"
+
+    def of_station(self, name: str) -> tuple[int, ...]:
+        """Ids of all frames of a camera of a rig: a static one, or views of one match called alike."""
+        last = _without_ending(name).rsplit("/", 1)[-1]
+        return (
+            self.stations.get(last)
+            or self._views.get(_without_ending(name))
+            or self._views.get(last, ())
+        )
+
+    def _lookup(self, name: str) -> int | None:
+        parts = _without_ending(name).split("/")
+        for start in range(len(parts)):
+            known = "/".join(parts[start:])
+            # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
+            if known in self._telling or all(map(_HOLDER.fullmatch, parts[:start])):
+                found = self._index.get(known)
+                if found is not None:
+                    return found
+        return None
+
+
+def _parse_number(text: str) -> int | None:
+    """A number as tables write it, ``4``, ``0004`` or ``4.0``."""
+    found = _DIGITS.fullmatch(id_text(text) or "")
+    return int(found[0]) if found else None
+
+
+def _without_ending(name: str) -> str:
+    return _SUFFIX.sub("", name.replace("\\", "/").strip().strip("/"))
+
+
+def _distinguishing_names(frame: NamedFrame) -> set[str]:
+    """Names that tell the match of a frame, or the group where it has no match."""
+    view, group, match = (
+        _without_ending(frame.view),
+        _without_ending(frame.group),
+        _without_ending(frame.match),
+    )
+    last = match.rsplit("/", 1)[-1]
+    places = {match, last} if _MATCH in last else {match}
+    within = _names_within_match(frame)
+    if match:
+        names = {f"{place}/{name}" for place in places for name in within}
+    else:
+        names = within if frame.station else {f"{group}/{view}"}
+    return _joined_names(names) | {name for name in _exported_names(frame) if name}
+
+
+def _names_within_dataset(frame: NamedFrame) -> set[str]:
+    """Names that another match could have as well."""
+    last = _without_ending(frame.match).rsplit("/", 1)[-1]
+    within = _names_within_match(frame)
+    pictures = {
+        _without_ending(frame.picture),
+        _without_ending(frame.picture).rsplit("/", 1)[-1],
+    } - {""}
+    return pictures | _joined_names(
+        within | ({f"{last}/{name}" for name in within} if last else set())
+    )
+
+
+def _names_within_match(frame: NamedFrame) -> set[str]:
+    """Names of a frame within its match."""
+    view, group = _without_ending(frame.view), _without_ending(frame.group)
+    return {f"{view}/{group}", f"{group}/{view}"} if frame.station else {view}
+
+
+def _joined_names(names: set[str]) -> set[str]:
+    return names | {name.replace("/", glue) for name in names for glue in ("_", "__", "-")}
+
+
+def _numbers_of_frame(frame: NamedFrame) -> set[int]:
+    """Numbers that a frame's view, picture or (static camera) group is called by."""
+    names = {_without_ending(name).rsplit("/", 1)[-1] for name in (frame.view, frame.picture)}
+    if frame.station:
+        names = {_without_ending(frame.group)}
+    found = (_NUMBER.fullmatch(name) for name in names)
+    return {int(match[1]) for match in found if match}
+
+
+def _exported_names(frame: NamedFrame) -> Iterator[str]:
+    """Names that our exports give to the frame, without the folder of a split."""
+    station = Station(frame.station or frame.view, frame.size, shared=bool(frame.station))
+    view = View(frame.view, station)
+    group = Group(frame.group, (view,), match=frame.match)
+    in_group, flat = (with_export_key(view, key_in_group(group, view, glue)) for glue in "/_")
+    for called in (view, in_group):
+        yield _without_ending(frame_path_by_match(group, called, "", ".jpg"))
+    for called in (view, flat):
+        yield _without_ending(sequence_frame_path(group, called, "", ".jpg").split("/", 1)[-1])
+    yield _without_ending(frame_path_in_split(group, view, "", ".jpg").rsplit("/", 1)[-1])
+    for called in (view, in_group):
+        lines = _without_ending(line_frame_path(group, called, "", ".jpg").rsplit("/", 1)[-1])
+        # A plain number tells no match, and a static camera has one file of lines.
+        if not frame.station and lines != _without_ending(frame.view).rsplit("/", 1)[-1]:
+            yield lines

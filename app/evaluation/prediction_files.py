@@ -28,7 +28,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, get_args
 
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNames, NamedFrame
 from app.evaluation.prediction_run import (
     FieldError,
     PredictionRun,

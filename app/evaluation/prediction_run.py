@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from app.errors import InputError
-from app.evaluation.frame import Detection
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import Detection, FrameNames, NamedFrame
 from app.formats.ball_names import is_ball
 from app.formats.report import Report
 from app.geometry.arrays import FloatArray

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from app.errors import DatasetFormatError
-from app.evaluation.frame_names import NamedFrame
+from app.evaluation.frame import NamedFrame
 from app.evaluation.prediction_run import FieldError, PredictionRun, in_field, noted, read_field
 from app.formats import fields
 from app.formats.csv_text import is_missing, parse_number_list, read_rows

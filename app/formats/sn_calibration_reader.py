@@ -13,7 +13,6 @@ from app.errors import DatasetFormatError, UnknownMarkingError
 from app.formats import fields
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.line_documents import LineDocument, read_line_documents
 from app.formats.match_info import (
     METADATA,
     PLACE,
@@ -22,7 +21,13 @@ from app.formats.match_info import (
     read_match_info,
 )
 from app.formats.report import Report
-from app.formats.sn_calibration import LARGEST_UNIT, LineFile, split_and_size
+from app.formats.sn_calibration import (
+    LARGEST_UNIT,
+    LineDocument,
+    LineFile,
+    read_line_documents,
+    split_and_size,
+)
 from app.formats.soccernet_v3 import SPLITS
 from app.formats.trees import opened_tree
 from app.plural import plural

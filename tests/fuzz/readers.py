@@ -21,7 +21,7 @@ from typing import Any
 from app.config import Settings
 from app.db.store import Store
 from app.errors import DatasetFormatError, ReviewError
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNames, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
 from app.features.imports.sources import (
     STATIC,

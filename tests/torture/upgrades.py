@@ -24,8 +24,7 @@ from alembic.operations import Operations
 from sqlalchemy import MetaData, func, select, text
 
 from app.config import Settings
-from app.db.dialects.dialect import WRITE
-from app.db.engine import make_engine
+from app.db.dialects.dialect import WRITE, make_engine
 from app.db.home import make_home
 from app.db.json_columns import pack
 from app.db.log import Entry, append

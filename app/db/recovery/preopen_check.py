@@ -14,7 +14,7 @@ from urllib.parse import quote
 import pysqlite3.dbapi2
 
 from app.config import Settings
-from app.db.engine import make_engine, report_storage_errors
+from app.db.dialects.dialect import make_engine, report_storage_errors
 from app.db.home import ASIDE, KEYS
 from app.db.recovery.anchor import read_anchor, require_own_database
 from app.db.recovery.wal import DatabaseHeader, WriteAheadLog, read_header, read_log

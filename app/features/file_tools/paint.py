@@ -22,10 +22,9 @@ from app.formats.cameras_reader import read_cameras
 from app.formats.cameras_writer import camera_file_name, camera_file_text
 from app.formats.file_tree import Limits
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.line_documents import read_line_documents
 from app.formats.report import Report
 from app.formats.safe_path import resolve_inside
-from app.formats.sn_calibration import LineFile
+from app.formats.sn_calibration import LineFile, read_line_documents
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.sn_calibration_writer import write_line_files
 from app.formats.trees import opened_tree

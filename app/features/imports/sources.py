@@ -18,8 +18,7 @@ from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.formats.cameras_reader import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.file_tree import Limits, Root
-from app.formats.frame_list import read_frame_list
-from app.formats.frames_reader import check_grouping, read_frames
+from app.formats.frames_reader import check_grouping, read_frame_list, read_frames
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.guess_format import guess_format, guess_from_content, holds_only_videos
 from app.formats.issia_3d_reader import open_issia_3d
@@ -122,7 +121,7 @@ class Source:
         flipped: ISSIA: cameras whose frames are mirrored.
         size: Size of the annotated images, for formats that do not say it; None: the usual one. Of
             ``cameras``: that of the images that they were made for; None: that of each view.
-        frames: A list of where the frames lie (``app.formats.frame_list``), where it is not beside
+        frames: A list of where the frames lie (``app.formats.frames_reader``), where it is not beside
             the labels.
         name: What people call it; the log keeps it. Empty: the path.
         ball_category: COCO: name or id of the category that is the ball; empty: by its name.

@@ -28,8 +28,14 @@ from sqlalchemy import (
 )
 
 from app.config import Settings
-from app.db.dialects.dialect import WRITE, Dialect, dialect_in, dialect_of
-from app.db.engine import make_engine, report_storage_errors
+from app.db.dialects.dialect import (
+    WRITE,
+    Dialect,
+    dialect_in,
+    dialect_of,
+    make_engine,
+    report_storage_errors,
+)
 from app.db.home import make_file
 from app.db.locks import database_alone, server_lock
 from app.db.log import verify_chain

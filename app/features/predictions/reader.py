@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app.config import Settings
 from app.errors import DatasetFormatError, InputError, TooLargeError
-from app.evaluation.frame_names import FrameNames
+from app.evaluation.frame import FrameNames
 from app.evaluation.prediction_files import (
     AUTO,
     ReadPredictedCameras,

@@ -17,8 +17,7 @@ from app.db.json_columns import Json
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.evaluation.frame import Detection
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import Detection, FrameNames, NamedFrame
 from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, list_unknown_frames
 from app.features.audit.audit_events import add_audit_event

@@ -18,7 +18,7 @@ from app.errors import InputError, NotFoundError, ReviewError, StorageError
 from app.features.imports.folders import list_folder, resolve_folder
 from app.features.integrity.home import examine_stores
 from app.formats.file_tree import Limits
-from app.formats.frame_list import read_frame_list
+from app.formats.frames_reader import read_frame_list
 from app.formats.report import Report
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.media.files import content_type, read_frame

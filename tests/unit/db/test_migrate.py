@@ -16,8 +16,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.db.backup import verify_backup
-from app.db.dialects.dialect import WRITE
-from app.db.engine import make_engine
+from app.db.dialects.dialect import WRITE, make_engine
 from app.db.home import make_home
 from app.db.locks import DatabaseInUse
 from app.db.migrate import KNOWN_REVISIONS, migrate, migrations_folder, schema_revision

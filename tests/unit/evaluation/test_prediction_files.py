@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNames, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
 from app.formats.camera_json import camera_to_json
 from app.soccer.frames import Box, ImageSize

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import DatasetFormatError, InputError
-from app.evaluation.frame_names import FrameNames
+from app.evaluation.frame import FrameNames
 from app.evaluation.prediction_files import read_predictions
 from app.evaluation.prediction_run import PredictedTrack, ReadPredictions
 from app.soccer.frames import ImageSize

@@ -10,8 +10,7 @@ from sqlalchemy import Engine, text
 from structlog.testing import capture_logs
 
 from app.config import Settings
-from app.db.dialects.dialect import dialect_of
-from app.db.engine import make_engine
+from app.db.dialects.dialect import dialect_of, make_engine
 from app.db.log import Entry, append
 from app.db.recovery import anchor
 from app.db.recovery.anchor import Anchor, anchor_file, make_anchor, read_anchor, renew_anchor

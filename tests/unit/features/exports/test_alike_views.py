@@ -16,7 +16,7 @@ import pytest
 
 import touchline
 from app.errors import InputError
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNames, NamedFrame
 from app.features.exports.service import ExportReport, export_dataset, require_possible
 from app.features.groups.submit import load
 from app.features.imports.cameras import ingest_cameras

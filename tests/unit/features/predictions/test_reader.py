@@ -10,7 +10,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import DatasetFormatError, InputError, NotFoundError, OverloadedError, TooLargeError
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNames, NamedFrame
 from app.features.imports.upload_queries import UploadWriter
 from app.features.predictions import reader as prediction_reader
 from app.features.predictions.reader import (

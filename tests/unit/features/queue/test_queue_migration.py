@@ -13,7 +13,7 @@ import pytest
 from sqlalchemy import text
 
 from app.config import Settings
-from app.db.engine import make_engine
+from app.db.dialects.dialect import make_engine
 from app.db.migrate import KNOWN_REVISIONS, migrate, schema_revision
 from app.db.store import Store
 from app.errors import StorageError

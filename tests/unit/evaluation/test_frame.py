@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.evaluation.frame_names import FrameNames, NamedFrame
+from app.evaluation.frame import FrameNames, NamedFrame
 from app.formats.frame_names import frame_path_by_match, frame_path_in_split
 from app.formats.gamestate_reader import sequence_frame_path
 from app.formats.sn_calibration import line_frame_path
