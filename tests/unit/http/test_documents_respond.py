@@ -250,7 +250,7 @@ class TestUpload:
         store = app.state.services.store
         stops = {
             "written down": stopped_after_a_commit(store, monkeypatch),
-            "moved": stopped_at("clear", monkeypatch),
+            "moved": stopped_at("delete_path", monkeypatch),
             "removed": stopped_at("sync", monkeypatch),
             "answered": stopped_after_a_commit(store, monkeypatch, commits=2),
         }
