@@ -12,7 +12,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from anyio import CapacityLimiter, WouldBlock, move_on_after
+from anyio import CapacityLimiter, WouldBlock, move_on_after, sleep
 from starlette.datastructures import Headers
 from starlette.responses import HTMLResponse, Response
 from starlette.types import Scope
@@ -27,6 +27,9 @@ PATIENCE = 10.0
 MOST_WAITING = 200
 """Requests of a class that may wait; of one person in a team half of them."""
 RETRY_SECONDS = "2"
+PAUSE = 4.0
+"""Seconds until who cannot even wait is told so: a refusal costs the event loop about as much as an answer, and who has
+hundreds of them at once asks again at once."""
 BUSY_PAGE = f"""<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -52,16 +55,16 @@ class RequestClass:
     @property
     def each(self) -> int:
         """How many of them one person of a team may have at work."""
-        return self.width // 2
+        return 1 if self.width < 4 else self.width // 2
 
 
-READ = RequestClass("read", 4)
-"""Whatever only reads, pages of the browser application, and previews: milliseconds each."""
-WRITE = RequestClass("write", 3)
-"""Whatever changes something. One is written at a time; the others are read, solved and encoded meanwhile."""
-COMPUTE = RequestClass("compute", 2)
-"""What is answered by solving many times or many groups, and edits of hundreds of points: up to seconds."""
-TRANSFER = RequestClass("transfer", 16)
+READ = RequestClass("read", 3)
+"""Whatever only reads, and pages of the browser application: milliseconds each."""
+WRITE = RequestClass("write", 2)
+"""Whatever changes something. One is written at a time; another is read, solved and encoded meanwhile."""
+COMPUTE = RequestClass("compute", 4)
+"""What is solved to answer: previews, and up to seconds for what solves many times, many groups, or hundreds of points."""
+TRANSFER = RequestClass("transfer", 8)
 """What waits for a client, a disk, a worker process or another server, and leaves the interpreter alone: pictures,
 uploads, exports, logins."""
 REQUEST_CLASSES = (READ, WRITE, COMPUTE, TRANSFER)
@@ -148,6 +151,7 @@ class ClassLimiter:
                 limiter.acquire_on_behalf_of_nowait(request)
             except WouldBlock:
                 if self.waiting >= MOST_WAITING or limiter.statistics().tasks_waiting >= most:
+                    await sleep(PAUSE)
                     return False
                 self.waiting += 1
                 try:

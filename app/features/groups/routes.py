@@ -44,7 +44,7 @@ from app.http.documents import Document, document, responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
-from app.http.request_limits import READ, limit
+from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.soccer.group import View, view_letter
 
@@ -259,7 +259,7 @@ def get_step(group: Id, entry: Id, store: AppStore) -> StepDocument:
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.READ, group=OwnedKind.GROUP)
-@limit(READ)
+@limit(COMPUTE)
 async def preview_group(
     group: Id, changes: PreviewRequest, services: AppServices, request: Request
 ) -> Response:
