@@ -151,6 +151,8 @@ class ClassLimiter:
                 limiter.acquire_on_behalf_of_nowait(request)
             except WouldBlock:
                 if self.waiting >= MOST_WAITING or limiter.statistics().tasks_waiting >= most:
+                    # Whoever is refused keeps none of their own places meanwhile.
+                    await held.aclose()
                     await sleep(PAUSE)
                     return False
                 self.waiting += 1

@@ -317,6 +317,26 @@ class TestTeam:
 
         run(test, team=True)
 
+    def test_who_is_refused_keeps_none_of_their_own_places(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(request_limits, "MOST_WAITING", 0)
+
+        async def test(service: Service) -> None:
+            for who in ("ann", "bob", "eve"):
+                service.ask(WRITE, f"/{who}", who=who)
+            await service.settle()
+            # Eve is not told yet; once somebody is done, her next one is let in.
+            assert service.work.begun == ["/ann", "/bob"] and service.statuses == []
+            service.work.may_answer.set()
+            await service.settle()
+            service.ask(WRITE, "/eve/again", who="eve")
+            await service.settle()
+            assert service.work.begun[-1] == "/eve/again"
+            service.tasks[2].cancel()
+
+        run(test, team=True)
+
     def test_who_goes_while_waiting_leaves_no_place_taken(self) -> None:
         async def test(service: Service) -> None:
             for who in ("ann", "bob", "eve"):
