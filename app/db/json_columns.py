@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from threading import Lock
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import msgspec
@@ -18,7 +17,6 @@ from app.errors import EXAMINE, DamagedError, GeometryError, InputError
 Shape = TypeVar("Shape")
 Json = Any
 """What ``json`` makes: dict, list, str, int, float, bool or None."""
-_LOOKING = Lock()
 _NULL_CHARACTERS = re.compile(rb"((?<!\\)(?:\\\\)*)\\u0000")
 """U+0000 as JSON writes it, behind an even number of backslashes; tables cannot keep it."""
 _MISSHAPEN = (
@@ -54,16 +52,6 @@ def parse_as(text: str | bytes, kind: type[Shape]) -> Shape:
         return msgspec.json.decode(text, type=kind)
     except (ValueError, msgspec.MsgspecError) as error:
         raise _damaged_record_error() from error
-
-
-def look_through(kind: Any) -> None:
-    """Let msgspec find out what a type is made of, once and by one thread, before it is read.
-
-    It keeps what it found at the classes before that is whole: of two threads that are the first to
-    read a type, one would follow an empty pointer, and the process would end (msgspec 0.22).
-    """
-    with _LOOKING, suppress(msgspec.ValidationError):
-        msgspec.convert(None, kind)
 
 
 @contextmanager

@@ -19,6 +19,13 @@ from app.formats.soccernet_record import BALLS, GAME, IMAGE, RECORD, REST
 from app.geometry.camera import camera_covariance
 from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
+from app.soccer.codec import (
+    ball_to_json,
+    covariance_to_json,
+    left_out_to_json,
+    lines_to_json,
+    picture_to_json,
+)
 from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import CALIBRATIONS, Group, LeftOut, Station, View, make_left_out
 from app.soccer.picture import PictureGeometry
@@ -66,44 +73,17 @@ def view_to_json(view: View) -> dict[str, Any]:
     return {
         "view": view.key,
         "included": view.included,
-        **({} if why is None else {"left_out": {"reason": why.reason, "note": why.note}}),
+        **({} if why is None else {"left_out": left_out_to_json(why)}),
         "station": station.key,
         "shared": station.shared,
         "flipped": station.flipped,
         "calibration": station.calibration,
         "given": None if given is None else camera_to_json(given),
-        **({} if covariance is None else {"given_covariance": [*map(float, covariance)]}),
+        **({} if covariance is None else {"given_covariance": covariance_to_json(covariance)}),
         **({} if station.picture is None else {"picture": picture_to_json(station.picture)}),
         "lines": lines_to_json(station.annotated_lines),
         **({"proposed": [*station.proposed]} if station.proposed else {}),
         "balls": [ball_to_json(ball) for ball in view.balls],
-    }
-
-
-def picture_to_json(picture: PictureGeometry) -> dict[str, Any]:
-    """``{"aspect": a, "shift": [right, down], "sigma": [aspect, right, down]}``."""
-    return {
-        "aspect": float(picture.aspect),
-        "shift": [*map(float, picture.shift)],
-        "sigma": [*map(float, picture.sigma)],
-    }
-
-
-def lines_to_json(lines: Lines) -> dict[str, Any]:
-    """``{marking: [[x, y], ...]}``, pixels; no points where it is said not to be visible."""
-    return {marking: [[float(x), float(y)] for x, y in points] for marking, points in lines.items()}
-
-
-def ball_to_json(ball: BallAnnotation) -> dict[str, Any]:
-    """``{"box": [x, y, w, h] | null, "point": [x, y] | null, ...}``, pixels."""
-    box = ball.box
-    return {
-        "box": None if box is None else [*map(float, (box.x, box.y, box.width, box.height))],
-        "point": None if ball.point is None else [*map(float, ball.point)],
-        "occluded": ball.occluded,
-        "out_of_view": ball.out_of_view,
-        **({"predicted_by": ball.predicted_by} if ball.predicted_by else {}),
-        **({"inferred": True} if ball.inferred else {}),
     }
 
 

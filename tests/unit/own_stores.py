@@ -13,11 +13,11 @@ from app.canonical import canonical
 from app.config import Settings
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel
-from app.features.groups.codecs import policy_to_json
 from app.features.groups.insert_queries import NewRows
 from app.features.queue.refresh_queries import refresh_queue
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
+from app.soccer.codec import policy_to_json
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch

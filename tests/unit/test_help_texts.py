@@ -28,7 +28,7 @@ PLAIN_WORDS = """
     advice after ahead anchor annotate app around arrays arrival ask assign attempt axis backup bar
     bars batches before binned block blocks bodies body boxes browser bulk bundle button buttons
     cache calibrate candidates canonical canvas caption card cards cell changes chart chip choice
-    chooser class cli client clip clock cluster codec codecs colours command comment comments
+    chooser class cli client clip clock cluster codec colours command comment comments
     compare comparison completion config confirm constraints contact copy copying correct cross css
     csv cursor curve cuts database datasets day delete deps descriptions details detect devices
     diagram dialect dialog diff differences dismissals distance documents drags drawing durable

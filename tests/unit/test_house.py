@@ -21,7 +21,6 @@ BELOW = {
 }
 """What modules of each kind import, in their own feature and in others."""
 VALUES = {
-    "groups.codecs",
     "groups.digest",
     "imports.upload_quota",
     "solutions.codec",

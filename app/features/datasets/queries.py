@@ -37,7 +37,6 @@ from app.db.session import COPIES_USED, Session, UsedIdModel
 from app.features.batches.tables import BatchModel
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.findings.queries import DismissalModel
-from app.features.groups.codecs import policy_from_json, policy_to_json
 from app.features.imports.upload_queries import list_uploads
 from app.features.jobs.queries import JobModel
 from app.features.people.visibility_queries import COPIES
@@ -52,6 +51,7 @@ from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
 from app.features.versions.tables import VersionModel
 from app.finite import MAX_ID
 from app.object_store.path import is_address
+from app.soccer.codec import policy_from_json, policy_to_json
 from app.soccer.policy import Policy
 
 _DIGITS = 19

@@ -26,7 +26,6 @@ from app.features.datasets.queries import (
     unused_calibrations,
     update_policy,
 )
-from app.features.groups.codecs import policy_to_json
 from app.features.independent_annotations.queries import (
     CopiesOf,
     copy_dataset_ids,
@@ -40,6 +39,7 @@ from app.finite import quoted
 from app.formats.issia import MATCH as ISSIA
 from app.formats.manifest import LICENCES, UNKNOWN_LICENCE
 from app.sample.fixture import LEAGUES
+from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from app.canonical import canonical, digest_of
 from app.db.json_columns import Json
-from app.features.groups.codecs import (
+from app.soccer.codec import (
     ball_to_json,
     group_without_views_to_json,
     paint_to_json,

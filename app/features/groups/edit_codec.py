@@ -7,19 +7,6 @@ from typing import Any
 
 from app.db.json_columns import Json
 from app.errors import TooManyPointsError
-from app.features.groups.codecs import (
-    ball_from_json,
-    ball_to_json,
-    camera_from_json,
-    camera_to_json,
-    covariance_from_json,
-    covariance_to_json,
-    paint_to_json,
-    picture_from_json,
-    picture_to_json,
-    positions_from_json,
-    positions_to_json,
-)
 from app.features.groups.edit import (
     CompositeEdit,
     Edit,
@@ -40,6 +27,19 @@ from app.features.groups.edit import (
     StationEdit,
 )
 from app.soccer.annotation import Lines
+from app.soccer.codec import (
+    ball_from_json,
+    ball_to_json,
+    camera_from_json,
+    camera_to_json,
+    covariance_from_json,
+    covariance_to_json,
+    paint_to_json,
+    picture_from_json,
+    picture_to_json,
+    positions_from_json,
+    positions_to_json,
+)
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
 

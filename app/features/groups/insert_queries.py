@@ -14,14 +14,14 @@ from app.db.dialects.statements import larger_of
 from app.db.json_columns import pack
 from app.db.session import Session, UsedIdModel
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
-from app.features.groups import codecs
 from app.features.groups.digest import group_inputs_hash, station_digest, view_digest
+from app.soccer import codec
 from app.soccer.group import Group, Station, View
 
 
 def station_values(station: Station) -> dict[str, Any]:
     """Columns of a station that follow from its value."""
-    given = codecs.given_camera_to_json(station)
+    given = codec.given_camera_to_json(station)
     return {
         "key": station.key,
         "shared": station.shared,
@@ -29,11 +29,11 @@ def station_values(station: Station) -> dict[str, Any]:
         "height": station.size.height,
         "flipped": station.flipped,
         "calibration": station.calibration,
-        "lines": canonical(codecs.lines_to_json(station.annotated_lines)),
+        "lines": canonical(codec.lines_to_json(station.annotated_lines)),
         "given": None if given is None else canonical(given),
         "picture": None
         if station.picture is None
-        else canonical(codecs.picture_to_json(station.picture)),
+        else canonical(codec.picture_to_json(station.picture)),
         "proposed": canonical([*station.proposed]) if station.proposed else None,
         "digest": station_digest(station),
     }
@@ -42,14 +42,14 @@ def station_values(station: Station) -> dict[str, Any]:
 def view_values(view: View, position: int) -> dict[str, Any]:
     """Columns of a view that follow from its value."""
     media, extras = view.media, view.extras.values()
-    why = codecs.left_out_to_json(view.left_out)
+    why = codec.left_out_to_json(view.left_out)
     return {
         "key": view.key,
         "position": position,
         "included": view.included,
         "left_out": None if why is None else canonical(why),
         "noise": None if view.noise == 1 else view.noise,
-        "balls": canonical([codecs.ball_to_json(ball) for ball in view.balls]),
+        "balls": canonical([codec.ball_to_json(ball) for ball in view.balls]),
         "media_path": None if media is None else media.path,
         "media_member": None if media is None else media.member,
         "media_frame": None if media is None else media.frame,
@@ -65,7 +65,7 @@ def paint_column(paint: Mapping[str, str]) -> str | None:
 
 def positions_column(group: Group) -> str | None:
     """The column of a group's shared positions; None where it has none."""
-    shared = codecs.positions_to_json(group.positions)
+    shared = codec.positions_to_json(group.positions)
     return canonical(shared) if shared else None
 
 
@@ -81,7 +81,7 @@ def group_values(
         paint: Digests of what was read of its pictures, where the readings are not at hand.
         views: Digests of each view and its station, where they are known.
     """
-    read = codecs.paint_to_json(group.paint) if paint is None else paint
+    read = codec.paint_to_json(group.paint) if paint is None else paint
     return {
         "key": group.key,
         "match": group.match,

@@ -23,11 +23,11 @@ from app.features.datasets.tables import (
     UnassignedFrameModel,
     ViewModel,
 )
-from app.features.groups import codecs
 from app.features.groups.view_queries import StoredStation, stored_station
 from app.features.match_estimates.queries import Factors, factors_from_text
 from app.features.paint.queries import paint_digests, read_readings
 from app.features.people.visibility_queries import visible_groups_condition
+from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View
 from app.soccer.paint_evidence import PaintReading
@@ -241,25 +241,25 @@ def positions_from_text(text: str | None) -> dict[str, SharedPosition]:
     if text is None:
         return {}
     with as_written():
-        return codecs.positions_from_json(parse(text))
+        return codec.positions_from_json(parse(text))
 
 
 def _left_out_from_text(text: str) -> LeftOut | None:
     with as_written():
-        return codecs.left_out_from_json(parse(text))
+        return codec.left_out_from_json(parse(text))
 
 
 # Most requests ask for what the one before asked for.
 @lru_cache(maxsize=1024)
 def _balls_from_text(text: str) -> tuple[BallAnnotation, ...]:
     with as_written():
-        return tuple(map(codecs.ball_from_json, parse(text)))
+        return tuple(map(codec.ball_from_json, parse(text)))
 
 
 @lru_cache(maxsize=256)
 def _extras_from_bytes(data: bytes) -> Extras:
     with as_written():
-        return codecs.extras_from_json(unpack(data))
+        return codec.extras_from_json(unpack(data))
 
 
 BATCH = 1000

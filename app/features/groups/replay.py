@@ -12,14 +12,6 @@ from app.db.log import LogEntry, read_log, verify_chain
 from app.db.session import Session
 from app.db.store import Store
 from app.features.findings.queries import DISMISSAL
-from app.features.groups.codecs import (
-    camera_of_log_entry,
-    extras_from_json,
-    policy_from_json,
-    positions_from_json,
-    station_from_json,
-    view_from_json,
-)
 from app.features.groups.digest import station_digest, view_digest
 from app.features.groups.edit_codec import edit_from_json, station_edit_from_json
 from app.features.groups.insert_queries import group_values, station_values, view_values
@@ -36,6 +28,14 @@ from app.features.match_estimates.queries import NOISE, POSITION
 from app.features.paint.queries import PAINT
 from app.features.pitches.queries import PITCH
 from app.features.queue.refresh_queries import refresh_queue
+from app.soccer.codec import (
+    camera_of_log_entry,
+    extras_from_json,
+    policy_from_json,
+    positions_from_json,
+    station_from_json,
+    view_from_json,
+)
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 

@@ -20,7 +20,6 @@ from app.features.datasets.tables import (
     ViewModel,
 )
 from app.features.findings.queries import DismissalModel
-from app.features.groups import codecs
 from app.features.groups.digest import inputs_hash, station_digest, view_digest
 from app.features.groups.insert_queries import (
     NewRows,
@@ -35,6 +34,7 @@ from app.features.groups.view_queries import save_station
 from app.features.paint.queries import paint_digests
 from app.features.solutions.queries import SolutionModel, is_current
 from app.features.verdicts.tables import VerdictModel
+from app.soccer import codec
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 
@@ -108,7 +108,7 @@ def next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGroup:
         revision=stored.revision + 1,
         changed=at,
         inputs_hash=inputs_hash(
-            group.pitch, pairs, group.positions, codecs.paint_to_json(group.paint), group.noise
+            group.pitch, pairs, group.positions, codec.paint_to_json(group.paint), group.noise
         ),
         group=group,
         stations=stations,
@@ -132,7 +132,7 @@ def save_revision(session: Session, stored: StoredGroup, after: StoredGroup) -> 
     pitch = after.group.pitch
     values |= {"pitch_length": pitch.length, "pitch_width": pitch.width}
     values["positions"] = positions_column(after.group)
-    values["paint"] = paint_column(codecs.paint_to_json(after.group.paint))
+    values["paint"] = paint_column(codec.paint_to_json(after.group.paint))
     _update_row(session, GroupModel.__table__, after.id, values)
 
 

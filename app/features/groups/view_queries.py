@@ -12,14 +12,14 @@ from sqlalchemy import ColumnElement, select, update
 from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
-from app.features.groups import codecs
-from app.features.groups.codecs import ball_from_json
 from app.features.groups.digest import station_digest
 from app.features.groups.insert_queries import station_values
 from app.features.queue.queries import Condition
 from app.features.queue.tables import QueueModel
 from app.geometry.camera import Camera
+from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Lines
+from app.soccer.codec import ball_from_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media, Station
 from app.soccer.picture import PictureGeometry
@@ -269,25 +269,25 @@ def station_pitches(session: Session, dataset_id: int) -> list[tuple[int, Pitch]
 @lru_cache(maxsize=1024)
 def _lines_from_text(text: str) -> Lines:
     with as_written():
-        return codecs.lines_from_json(parse(text))
+        return codec.lines_from_json(parse(text))
 
 
 @lru_cache(maxsize=1024)
 def _not_visible_from_text(text: str) -> tuple[str, ...]:
     with as_written():
-        return codecs.not_visible_from_json(parse(text))
+        return codec.not_visible_from_json(parse(text))
 
 
 @lru_cache(maxsize=1024)
 def _parse_camera(text: str) -> Camera:
     with as_written():
-        return codecs.camera_from_json(parse(text))
+        return codec.camera_from_json(parse(text))
 
 
 @lru_cache(maxsize=1024)
 def _covariance_from_text(text: str) -> tuple[float, ...] | None:
     with as_written():
-        return codecs.covariance_from_json(parse(text).get("covariance"))
+        return codec.covariance_from_json(parse(text).get("covariance"))
 
 
 @lru_cache(maxsize=256)
@@ -299,4 +299,4 @@ def _proposed_from_text(text: str) -> tuple[str, ...]:
 @lru_cache(maxsize=256)
 def _picture_from_text(text: str) -> PictureGeometry | None:
     with as_written():
-        return codecs.picture_from_json(parse(text))
+        return codec.picture_from_json(parse(text))

@@ -12,7 +12,6 @@ from app.db.json_columns import Json
 from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.features.findings.queries import add_group_findings, group_findings, groups_with_finding
-from app.features.groups.codecs import group_without_views_to_json, view_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KIND
 from app.features.groups.revision_queries import save_group
@@ -21,6 +20,7 @@ from app.features.imports.queries import known_groups
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.report import Report
 from app.soccer.annotation import Lines
+from app.soccer.codec import group_without_views_to_json, view_to_json
 from app.soccer.group import Group, View
 
 

@@ -11,7 +11,6 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
-from app.features.groups.codecs import camera_to_json, covariance_to_json
 from app.features.groups.revision_queries import bump_group_revisions, refresh_inputs_hashes
 from app.features.groups.view_queries import (
     dataset_views,
@@ -23,6 +22,7 @@ from app.features.imports.ingest import IngestReport, ingest_session
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
 from app.geometry.camera import Camera
+from app.soccer.codec import camera_to_json, covariance_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.picture import size_centred_on_principal_point
 

@@ -20,12 +20,6 @@ from app.db.store import Store
 from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head
 from app.features.exports.queries import newest_entry_time
 from app.features.findings.queries import dismissals_to_merge
-from app.features.groups.codecs import (
-    group_without_views_to_json,
-    policy_to_json,
-    station_to_json,
-    view_to_json,
-)
 from app.features.groups.queries import StoredGroup, read_groups, sorted_unassigned_rows
 from app.features.groups.undo_stacks import RevisionChain, RevisionChains, station_revision_chain
 from app.features.imports.queries import group_verdicts, known_groups, shared_stations
@@ -34,6 +28,12 @@ from app.formats.file_tree import Root
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import output_anywhere
 from app.progress import ReportProgress
+from app.soccer.codec import (
+    group_without_views_to_json,
+    policy_to_json,
+    station_to_json,
+    view_to_json,
+)
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION
 

@@ -10,7 +10,6 @@ from typing import IO, Any
 from app.db.json_columns import Json
 from app.errors import DatasetFormatError, InputError, ReviewError
 from app.features.findings.queries import MERGED_COLUMNS
-from app.features.groups.codecs import extras_from_json, policy_from_json, station_from_json
 from app.features.groups.undo_stacks import group_of_log_entry, pitch_size
 from app.features.imports.body import MAX_POINTS, MAX_VIEWS, count_points
 from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION, HEAD
@@ -22,6 +21,7 @@ from app.formats.file_tree import BROKEN, FileTree
 from app.formats.json_text import read_json
 from app.formats.report import Report
 from app.soccer.annotation import Extras
+from app.soccer.codec import extras_from_json, policy_from_json, station_from_json
 from app.soccer.finding import FINDING_KINDS
 from app.soccer.frames import MAX_SIDE
 from app.soccer.group import CALIBRATIONS, MAX_NOTE, REASONS, Group, Station, View, make_left_out

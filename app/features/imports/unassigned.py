@@ -12,11 +12,11 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.features.datasets.service import read_dataset_head
-from app.features.groups.codecs import extras_from_json
 from app.features.groups.queries import unassigned_extras, unassigned_rows, upsert_unassigned
 from app.features.imports.ingest import IngestReport, ensure_dataset
 from app.formats.issia import FramePersons
 from app.soccer.annotation import Extras
+from app.soccer.codec import extras_from_json
 
 BATCH = 1000
 """Frames a transaction and a log entry."""

@@ -14,7 +14,6 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import need_dataset
-from app.features.groups.codecs import group_from_json, group_to_json
 from app.features.groups.state import GroupState, need_group, read_states
 from app.features.groups.submit import load_solved
 from app.features.groups.view_queries import group_dataset
@@ -42,6 +41,7 @@ from app.features.independent_annotations.submission_queries import list_submiss
 from app.features.solutions.service import known_calibrations
 from app.finite import Moment
 from app.formats.camera_json import camera_from_json
+from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group
 from app.soccer.solution import Solution

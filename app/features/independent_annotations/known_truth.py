@@ -19,7 +19,6 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError
 from app.features.agreement.queries import AGREED, DECIDED, read_group_states
 from app.features.datasets.service import dataset_id
-from app.features.groups.codecs import group_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.submit import solve_and_keep
 from app.features.independent_annotations.gold import KIND, TruthSource, check_start
@@ -40,6 +39,7 @@ from app.features.versions.service import Version, find_version, read_frozen_gro
 from app.formats.camera_json import camera_to_json
 from app.sample.scene import TRUTH, SceneTruth, read_truth
 from app.soccer.actors import person_of
+from app.soccer.codec import group_to_json
 from app.soccer.group import Group
 
 MOST = 1000

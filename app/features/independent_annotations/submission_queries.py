@@ -14,7 +14,6 @@ from app.db.log import Entry, append, read_entries_of
 from app.db.session import Session
 from app.errors import ConflictError, ForbiddenError
 from app.features.agreement.queries import forget_open
-from app.features.groups.codecs import group_to_json
 from app.features.groups.queries import read_groups
 from app.features.independent_annotations.queries import (
     IndependentAnnotation,
@@ -22,6 +21,7 @@ from app.features.independent_annotations.queries import (
     update_annotation,
 )
 from app.soccer.actors import LOCAL_USER, person_of
+from app.soccer.codec import group_to_json
 
 KIND = "take"
 """Kind of the log's entries about what became of a copy."""

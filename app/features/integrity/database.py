@@ -11,7 +11,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.datasets.service import list_datasets
-from app.features.groups.codecs import paint_to_json
 from app.features.groups.digest import group_inputs_hash, station_digest, view_digest
 from app.features.groups.projection_queries import all_groups, all_stations
 from app.features.groups.replay import replay_log
@@ -21,6 +20,7 @@ from app.features.integrity.records import DELETED, examine_computed, examine_pe
 from app.features.integrity.transfer import find_null_characters, list_null_characters
 from app.features.queue.refresh_queries import differing_rows
 from app.features.solutions.service import stale_groups
+from app.soccer.codec import paint_to_json
 
 
 def examine_guidelines(session: Session, restore: str) -> Check:

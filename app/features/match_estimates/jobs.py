@@ -21,7 +21,6 @@ from app.features.datasets.service import (
     get_dataset_head,
     require_matches,
 )
-from app.features.groups.codecs import picture_to_json
 from app.features.jobs.queries import Job
 from app.features.jobs.records import need_job
 from app.features.jobs.runner import JobProgress, Work, counting_progress
@@ -40,6 +39,7 @@ from app.features.match_estimates.rig import (
     take_back,
 )
 from app.features.solve.jobs import change_and_solve, request_solve
+from app.soccer.codec import picture_to_json
 
 
 @dataclass(frozen=True)

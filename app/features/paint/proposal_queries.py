@@ -18,11 +18,11 @@ from app.db.dialects.statements import insert, items_of, numbers_in
 from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
-from app.features.groups.codecs import lines_from_json, lines_to_json
 from app.features.paint.queries import ProposalModel
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import SolutionModel, is_current, list_undetermined_calibrations
 from app.soccer.annotation import Lines
+from app.soccer.codec import lines_from_json, lines_to_json
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES
 
 _PROPOSAL = cast(Table, ProposalModel.__table__)

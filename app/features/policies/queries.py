@@ -9,8 +9,8 @@ from sqlalchemy import select, text
 from app.db.json_columns import unpack
 from app.db.log import LogModel
 from app.db.session import Session
-from app.features.groups.codecs import policy_from_json
 from app.features.people.visibility_queries import shown_actor
+from app.soccer.codec import policy_from_json
 from app.soccer.policy import Policy
 
 

@@ -16,7 +16,6 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
 from app.features.datasets.service import read_dataset_head
-from app.features.groups.codecs import ball_from_json
 from app.features.groups.edit import SetBall, need_view
 from app.features.groups.state import GroupState, content_tag_from_etag, require_unchanged
 from app.features.groups.submit import load, submit
@@ -40,6 +39,7 @@ from app.features.predictions.service import read_set
 from app.features.queue.query import parse_query
 from app.progress import ReportProgress
 from app.soccer.annotation import BallAnnotation
+from app.soccer.codec import ball_from_json
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import View
 

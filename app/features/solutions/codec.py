@@ -1,7 +1,7 @@
 """Solutions as JSON, compiled from their type hints, and the summary by which groups are listed.
 
 Solutions are rebuilt whenever the solver changes, so their JSON follows the dataclasses; what
-people annotated has explicit codecs of its own (``groups.codecs``)."""
+people annotated has explicit codecs of its own (``soccer.codec``)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from app.db.json_columns import as_written, look_through
-from app.features.groups.codecs import camera_from_json, camera_to_json
+from app.db.json_columns import as_written
+from app.finite import look_through
 from app.geometry.camera import Camera
+from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.frames import ImagePoint, height_above_grass
 from app.soccer.group import Group
 from app.soccer.solution import BallFit, Gate, Solution, ViewSolution

@@ -19,7 +19,6 @@ from app.features.datasets.service import (
     need_dataset,
     read_dataset_head,
 )
-from app.features.groups.codecs import group_from_json, group_to_json
 from app.features.groups.queries import read_groups
 from app.features.groups.view_queries import read_stations, station_pitches
 from app.features.policies.queries import policy_history
@@ -39,6 +38,7 @@ from app.features.solutions.queries import (
 from app.features.solutions.stored_queries import KeptSolution, kept_solutions
 from app.plural import plural
 from app.progress import ReportProgress
+from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy

@@ -13,10 +13,10 @@ import numpy as np
 
 from app.canonical import canonical, digest_of
 from app.db.json_columns import Json, as_written, parse
-from app.features.groups.codecs import camera_from_json, camera_to_json
 from app.features.tracks.stretches import Stretch
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
+from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.pitch import Pitch
 from app.tracking.ball_correct import TrackPatch, correct_track, patched
 from app.tracking.ball_solve import track_ball

@@ -13,10 +13,10 @@ from app.db.json_columns import Json, parse
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
-from app.features.groups.codecs import policy_to_json
 from app.features.versions.queries import annotation_rows
 from app.features.versions.service import Version, read_version
 from app.plural import plural
+from app.soccer.codec import policy_to_json
 
 NEW, GONE = "not in the dataset", "no longer in the dataset"
 

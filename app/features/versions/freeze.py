@@ -19,7 +19,6 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError
 from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head, require_name
 from app.features.findings.queries import GroupDismissals, findings_from_rows
-from app.features.groups.codecs import policy_to_json
 from app.features.groups.queries import read_groups
 from app.features.queue.refresh_queries import read_import_findings
 from app.features.solutions.queries import (
@@ -52,6 +51,7 @@ from app.finite import quoted
 from app.formats.manifest import software_version
 from app.media.files import media_facts
 from app.progress import ReportProgress
+from app.soccer.codec import policy_to_json
 from app.soccer.finding import Finding
 from app.soccer.group import Group, checked_note
 from app.soccer.solution import SOLVER_VERSION

@@ -11,9 +11,12 @@ from sqlalchemy import ColumnElement, Table, exists, func, insert, or_, select, 
 from zlib_ng import zlib_ng
 
 from app.canonical import canonical, digest_of
-from app.db.json_columns import Json, decompress, look_through, parse
+from app.db.json_columns import Json, decompress, parse
 from app.db.session import Session
-from app.features.groups.codecs import (
+from app.features.solutions.queries import CalibrationModel, read_calibration_bodies
+from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
+from app.finite import look_through
+from app.soccer.codec import (
     group_without_views_to_json,
     positions_from_json,
     station_from_json,
@@ -21,8 +24,6 @@ from app.features.groups.codecs import (
     view_from_json,
     view_to_json,
 )
-from app.features.solutions.queries import CalibrationModel, read_calibration_bodies
-from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.paint_evidence import reading_from_json

@@ -12,12 +12,12 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.groups.codecs import policy_to_json
 from app.features.versions.diff import read_changelog
 from app.features.versions.queries import candidate_rows, version_verdicts
 from app.features.versions.service import Version, read_version
 from app.plural import plural
 from app.soccer.choices import VersionRule
+from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy
 
 RULES: tuple[str, ...] = get_args(VersionRule)

@@ -15,7 +15,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError, StorageError
 from app.features.datasets.service import read_dataset_head
-from app.features.groups.codecs import policy_from_json
 from app.features.jobs.queries import OPEN, read_jobs
 from app.features.people.ownership import MIN_HASH, find_versions
 from app.features.solutions.queries import decode_camera, decode_solution
@@ -38,6 +37,7 @@ from app.features.versions.queries import (
     version_row,
 )
 from app.finite import quoted
+from app.soccer.codec import policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy, digested_values
 from app.soccer.solution import Solution

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from app.features.groups.codecs import group_from_json, group_to_json
 from app.features.groups.digest import group_inputs_hash, source_hash, station_digest, view_digest
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
+from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, SharedPosition
 from app.soccer.paint_evidence import PaintEvidence, PaintPoint, PaintReading

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from app.errors import DatasetFormatError, InputError
-from app.features.groups.codecs import policy_to_json, station_to_json
 from app.features.imports.body import MAX_POINTS
 from app.features.imports.edits_export import group_to_merge
 from app.features.imports.merge_parse import (
@@ -22,6 +21,7 @@ from app.features.imports.merge_parse import (
 )
 from app.formats.report import Report
 from app.formats.trees import open_tree
+from app.soccer.codec import policy_to_json, station_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Station
 from app.soccer.policy import PAPER

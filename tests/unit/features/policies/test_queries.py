@@ -3,8 +3,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.db.log import Entry, append
-from app.features.groups.codecs import policy_to_json
 from app.features.policies.queries import PolicyVersion, policy_history
+from app.soccer.codec import policy_to_json
 from app.soccer.policy import PAPER
 
 

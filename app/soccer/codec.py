@@ -1,6 +1,8 @@
-"""Said data to JSON and back, explicit field by field: what the log keeps must stay readable.
+"""What people and datasets said as JSON values, and back: the one codec of lines, balls, cameras,
+stations, views, groups and policies.
 
-Floats go through ``repr`` and come back the same bits. Nothing here knows the database.
+Database, log, versions and exports write these shapes, so each is spelt field by field: what is
+kept must stay readable. Floats come back the same bits.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from app.db.json_columns import Json, look_through
+from app.finite import look_through
 from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
 from app.soccer.annotation import BallAnnotation, Extras, Lines
@@ -23,6 +25,8 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, Policy
 
+Json = Any
+"""Dicts, lists and plain values."""
 _LINES = dict[str, tuple[ImagePoint, ...]]
 look_through(_LINES)
 

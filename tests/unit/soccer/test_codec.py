@@ -9,9 +9,9 @@ import pytest
 from app.canonical import canonical
 from app.db.json_columns import pack, parse, unpack
 from app.errors import InputError
-from app.features.groups import codecs
 from app.features.groups.digest import station_digest
 from app.geometry.camera import Camera
+from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Station
@@ -33,34 +33,34 @@ EXACT = Camera(
 
 class TestGroup:
     def test_comes_back_to_the_last_bit(self, full_group) -> None:
-        value = unpack(pack(codecs.group_to_json(full_group)))
-        assert codecs.group_from_json(value) == full_group
+        value = unpack(pack(codec.group_to_json(full_group)))
+        assert codec.group_from_json(value) == full_group
 
     def test_a_shared_station_can_stand_as_its_key(self, full_group) -> None:
         view = full_group.views[1]
-        value = codecs.view_to_json(view, "cam1")
+        value = codec.view_to_json(view, "cam1")
         assert value["station"] == "cam1"
-        assert codecs.view_from_json(value, view.station) == view
+        assert codec.view_from_json(value, view.station) == view
 
     def test_the_covariance_of_a_given_camera_comes_back(self, full_group, full_camera) -> None:
         station = replace(full_group.views[0].station, given=full_camera)
-        bare = codecs.station_to_json(station)
+        bare = codec.station_to_json(station)
         assert "given_covariance" not in bare  # digests of stations without one stay
         known = replace(station, given_covariance=COVARIANCE)
-        value = json.loads(canonical(codecs.station_to_json(known)))
-        assert codecs.station_from_json(value) == known
+        value = json.loads(canonical(codec.station_to_json(known)))
+        assert codec.station_from_json(value) == known
 
     @pytest.mark.parametrize("lens", WIDE_LENSES)
     def test_a_wide_lens_comes_back(self, full_group, lens) -> None:
         given = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0), lens)
         station = replace(full_group.views[0].station, given=given)
-        value = json.loads(canonical(codecs.station_to_json(station)))
+        value = json.loads(canonical(codec.station_to_json(station)))
         assert value["given"]["lens"] == lens
-        assert codecs.station_from_json(value) == station
+        assert codec.station_from_json(value) == station
 
     def test_a_lens_that_every_format_holds_leaves_digests_as_they_were(self) -> None:
         full_camera = looking((2.0, 60.0, -14.0), (0.0, 0.0, 0.0), 2000.0, bend=0.02)
-        assert "lens" not in codecs.camera_to_json(full_camera)
+        assert "lens" not in codec.camera_to_json(full_camera)
         # Written before lenses had names.
         sizes = Station("cam1", ImageSize(1280, 720), shared=True, given=EXACT)
         assert station_digest(sizes) == "bdaa3b6b84da2dbac917c57d7be3b2b9"
@@ -68,16 +68,16 @@ class TestGroup:
     def test_a_wide_lens_has_no_covariance_of_eight_parameters(self, full_group) -> None:
         given = wide((0.0, 60.0, -9.0), (0.0, 0.0, 0.0))
         station = replace(full_group.views[0].station, given=given)
-        value = codecs.station_to_json(station) | {"given_covariance": np.eye(8).ravel().tolist()}
+        value = codec.station_to_json(station) | {"given_covariance": np.eye(8).ravel().tolist()}
         with pytest.raises(InputError, match="lens is fisheye"):
-            codecs.station_from_json(value)
+            codec.station_from_json(value)
 
     def test_a_picture_comes_back(self, full_group) -> None:
         station = full_group.views[0].station
-        assert "picture" not in codecs.station_to_json(station)  # digests of those without one stay
+        assert "picture" not in codec.station_to_json(station)  # digests of those without one stay
         known = replace(station, picture=PictureGeometry(1.25, (0.5, -0.25), (0.125, 0.0, 0.5)))
-        value = json.loads(canonical(codecs.station_to_json(known)))
-        assert codecs.station_from_json(value) == known
+        value = json.loads(canonical(codec.station_to_json(known)))
+        assert codec.station_from_json(value) == known
 
     @pytest.mark.parametrize(
         ("wrong", "why"),
@@ -92,38 +92,38 @@ class TestGroup:
     )
     def test_a_covariance_that_is_none_is_refused(self, wrong, why) -> None:
         with pytest.raises(ValueError, match=why):
-            codecs.covariance_from_json(wrong)
+            codec.covariance_from_json(wrong)
 
     def test_a_covariance_of_no_camera_is_refused(self, full_group) -> None:
         station = replace(full_group.views[0].station, given=None, given_covariance=COVARIANCE)
         with pytest.raises(ValueError, match="no given camera"):
-            codecs.station_from_json(codecs.station_to_json(station))
+            codec.station_from_json(codec.station_to_json(station))
 
     def test_integers_and_floats_are_one_text(self) -> None:
         whole = BallAnnotation(box=Box(1, 2, 3, 4))
-        assert canonical(codecs.ball_to_json(whole)) == canonical(
-            codecs.ball_to_json(BallAnnotation(box=Box(1.0, 2.0, 3.0, 4.0)))
+        assert canonical(codec.ball_to_json(whole)) == canonical(
+            codec.ball_to_json(BallAnnotation(box=Box(1.0, 2.0, 3.0, 4.0)))
         )
 
     def test_no_extras_are_nothing(self) -> None:
         assert Extras().values() is None
-        assert codecs.extras_from_json(None) == Extras()
+        assert codec.extras_from_json(None) == Extras()
 
 
 class TestCamera:
     def test_every_number_comes_back(self, full_camera) -> None:
-        text = canonical(codecs.camera_to_json(full_camera))
-        again = codecs.camera_from_json(json.loads(text))
+        text = canonical(codec.camera_to_json(full_camera))
+        again = codec.camera_from_json(json.loads(text))
         assert np.array_equal(again.parameters, full_camera.parameters)
 
 
 class TestPolicy:
     @pytest.mark.parametrize("policy", [PAPER, STRICT, Policy(name="mine", tau_percent=0.7)])
     def test_comes_back(self, policy: Policy) -> None:
-        again = codecs.policy_from_json(parse(canonical(codecs.policy_to_json(policy))))
+        again = codec.policy_from_json(parse(canonical(codec.policy_to_json(policy))))
         assert again == policy
         assert again.hash == policy.hash
 
     def test_thresholds_that_are_not_named_keep_their_default(self) -> None:
-        assert codecs.policy_from_json({"name": "x"}) == replace(PAPER, name="x")
-        assert codecs.policy_from_json({"calibration": {}}).calibration == CalibrationPolicy()
+        assert codec.policy_from_json({"name": "x"}) == replace(PAPER, name="x")
+        assert codec.policy_from_json({"calibration": {}}).calibration == CalibrationPolicy()
