@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -45,9 +46,23 @@ def broad_lines() -> list[str]:
     return [line for line in lines if line and not line.startswith("#")]
 
 
-def names(line: str, test: str) -> bool:
-    """Whether a line names a test: each of its parts is in the name."""
-    return all(part in test for part in line.split(" * "))
+def broad_tests(tests: Iterable[str]) -> set[str]:
+    """Those tests that a line of `BROAD` names: each of its parts is in the name."""
+    lines = [line.split(" * ") for line in broad_lines()]
+    of_file: dict[str, list[list[str]]] = {}
+    found = set()
+    for test in tests:
+        file = test.partition("::")[0]
+        if file not in of_file:
+            # Few lines speak of a file, and there are thousands of tests.
+            of_file[file] = [
+                parts
+                for parts in lines
+                if not parts[0].startswith("tests/") or parts[0].partition("::")[0] in file
+            ]
+        if any(all(part in test for part in parts) for parts in of_file[file]):
+            found.add(test)
+    return found
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -66,10 +81,9 @@ def pytest_configure() -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what is broad where that is asked for, and what is about the file of SQLite where there is none."""
     if config.getoption("--quick"):
-        lines = broad_lines()
-        broad = {item for item in items if any(names(line, item.nodeid) for line in lines)}
-        config.hook.pytest_deselected(items=list(broad))
-        items[:] = [item for item in items if item not in broad]
+        broad = broad_tests(item.nodeid for item in items)
+        config.hook.pytest_deselected(items=[item for item in items if item.nodeid in broad])
+        items[:] = [item for item in items if item.nodeid not in broad]
     for item in items if cluster is not None else ():
         if (mark := item.get_closest_marker(MARK)) is not None:
             item.add_marker(pytest.mark.skip(reason=f"of SQLite alone: {mark.args[0]}"))
@@ -77,7 +91,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_collection_finish() -> None:
     """Leave modules and tests out of the search for garbage: they stay until the end."""
-    gc.collect()
     gc.freeze()
     gc.set_threshold(YOUNG)
     gc.enable()

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.soccer.pitch import Pitch
@@ -168,7 +168,8 @@ def _with_event_times(knots: Knots, fitted: Fitted) -> FloatArray:
         inside = np.arange(first + 1, last)
         off = np.abs(knots.times[inside] - fitted.event_time[at]) / max(sigma, 1e-6)
         # Mean square of how far a normal number lies beyond another: half at nought.
-        tail = (1 + off**2) * norm.sf(off) - off * norm.pdf(off)
+        density = np.exp(-(off**2) / 2) / np.sqrt(2 * np.pi)
+        tail = (1 + off**2) * ndtr(-off) - off * density
         covariance[inside, :3, :3] += (sigma**2 * tail)[:, None, None] * np.outer(change, change)
     return covariance
 

@@ -9,7 +9,6 @@ import importlib
 import io
 import json
 import math
-import pkgutil
 import re
 import warnings
 from collections.abc import Callable, Iterator
@@ -24,7 +23,6 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import app
-from app import features
 from app.evaluation.result import Axis, Figure, Panel, Series, figure_csv
 from app.features.findings.service import GroupFindings
 from app.features.groups.solution_schemas import SolutionDocument
@@ -186,29 +184,32 @@ def calls_of(path: Path) -> Iterator[str]:
             yield ast.unparse(node.func)
 
 
-def models() -> list[type[BaseModel]]:
+def models(of: type[BaseModel] = BaseModel) -> Iterator[type[BaseModel]]:
     """Every document of the REST interface."""
-    found: dict[str, type[BaseModel]] = {}
-    for item in pkgutil.walk_packages(features.__path__, f"{features.__name__}."):
-        if not item.name.endswith("schemas"):
-            continue
-        module = importlib.import_module(item.name)
-        for name, value in vars(module).items():
-            if isinstance(value, type) and issubclass(value, BaseModel) and value is not BaseModel:
-                found[f"{value.__module__}.{name}"] = value
-    return list(found.values())
+    for kind in of.__subclasses__():
+        yield from models(kind)
+        if kind.__module__.startswith("app."):
+            yield kind
 
 
 class TestRest:
-    @pytest.mark.parametrize("model", models(), ids=lambda model: model.__name__)
-    def test_every_document_writes_null_instead(self, model: type[BaseModel], bad: float) -> None:
-        # Whatever the type of a field, the worst that could stand there, also inside of it.
-        values = dict.fromkeys(model.model_fields, bad)
-        deep = {name: [bad, {"x": (bad,)}] for name in model.model_fields}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            for fields in (values, deep):
-                strict(model.model_construct(**fields).model_dump_json())
+    def test_every_document_writes_null_instead(self, bad: float) -> None:
+        importlib.import_module("app.main")
+        # Bodies with passwords come in and never leave.
+        documents = {
+            model
+            for model in models()
+            if not any("Secret" in str(item.annotation) for item in model.model_fields.values())
+        }
+        assert len(documents) > 300
+        for model in documents:
+            # Whatever the type of a field, the worst that could stand there, also inside of it.
+            values = dict.fromkeys(model.model_fields, bad)
+            deep = {name: [bad, {"x": (bad,)}] for name in model.model_fields}
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                for fields in (values, deep):
+                    strict(model.model_construct(**fields).model_dump_json())
 
     def test_a_solution_is_told_with_null(self, record: ExportRecord, bad: float) -> None:
         solution = poisoned(record.solution, bad)

@@ -28,9 +28,9 @@ def transactions(source: str) -> list[int]:
     ]
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
-def test_no_route_opens_a_transaction(path: Path) -> None:
-    assert transactions(path.read_text()) == []
+def test_no_route_opens_a_transaction() -> None:
+    found = {path.name: lines for path in SOURCES if (lines := transactions(path.read_text()))}
+    assert (len(SOURCES) > 40, found) == (True, {})
 
 
 @pytest.mark.parametrize("way", ["read", "glance", "peek", "write"])
