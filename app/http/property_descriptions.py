@@ -30,7 +30,7 @@ PARAMETERS: Mapping[str, str] = {
     "recording": "Id of the recording.",
     "session": "Id of the session.",
     "sort": "Field by which the frames are ordered; with a minus before it, downwards.",
-    "state": "Only jobs in this state.",
+    "state": "Only jobs in this state; `open`: those that wait or run.",
     "station": "Id of the station.",
     "table": "Name of the table.",
     "thread": "Id of the thread.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, get_args
@@ -32,8 +32,10 @@ _ONCE = "is there more than once; no parameter is a list"
 _NO_NUMBER = "must be a number in plain digits"
 _INT = re.compile(r"0|-?[1-9][0-9]*")
 _FLOAT = re.compile(r"-?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?")
-_FIELDS: dict[Callable[..., Any], frozenset[str]] = {}
+_FIELDS: dict[Callable[..., Any], dict[tuple[str, ...], frozenset[str]]] = {}
 """Of each route by its function, once somebody misspelt one."""
+MOST_NAMED = 8
+"""Names that an error lists; of more than that it lists none."""
 
 
 class HeadAsGet:
@@ -141,11 +143,26 @@ def sentence_about(request: Request, location: tuple[int | str, ...]) -> str:
     """What to say of a name that nobody knows, at its place in the request."""
     place, name = location[0], str(location[-1])
     route = request.scope["route"]
-    known = _parameter_names(route) if place == "query" else _body_field_names(route)
-    what = "parameter" if place == "query" else "field"
+    if place == "query":
+        nearest = get_close_matches(name, _parameter_names(route), n=1)
+        return f"there is no such parameter{_meant(nearest)}"
+    by_place = _body_field_names(route)
+    # Items of a list have no place of their own in a schema.
+    above = tuple(str(part) for part in location[1:-1] if not isinstance(part, int))
+    known = by_place.get(above)
+    if known is None:
+        known = frozenset(one for names in by_place.values() for one in names if one != name)
     nearest = get_close_matches(name, known, n=1)
-    meant = f"; did you mean {nearest[0]}?" if nearest else ""
-    return f"there is no such {what}{meant}"
+    if nearest:
+        return f"there is no such field{_meant(nearest)}"
+    places = [f"/{'/'.join((*at, name))}" for at, names in by_place.items() if name in names]
+    belongs = f", it belongs at {' or '.join(places)}" if places else ""
+    here = f"; known here: {', '.join(sorted(known))}" if 0 < len(known) <= MOST_NAMED else ""
+    return f"there is no such field{belongs}{here}"
+
+
+def _meant(nearest: list[str]) -> str:
+    return f"; did you mean {nearest[0]}?" if nearest else ""
 
 
 def _parameter_names(route: APIRoute) -> frozenset[str]:
@@ -174,24 +191,45 @@ def _number_parameters(
     return tuple(found)
 
 
-def _body_field_names(route: APIRoute) -> frozenset[str]:
-    """Every name that stands anywhere in the body of a route."""
+def _body_field_names(route: APIRoute) -> dict[tuple[str, ...], frozenset[str]]:
+    """The names of each object in the body of a route, by the names that lead to it."""
     if route.body_field is None:
-        return frozenset()
+        return {}
     if route.endpoint not in _FIELDS:
         body: Any = route.body_field.field_info.annotation
         # To make a schema takes milliseconds, in which nobody is answered.
-        _FIELDS[route.endpoint] = frozenset(_property_names(TypeAdapter(body).json_schema()))
+        schema = TypeAdapter(body).json_schema()
+        found: dict[tuple[str, ...], set[str]] = {}
+        _collect_property_names(schema, schema.get("$defs", {}), (), found, frozenset())
+        _FIELDS[route.endpoint] = {place: frozenset(names) for place, names in found.items()}
     return _FIELDS[route.endpoint]
 
 
-def _property_names(schema: Any) -> Iterator[str]:
-    if isinstance(schema, dict):
-        properties = schema.get("properties")
-        if isinstance(properties, dict):
-            yield from properties
-        for part in schema.values():
-            yield from _property_names(part)
-    elif isinstance(schema, list):
-        for part in schema:
-            yield from _property_names(part)
+def _collect_property_names(
+    schema: Any,
+    definitions: Mapping[str, Any],
+    place: tuple[str, ...],
+    found: dict[tuple[str, ...], set[str]],
+    above: frozenset[str],
+) -> None:
+    """Adds the names of a schema's objects to those of their places; items of a list are at its own.
+
+    Args:
+        schema: Part of a JSON schema.
+        definitions: What its references mean.
+        place: Names that lead to the part.
+        found: Result: names by place.
+        above: References that led to the part: one that holds itself is not followed again.
+    """
+    if not isinstance(schema, dict):
+        return
+    name = str(schema.get("$ref", "")).rpartition("/")[2]
+    if name and name not in above:
+        _collect_property_names(definitions[name], definitions, place, found, above | {name})
+    for key in ("anyOf", "oneOf", "allOf"):
+        for part in schema.get(key, ()):
+            _collect_property_names(part, definitions, place, found, above)
+    _collect_property_names(schema.get("items"), definitions, place, found, above)
+    for key, part in schema.get("properties", {}).items():
+        found.setdefault(place, set()).add(key)
+        _collect_property_names(part, definitions, (*place, key), found, above)

@@ -27,7 +27,7 @@ import { idempotencyKey, request, requestTagged } from './client.js';
  * @typedef {BallRunJson & {frame: number[], x: number[], y: number[], diameter: number[], sigma_px: number[], confidence: number[], state: string}} BallRunFrames
  */
 
-/** @param {number} id of the recording @param {AbortSignal} [signal] @returns {Promise<{items: BallRunJson[]}>} */
+/** @param {number} id of the recording @param {AbortSignal} [signal] @returns {Promise<{items: BallRunJson[], following: number[]}>} `following`: frames whose clicks are being followed */
 export function getBallRuns(id, signal) {
 	return request(`/recordings/${id}/ball-runs`, { signal });
 }

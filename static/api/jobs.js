@@ -21,9 +21,11 @@ import { queryText, request } from './client.js';
  * @property {string | null} started
  * @property {string | null} ended
  * @property {string} actor
+ * @property {JobSubject | null} subject what it works on; null: it is about something else
  */
+/** @typedef {{recording: number | null, first: number | null, last: number | null, link: number | null, practice: 'groups' | 'recording' | null}} JobSubject */
 
-/** @param {{dataset?: string, limit?: number, cursor?: string | null}} options @param {AbortSignal} [signal] @returns {Promise<{items: JobJson[], next: string | null}>} */
+/** @param {{dataset?: string, kind?: string, state?: JobState | 'open', limit?: number, cursor?: string | null}} options @param {AbortSignal} [signal] @returns {Promise<{items: JobJson[], next: string | null}>} */
 export function getJobs(options, signal) {
 	return request(`/jobs${queryText(options)}`, { signal });
 }

@@ -22,6 +22,15 @@ export function shareOf(job) {
 }
 
 /**
+ * The one to show of some jobs: that at work, else the one that begins next, else the last that ended.
+ *
+ * @param {JobJson[]} jobs oldest first @returns {JobJson | null}
+ */
+export function jobToShow(jobs) {
+	return jobs.find(({ state }) => state === 'running') ?? jobs.find((job) => !isOver(job)) ?? jobs.at(-1) ?? null;
+}
+
+/**
  * Follow a job to its end.
  *
  * @param {JobJson} job @param {(job: JobJson) => void} seen each time it has moved

@@ -10,6 +10,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.drawn_balls import FRAMES, SIZE, WALL, place, write_film
+from tests.e2e.conftest import Console
+from tests.e2e.screen import until
 from tests.e2e.service import delete_dataset
 from tests.e2e.test_access import SIZES, resize, serious_in_both, soon
 from tests.e2e.test_pages import TOO_WIDE
@@ -104,6 +106,39 @@ def test_a_cross_clicks_by_keyboard(recording: int, open_page: OpenPage) -> None
     card = page.get_by_role("region", name="Ball", exact=True)
     expect(card).to_contain_text(f"frames 0 to {FRAMES - 1}", timeout=120_000)
     expect(page.locator(".ball__cross")).to_have_count(0)
+
+
+def test_a_page_that_is_loaded_again_shows_what_a_click_was_followed_to(
+    recording: int, open_page: OpenPage
+) -> None:
+    page = open_page(f"/recordings/{recording}")
+    shows(page, 0)
+    runs = f"/api/v1/recordings/{recording}/ball-runs"
+    click(page, 0)
+    until(page, lambda: page.request.get(runs).json()["following"] == [0])
+    page.reload()
+    card = page.get_by_role("region", name="Ball", exact=True)
+    expect(card).to_contain_text(f"frames 0 to {FRAMES - 1}", timeout=120_000)
+    assert len(page.request.get(runs).json()["items"]) == 1
+
+
+def test_a_cross_clicks_where_its_button_has_the_focus(
+    recording: int, open_page: OpenPage, console: Console
+) -> None:
+    # Nothing there looks like a ball: that is what the server says of the place of the cross.
+    console.expect("400")
+    page = open_page(f"/recordings/{recording}")
+    shows(page, 0)
+    button = page.get_by_role("button", name="Cross F")
+    button.focus()
+    page.keyboard.press("Enter")
+    expect(page.locator(".ball__cross")).to_have_count(1)
+    page.keyboard.press("ArrowLeft")
+    with page.expect_response("**/ball-runs") as answered:
+        page.keyboard.press("Enter")
+    assert answered.value.request.method == "POST"
+    assert answered.value.request.post_data_json["x"] == SIZE[0] / 2 - 8
+    expect(button).to_be_focused()
 
 
 def test_it_is_usable_by_everybody_in_every_size(recording: int, open_page: OpenPage) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
@@ -15,6 +17,7 @@ from app.soccer.pitch import Pitch
 from app.solving.jaccard import project_markings
 from tests.e2e.screen import until
 from tests.e2e.service import delete_dataset
+from tests.e2e.tab_walk import faults_of
 from tests.e2e.test_access import (
     BEYOND_ITS_FRAME,
     NESTED_SCROLLERS,
@@ -257,3 +260,134 @@ def test_the_pitch_that_a_shot_shows_is_taken_for_its_match(
     pitch = page.request.get("/api/v1/datasets/pans/pitches").json()["items"][0]
     assert (pitch["length"], pitch["width"]) == (101.2, 68.0)
     assert pitch["previous"] == {"length": 105.0, "width": 68.0}
+
+
+def queued(page: Page, address: str, body: dict[str, Any] | None) -> dict[str, Any]:
+    """A job that somebody begins elsewhere."""
+    begun = page.request.post(address, data=body)
+    assert begun.status == 202, begun.text()
+    job: dict[str, Any] = begun.json()
+    return job
+
+
+def ends_all(page: Page, jobs: list[dict[str, Any]]) -> None:
+    """Cancel jobs, the last first, and wait until they are over."""
+    for job in reversed(jobs):
+        page.request.delete(f"/api/v1/jobs/{job['id']}")
+    open_jobs = "/api/v1/jobs?state=open&dataset=pans"
+    until(page, lambda: page.request.get(open_jobs).json()["items"] == [])
+
+
+def linked(page: Page, recording: int) -> int:
+    """A link of the end of the film, as a replay, to its beginning."""
+    here = f"/api/v1/recordings/{recording}"
+    tag = {"If-Match": page.request.get(f"{here}/shots").headers["etag"]}
+    live, replay = {"first": 0, "last": 3}, {"first": 4, "last": LAST}
+    shots = [{**live, "kind": "main"}, {**replay, "kind": "replay"}]
+    assert page.request.put(f"{here}/shots", data={"shots": shots}, headers=tag).ok
+    both = {"live": live, "replay": {"recording": recording, **replay}}
+    made = page.request.post(f"{here}/links", data=both)
+    return int(made.json()["id"])
+
+
+class TestBegunBefore:
+    """A page that is opened, or loaded again, shows what is at work on it, and can end it."""
+
+    def test_a_recording_shows_tracking_shots_and_groups(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = open_page(f"/recordings/{recording}")
+        shows(page, 0)
+        here = f"/api/v1/recordings/{recording}"
+        # One runs at a time: the first ones keep the others waiting.
+        tracking = [queued(page, f"{here}/cameras", {"first": 0, "last": LAST}) for _ in range(4)]
+        finding = queued(page, f"{here}/shots", None)
+        grouping = queued(page, f"{here}/groups", {"frames": [0], "propose": False})
+        page.reload()
+        shows(page, 0)
+        for card, job in (
+            ("Cameras", tracking[0]),
+            ("Shot", finding),
+            ("Instants", grouping),
+        ):
+            at_work = page.get_by_role("region", name=card, exact=True).locator(".job")
+            expect(at_work).to_contain_text(job["title"])
+            expect(at_work.get_by_role("progressbar")).to_be_visible()
+        button = page.get_by_role("button", name="Track this shot")
+        expect(button).to_have_attribute("aria-disabled", "true")
+        ends_all(page, [*tracking, finding, grouping])
+        expect(page.get_by_role("progressbar")).to_have_count(0)
+        expect(page.get_by_role("region", name="Shot", exact=True)).to_contain_text("cancelled")
+
+    def test_a_link_shows_the_search_for_its_times(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = open_page("/recordings")
+        here = f"/api/v1/recordings/{recording}"
+        shots = page.request.get(f"{here}/shots")
+        both = [
+            {"first": 0, "last": 3, "kind": "main"},
+            {"first": 4, "last": LAST, "kind": "replay"},
+        ]
+        tag = {"If-Match": shots.headers["etag"]}
+        assert page.request.put(f"{here}/shots", data={"shots": both}, headers=tag).ok
+        sides = {"live": {"first": 0, "last": 3}, "replay": {"recording": recording}}
+        sides["replay"] |= {"first": 4, "last": LAST}
+        link = page.request.post(f"{here}/links", data=sides).json()["id"]
+        tracking = [queued(page, f"{here}/cameras", {"first": 0, "last": 3}) for _ in range(4)]
+        looking = queued(page, f"{here}/links/{link}/ball", {})
+        page.goto(f"/recordings/{recording}/links/{link}")
+        at_work = page.get_by_role("region", name="Ball").locator(".job")
+        expect(at_work).to_contain_text(looking["title"])
+        button = page.get_by_role("button", name="Find the times from the ball")
+        expect(button).to_have_attribute("aria-disabled", "true")
+        at_work.get_by_role("button", name="Cancel").click()
+        expect(at_work).to_contain_text("cancelled")
+        expect(button).to_have_attribute("aria-disabled", "false")
+        ends_all(page, tracking)
+
+    def test_the_list_shows_what_is_being_indexed(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = open_page("/recordings")
+        here = f"/api/v1/recordings/{recording}"
+        tracking = [queued(page, f"{here}/cameras", {"first": 0, "last": LAST}) for _ in range(4)]
+        finding = queued(page, f"{here}/shots", None)
+        page.reload()
+        at_work = page.get_by_role("region", name="Add a recording").locator(".job")
+        expect(at_work).to_contain_text(finding["title"])
+        at_work.get_by_role("button", name="Cancel").click()
+        expect(at_work).to_contain_text("cancelled")
+        ends_all(page, tracking)
+
+
+class TestKeyboardAlone:
+    @pytest.mark.parametrize("size", SIZES[:2])
+    def test_leads_through_a_recording(
+        self, recording: int, open_page: OpenPage, size: tuple[int, int]
+    ) -> None:
+        page = tracked(open_page, recording)
+        page.keyboard.press("i")
+        link = linked(page, recording)
+        clocks = {"clocks": [{"frame": 0, "half": 1, "seconds": 760}]}
+        assert page.request.patch(f"/api/v1/recordings/{recording}", data=clocks).ok
+        page.reload()
+        shows(page, 0)
+        expect(page.get_by_role("link", name=re.compile("frames 4 to"))).to_be_visible()
+        resize(page, *size)
+        assert faults_of(page) == []
+        page.goto(f"/recordings/{recording}/links/{link}")
+        page.wait_for_selector(".linking__side[data-frame] img >> nth=1")
+        page.keyboard.press("i")
+        expect(page.get_by_role("region", name="Instants")).to_contain_text("1 instant")
+        assert faults_of(page) == []
+
+    def test_leads_through_the_list(self, recording: int, open_page: OpenPage) -> None:
+        page = open_page("/recordings")
+        expect(page.get_by_role("link", name="pan")).to_be_visible()
+        assert faults_of(page) == []
+
+    def test_leads_through_the_practice_on_a_recording(self, open_page: OpenPage) -> None:
+        page = open_page("/help/practice")
+        expect(page.get_by_role("button", name="Make the recording")).to_be_visible()
+        assert faults_of(page) == []

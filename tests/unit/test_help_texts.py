@@ -48,7 +48,7 @@ PLAIN_WORDS = """
     postgresql preopen preview problem process profile progress projection proof property proposal
     propose props provider queries query quota rail rater reader reasons record refresh reimport
     remote render repeats report requests resect resource restore result rethreshold return revert
-    reviewers rights roles rotation router routes row rows rules run runner runs safe save scale
+    reviewers rights roles rotation router routes row rows rules run runner running runs safe save scale
     scene scene3d scenes schemas score scoring scroll search sender sending serve server service
     serving session sets shared sharing sheet sign snapshot solve solving source sources sphere
     spread sqlite squares stacks stage staging standpoints state statements statistics steps storage

@@ -29,6 +29,8 @@ EXPORT = "export"
 """The kind of job whose row is the only way to its file."""
 OPEN = (WAITING, RUNNING)
 """States that are not the last one of a job."""
+SUBJECT = ("recording", "first", "last", "link")
+"""What of a job's request says what it works on, and nothing else of it."""
 
 
 class JobModel(Base):
@@ -95,6 +97,14 @@ class Job:
     actor: str
     tries: int
     ending: bool = False
+
+    @property
+    def subject(self) -> dict[str, Json] | None:
+        """Which recording, frames of it, link or practice it works on; None where it is about something else."""
+        asked = self.request if isinstance(self.request, dict) else {}
+        if self.kind == "practice":
+            return {"practice": "recording" if asked.get("recording") else "groups"}
+        return {key: asked[key] for key in SUBJECT if type(asked.get(key)) is int} or None
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query
 
 from app.features.datasets.service import dataset_id
-from app.features.jobs.queries import Job
+from app.features.jobs.queries import OPEN, Job
 from app.features.jobs.schemas import JobDocument, JobKind, JobPage
 from app.http.cursor import parse_cursor
 from app.http.deps import Actor, AppServices, Id, SeesWhole
@@ -33,7 +33,7 @@ def list_jobs(
     visibility: SeesWhole,
     dataset: DatasetFilter = None,
     kind: Annotated[JobKind | None, Query()] = None,
-    state: Annotated[JobState | None, Query()] = None,
+    state: Annotated[JobState | Literal["open"] | None, Query()] = None,
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> JobPage:
@@ -42,7 +42,7 @@ def list_jobs(
     jobs = services.jobs.find(
         dataset_id=found,
         kinds=[kind] if kind else [],
-        states=[state] if state else [],
+        states=OPEN if state == "open" else [state] if state else [],
         before=parse_cursor(cursor),
         limit=limit + 1,
         visibility=visibility,

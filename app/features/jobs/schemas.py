@@ -52,6 +52,18 @@ class JobProblem(Document):
     pointer: str | None
 
 
+class JobSubject(Document):
+    """What a job works on."""
+
+    recording: int | None = Field(default=None, description="Id of the recording.")
+    first: int | None = Field(default=None, description="First of its frames; null: all of them.")
+    last: int | None = Field(default=None, description="Last of its frames; null: all of them.")
+    link: int | None = Field(default=None, description="Id of the link of a replay.")
+    practice: Literal["groups", "recording"] | None = Field(
+        default=None, description="Which practice it makes."
+    )
+
+
 class JobDocument(Document):
     """A job as it stands."""
 
@@ -69,6 +81,9 @@ class JobDocument(Document):
     started: datetime | None
     ended: datetime | None
     actor: str
+    subject: JobSubject | None = Field(
+        description="The part of a recording, or the practice, that it works on; null: it is about something else."
+    )
 
 
 class JobPage(ListDocument[JobDocument]):

@@ -54,9 +54,12 @@ def _made(found: StoredRun) -> Response:
 @router.get("", operation_id="listBallRuns", responses=responses(404))
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
-def get_runs(recording: Id, store: AppStore) -> BallRunList:
+def get_runs(recording: Id, services: AppServices) -> BallRunList:
     """The balls that were followed in a recording."""
-    return BallRunList(items=[BallRunDocument.of(one) for one in list_runs(store, recording)])
+    # Asked first: what is over by then is in the list.
+    following = services.balls.frames_at_work(recording)
+    items = [BallRunDocument.of(one) for one in list_runs(services.store, recording)]
+    return BallRunList(items=items, following=following)
 
 
 @router.post(

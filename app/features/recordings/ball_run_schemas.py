@@ -120,6 +120,10 @@ class BallRunFrames(BallRunDocument):
 class BallRunList(ListDocument[BallRunDocument]):
     """Ball runs of a recording, by their first frames."""
 
+    following: list[int] = Field(
+        description="Frames whose clicks are being followed now; what comes of them is in a later list."
+    )
+
 
 def _head(found: StoredRun) -> dict[str, object]:
     run = found.run

@@ -95,17 +95,23 @@ def add_run(
         ConflictError: The recording cannot be read.
         InputError: The frame is outside of the recording, or nothing near the click looks like a ball.
     """
-    recording, run = _followed(store, follower, recording_id, click)
+    with follower.at_work(recording_id, click.frame):
+        recording, run = _followed(store, follower, recording_id, click)
+        return _insert(store, recording, run, actor)
+
+
+def _insert(store: Store, recording: Recording, run: BallRun, actor: str) -> StoredRun:
+    """Keep a new run."""
     with store.write() as session:
         number = insert_run(
             session,
             actor,
             dataset_id=recording.dataset_id,
-            recording_id=recording_id,
+            recording_id=recording.id,
             sha256=recording.sha256,
             **run_columns(run),
         )
-        found = _need(session, recording_id, number)
+        found = _need(session, recording.id, number)
         _note(session, actor, "ball followed", found)
         session.respond(found)
     return found
@@ -129,7 +135,14 @@ def mend_run(
     """
     before = get_run(store, recording_id, run_id)
     _require_open(before, if_match)
-    _, new = _followed(store, follower, recording_id, click, before.run)
+    with follower.at_work(recording_id, click.frame):
+        _, new = _followed(store, follower, recording_id, click, before.run)
+        return _mend(store, before, new, if_match, actor)
+
+
+def _mend(store: Store, before: StoredRun, new: BallRun, if_match: str, actor: str) -> StoredRun:
+    """Keep a run with what one more click was followed to."""
+    recording_id, run_id = before.recording, before.id
     with store.write() as session:
         before = _need(session, recording_id, run_id)
         _require_open(before, if_match)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Lock
 
 from app.config import Settings
 from app.db.store import Store
@@ -34,6 +37,24 @@ class BallFollower:
     def __init__(self, settings: Settings):
         self._settings = settings
         self._pool = WorkerPool(LIMITS, 1, WAITING, "balls", COUNTS["recordings"])
+        self._lock = Lock()
+        self._at_work: list[tuple[int, int]] = []
+
+    @contextmanager
+    def at_work(self, recording_id: int, frame: int) -> Iterator[None]:
+        """While a click in a frame of a recording is followed, and until what came of it is kept."""
+        with self._lock:
+            self._at_work.append((recording_id, frame))
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._at_work.remove((recording_id, frame))
+
+    def frames_at_work(self, recording_id: int) -> list[int]:
+        """Frames of a recording whose clicks are being followed now."""
+        with self._lock:
+            return sorted(frame for recording, frame in self._at_work if recording == recording_id)
 
     def follow(
         self, recording: Recording, click: BallClick, bounds: tuple[int, int], hints: FollowHints

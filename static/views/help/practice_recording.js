@@ -2,26 +2,26 @@
 /** The practice on a recording: a film with known faults, and what is right of it by now. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
 
 import { getRecordingPractice, postRecordingPractice } from '../../api/practice.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { useResource } from '../../lib/resource.js';
 import { loadDatasets } from '../../state/datasets.js';
-import { follow, isOver } from '../../state/jobs.js';
+import { isOver, jobToShow } from '../../state/jobs.js';
 import { loadSession, isTeam } from '../../state/me.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 import { MARKS, WORDS } from '../lesson_card.js';
-
-/** @import {JobJson} from '../../api/jobs.js' */
+import { useEnded, useRunningJobs } from '../running_jobs.js';
 
 const NAMES = { shots: 'Shots', cameras: 'Cameras', side: 'Side', link: 'Replay' };
 
 /** @param {{onLeave: () => void}} props */
 export function RecordingPracticePart({ onLeave }) {
 	const { value, error, reload } = useResource(getRecordingPractice, []);
-	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { jobs, watch } = useRunningJobs({ kind: 'practice' }, ({ subject }) => subject?.practice === 'recording');
+	const job = jobToShow(jobs);
+	useEnded(jobs, reload);
 	const { error: refused, attempt } = useAttempt();
 	const busy = job !== null && !isOver(job);
 	const lessons = value?.lessons ?? [];
@@ -30,9 +30,8 @@ export function RecordingPracticePart({ onLeave }) {
 	function begin(again) {
 		if (busy) return;
 		attempt(postRecordingPractice(again), async (begun) => {
-			const over = await follow(begun, setJob);
+			const over = await watch(begun);
 			if (over.state === 'done' && isTeam) await Promise.all([loadSession(), loadDatasets()]);
-			reload();
 		});
 	}
 	/** @param {number} frame */

@@ -103,6 +103,12 @@ export function BallCard({ one, shot, balls }) {
 		const { left: begin, width } = /** @type {HTMLElement} */ (event.currentTarget).getBoundingClientRect();
 		if (shot) goTo(Math.floor(shot.first + ((event.clientX - begin) / width) * (shot.last - shot.first + 1)));
 	}
+	/** Enter clicks while there is a cross, also where its button has the focus. @param {KeyboardEvent} event */
+	function enter(event) {
+		if (event.key !== 'Enter' || !balls.cross) return;
+		event.preventDefault();
+		balls.click(balls.cross);
+	}
 	return html`
 		<section class="card ball" aria-label="Ball" aria-busy=${busy}>
 			<h2>Ball${run ? html`<span class="card__aside">frames ${run.first} to ${run.last}</span>` : null}</h2>
@@ -121,7 +127,7 @@ export function BallCard({ one, shot, balls }) {
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || !accepted} title=${why || (accepted ? 'Those balls go again' : 'It is not accepted')} onClick=${balls.takeBack}>Take back <kbd>U</kbd></button>
 				<button class="button" type="button" aria-disabled=${runs.length === 0} title=${runs.length ? '' : 'No ball is followed in this shot'} onClick=${balls.next}>Next unsure <kbd>V</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || sure !== '' || accepted} title=${why || sure || 'These uncertain frames are right'} onClick=${balls.confirm}>Right <kbd>O</kbd></button>
-				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${balls.cross !== null} title="A cross that the arrow keys move; Enter clicks" onClick=${balls.turnCross}>Cross <kbd>F</kbd></button>
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${balls.cross !== null} title="A cross that the arrow keys move; Enter clicks" onClick=${balls.turnCross} onKeyDown=${enter}>Cross <kbd>F</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${balls.remove}>Delete <kbd>Del</kbd></button>
 			</div>
 			<p role="status">${busy ? 'Following the ball…' : ''}</p>

@@ -36,6 +36,8 @@ import { goTo, stand, wanted } from '../../state/playback.js';
  * @property {(x: number, y: number, event: KeyboardEvent) => void} moveCross
  */
 
+/** Until it is asked again what came of a click that is being followed, ms. */
+const ASK_AGAIN = 700;
 /** What one press of an arrow moves the cross by, pixels of the recording. */
 const STEPS = { plain: 8, Shift: 40, Alt: 1 };
 
@@ -46,7 +48,7 @@ const tag = ({ id, etag }) => `${id} ${etag}`;
 export function useBalls(one, shot) {
 	const list = useResource((signal) => getBallRuns(one.id, signal), [one.id]);
 	const [cross, setCross] = useState(/** @type {Place | null} */ (null));
-	const { error, busy, attempt } = useAttempt();
+	const { error, busy: asking, attempt } = useAttempt();
 	const known = useRef(/** @type {Map<string, BallRunFrames>} */ (new Map()));
 	const all = list.value?.items ?? [];
 	const mine = shot ? all.filter(({ first, last }) => first <= shot.last && shot.first <= last) : [];
@@ -61,6 +63,14 @@ export function useBalls(one, shot) {
 	const frame = wanted.value;
 	const run = runAt(runs, frame);
 	useEffect(() => { setCross(null); }, [one.id]);
+	// Begun before the page was opened, or by somebody else.
+	const elsewhere = list.value?.following ?? [];
+	useEffect(() => {
+		if (asking || !elsewhere.length) return undefined;
+		const timer = setTimeout(list.reload, ASK_AGAIN);
+		return () => clearTimeout(timer);
+	}, [list.value, asking]);
+	const busy = asking || elsewhere.some((click) => shot && shot.first <= click && click <= shot.last);
 	/** @param {Promise<BallRunFrames>} doing @param {(done: BallRunFrames) => string} told */
 	const ask = (doing, told) => attempt(doing, (done) => {
 		known.current.set(tag(done), done);

@@ -13,15 +13,17 @@ import { pitchSize } from '../../lib/pitch_size.js';
 import { useResource } from '../../lib/resource.js';
 import { address, navigate } from '../../lib/router.js';
 import { worstFrame, nextUntracked } from '../../state/cameras.js';
-import { follow, isOver } from '../../state/jobs.js';
+import { isOver, jobToShow } from '../../state/jobs.js';
 import { announce } from '../../state/notice.js';
 import { goTo, wanted } from '../../state/playback.js';
+import { useEnded } from '../running_jobs.js';
 
 /** @import {FrameCamerasJson, ShotCamerasJson} from '../../api/cameras.js' */
 /** @import {JobJson} from '../../api/jobs.js' */
 /** @import {ApiError} from '../../api/problem.js' */
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
 /** @import {Binding} from '../../lib/keys.js' */
+/** @import {RunningJobs} from '../running_jobs.js' */
 
 /**
  * @typedef {object} Cameras
@@ -29,7 +31,7 @@ import { goTo, wanted } from '../../state/playback.js';
  * @property {FrameCamerasJson | null} frames of that stretch, as they are shown
  * @property {boolean} before whether those are shown that the present ones took the place of
  * @property {boolean} lines whether projected lines are drawn
- * @property {JobJson | null} job that tracks, or takes a frame
+ * @property {JobJson | null} job that tracks
  * @property {ApiError | null} error
  * @property {string} busy why nothing can be begun
  * @property {() => void} track
@@ -42,54 +44,57 @@ import { goTo, wanted } from '../../state/playback.js';
  * @property {() => void} turnLines
  */
 
-/** @param {RecordingJson} one @param {Shot | undefined} shot @returns {Cameras} */
-export function useCameras(one, shot) {
+/** @param {RecordingJson} one @param {Shot | undefined} shot @param {RunningJobs} running on the recording @returns {Cameras} */
+export function useCameras(one, shot, { jobs, watch }) {
 	const list = useResource((signal) => getCameraStretches(one.id, signal), [one.id]);
 	const [before, setBefore] = useState(false);
 	const [lines, setLines] = useState(true);
-	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const [drawing, setDrawing] = useState(-1);
 	const { error, attempt } = useAttempt();
 	const frame = wanted.value;
 	const stretch = list.value?.items.find(({ first, last }) => first <= frame && frame <= last) ?? null;
 	const old = before && stretch?.before !== null;
 	const [id, revision] = [stretch?.first ?? -1, stretch?.revision ?? 0];
 	const found = useResource(async (signal) => (id < 0 ? null : getFrameCameras(one.id, id, old, signal)), [one.id, id, revision, old]);
-	useEffect(() => listen('job', (/** @type {JobJson} */ told) => {
-		if (told.kind === 'track' && isOver(told) && told.result?.recording === one.id) list.reload();
-	}, list.reload), [one.id]);
-	const busy = job !== null && !isOver(job) ? 'A job is at work' : shot ? '' : 'This recording has no shot';
+	const tracking = jobs.filter(({ kind }) => kind === 'track');
+	const here = tracking.filter(({ subject }) => shot && (subject?.first ?? 0) <= shot.last && shot.first <= (subject?.last ?? Infinity));
+	// Of several the one that works on the shot on screen.
+	const job = jobToShow(here.some((one) => !isOver(one)) || tracking.every(isOver) ? here : tracking);
+	useEnded(tracking, list.reload);
+	useEffect(() => listen('job', () => {}, list.reload), [one.id]);
+	const busy = jobs.some((one) => !isOver(one) && (one.kind === 'track' || one.id === drawing)) ? 'A job is at work' : shot ? '' : 'This recording has no shot';
 	function track() {
 		if (busy || !shot) return;
 		const asked = stretch && stretch.first <= shot.first && shot.last <= stretch.last ? stretch : shot;
 		attempt(postCameras(one.id, asked), async (begun) => {
-			const over = await follow(begun, setJob);
+			const over = await watch(begun);
 			if (over.state === 'done') announce(over.sentence ?? 'The shot is tracked.');
-			list.reload();
 		});
 	}
 	function turnHalf() {
 		if (busy || !stretch) return;
 		const turned = !stretch.summary.turned;
 		attempt(turnCameras(one.id, stretch.first, turned), async (begun) => {
-			const over = await follow(begun, setJob);
+			const over = await watch(begun);
 			if (over.state === 'done') announce(turned ? 'The cameras stand on the other side now. Shift T turns them back.' : 'The cameras are turned back.');
-			list.reload();
 		});
 	}
 	function takePitch() {
 		const other = stretch?.summary.pitch?.other;
 		if (busy || !other) return;
-		attempt(getPitches(one.dataset).then(({ etag }) => setPitch(one.dataset, one.name, other, etag)), async (begun) => {
-			const over = await follow(begun, setJob);
-			if (over.state !== 'done') return;
+		// Both at once: whoever leaves the page meanwhile finds the shot tracked on its pitch.
+		const size = getPitches(one.dataset).then(({ etag }) => setPitch(one.dataset, one.name, other, etag));
+		attempt(size.then(() => postCameras(one.id, stretch)), async (begun) => {
 			announce(`The match is played on ${pitchSize(other)} now. Its cameras are tracked again on that pitch.`);
-			track();
+			const over = await watch(begun);
+			if (over.state === 'done') announce(over.sentence ?? 'The shot is tracked.');
 		});
 	}
 	function correct() {
 		if (busy) return;
 		attempt(postInstants(one.id, [frame], { propose: false, linked: false }), async (begun) => {
-			const over = await follow(begun, setJob);
+			setDrawing(begun.id);
+			const over = await watch(begun);
 			if (over.state !== 'done') return;
 			// Both ways back lead to this frame.
 			const place = { frame: String(frame) };

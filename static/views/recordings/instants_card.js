@@ -8,7 +8,7 @@ import { postInstants } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { withForm, withTick } from '../../lib/field.js';
 import { plural } from '../../lib/format.js';
-import { follow, isOver } from '../../state/jobs.js';
+import { isOver, jobToShow } from '../../state/jobs.js';
 import { queueAddress } from '../../state/navigation.js';
 import { wanted } from '../../state/playback.js';
 import { everyOf } from '../../state/shots.js';
@@ -17,6 +17,7 @@ import { JobProgress } from '../job_progress.js';
 
 /** @import {JobJson} from '../../api/jobs.js' */
 /** @import {LinkJson, RecordingJson, Shot} from '../../api/recordings.js' */
+/** @import {RunningJobs} from '../running_jobs.js' */
 
 /** @typedef {{chosen: ReadonlySet<number>, turn: (frame: number) => void, add: (frames: number[]) => void, clear: () => void}} Instants */
 
@@ -32,12 +33,12 @@ function madeText({ new: made, changed, unchanged, linked_views: views, outside,
 	].filter(Boolean).join(' ');
 }
 
-/** @param {{one: RecordingJson, shot: Shot | undefined, instants: Instants, links: LinkJson[]}} props */
-export function InstantsCard({ one, shot, instants, links }) {
+/** @param {{one: RecordingJson, running: RunningJobs, shot: Shot | undefined, instants: Instants, links: LinkJson[]}} props */
+export function InstantsCard({ one, running: { jobs, watch }, shot, instants, links }) {
 	const [propose, setPropose] = useState(true);
 	const [linked, setLinked] = useState(true);
 	const usable = links.filter(({ live, map }) => live.recording === one.id && map.outcome === 'linked').length;
-	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const job = jobToShow(jobs.filter(({ kind }) => kind === 'instants'));
 	const { error, attempt } = useAttempt();
 	const { chosen } = instants;
 	const busy = job !== null && !isOver(job);
@@ -47,7 +48,7 @@ export function InstantsCard({ one, shot, instants, links }) {
 	function make(dry) {
 		if (why) return;
 		attempt(postInstants(one.id, [...chosen], { propose, linked: linked && usable > 0, dry_run: dry }), async (begun) => {
-			const over = await follow(begun, setJob);
+			const over = await watch(begun);
 			if (over.state === 'done' && !dry) instants.clear();
 		});
 	}

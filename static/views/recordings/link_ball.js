@@ -2,28 +2,36 @@
 /** The times of a replay from the ball: where it is in both shots, and how far its rays miss each other under the map. */
 
 import { html } from 'htm/preact';
-import { useRef, useState } from 'preact/hooks';
+import { useRef } from 'preact/hooks';
 
 import { getCameraStretches, turnCameras } from '../../api/cameras.js';
 import { postUpload } from '../../api/imports.js';
 import { postBallLink } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
-import { follow, isOver } from '../../state/jobs.js';
+import { isOver, jobToShow } from '../../state/jobs.js';
 import { Chart } from '../chart.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
+import { useEnded, useRunningJobs } from '../running_jobs.js';
 
-/** @import {JobJson} from '../../api/jobs.js' */
-/** @import {LinkJson} from '../../api/recordings.js' */
+/** @import {JobSubject} from '../../api/jobs.js' */
+/** @import {LinkedShot, LinkJson} from '../../api/recordings.js' */
 
 /** A file of a form as an upload; null: none was chosen. @param {FormDataEntryValue | null} file */
 async function sent(file) {
 	return file instanceof File && file.name ? (await postUpload(file, () => {})).id : null;
 }
 
+/** Whether a job works on frames of a replay. @param {LinkedShot} replay @param {JobSubject | null} subject */
+function isOfReplay({ recording, first, last }, subject) {
+	return subject?.recording === recording && (subject.first ?? 0) <= last && first <= (subject.last ?? Infinity);
+}
+
 /** @param {{link: LinkJson, dataset: string, reload: () => void}} props */
 export function BallCard({ link, dataset, reload }) {
-	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { jobs, watch } = useRunningJobs({ dataset }, ({ kind, subject }) => (kind === 'link' ? subject?.link === link.id : kind === 'track' && isOfReplay(link.replay, subject)));
+	const job = jobToShow(jobs);
+	useEnded(jobs, reload);
 	const { error, busy, attempt } = useAttempt();
 	const form = useRef(/** @type {HTMLFormElement | null} */ (null));
 	const runs = busy || (job !== null && !isOver(job));
@@ -31,10 +39,7 @@ export function BallCard({ link, dataset, reload }) {
 		if (!form.current) return;
 		const said = new FormData(form.current);
 		const files = Promise.all([sent(said.get('live')), sent(said.get('replay'))]);
-		attempt(files.then(([live, replay]) => postBallLink(link.live.recording, link.id, { live_upload: live, replay_upload: replay })), async (begun) => {
-			await follow(begun, setJob);
-			reload();
-		});
+		attempt(files.then(([live, replay]) => postBallLink(link.live.recording, link.id, { live_upload: live, replay_upload: replay })), watch);
 	}
 	const { misses, turned } = link.map;
 	/** Turn the cameras of the replay, and look for the times once more. */
@@ -43,8 +48,9 @@ export function BallCard({ link, dataset, reload }) {
 		const { recording, first } = link.replay;
 		const turning = getCameraStretches(recording).then(async ({ items }) => {
 			const stretch = items.find((one) => one.first <= first && first <= one.last);
-			if (stretch) await follow(await turnCameras(recording, stretch.first, !stretch.summary.turned), setJob);
+			if (stretch) watch(await turnCameras(recording, stretch.first, !stretch.summary.turned));
 		});
+		// It waits for the turn on the server: whoever leaves the page meanwhile finds the times.
 		if (await attempt(turning)) look();
 	}
 	return html`

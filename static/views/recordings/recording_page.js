@@ -4,17 +4,16 @@
 import { html } from 'htm/preact';
 import { useCallback, useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
-import { listen } from '../../api/events.js';
 import { getLinks, getRecording, getShots, putShots } from '../../api/recordings.js';
 import { ApiError } from '../../api/problem.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
 import { page, param } from '../../lib/router.js';
 import { useResource } from '../../lib/resource.js';
-import { isOver } from '../../state/jobs.js';
 import { announce, complain } from '../../state/notice.js';
 import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
 import { matchTime, shotAt, timecode } from '../../state/shots.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { useEnded, useRunningJobs } from '../running_jobs.js';
 import { BallCard, BallOverlay } from './ball_card.js';
 import { useBallKeys, useBalls } from './ball_state.js';
 import { CameraCard } from './camera_card.js';
@@ -28,10 +27,10 @@ import { FindAgain, ShotCard } from './shot_card.js';
 import { Strip } from './strip.js';
 import { factsOf } from './recordings_page.js';
 
-/** @import {JobJson} from '../../api/jobs.js' */
 /** @import {RecordingJson, Shot, TimedShot} from '../../api/recordings.js' */
 /** @import {Balls} from './ball_state.js' */
 /** @import {Cameras} from './camera_state.js' */
+/** @import {RunningJobs} from '../running_jobs.js' */
 
 /** The list of shots, and what changes it: at once here, then on the server. @param {number} id */
 function useShots(id) {
@@ -141,8 +140,8 @@ function clock(shots, one) {
 	};
 }
 
-/** @param {{one: RecordingJson, reload: () => void}} props */
-function Film({ one, reload }) {
+/** @param {{one: RecordingJson, running: RunningJobs, reload: () => void}} props */
+function Film({ one, running, reload }) {
 	const { list, latest, error, read, change, undo, remember } = useShots(one.id);
 	const instants = useInstants();
 	const links = useResource((signal) => getLinks(one.id, signal), [one.id]).value?.items ?? [];
@@ -152,23 +151,21 @@ function Film({ one, reload }) {
 		if (Number(param('frame')) > 0) goTo(Number(param('frame')));
 		return end;
 	}, [one.id, one.frames]);
-	useEffect(() => listen('job', (/** @type {JobJson} */ job) => {
-		if (isOver(job) && job.result?.recording === one.id) read();
-		if (isOver(job) && job.kind === 'instants') reload();
-	}), [one.id]);
+	useEnded(running.jobs, read);
+	useEnded(running.jobs.filter(({ kind }) => kind === 'instants'), reload);
 	const doing = useRef({ change, undo, turn: instants.turn });
 	doing.current = { change, undo, turn: instants.turn };
 	const keys = useMemo(() => keysOfRecording(one, () => latest.current?.items ?? [], doing), [one.id]);
 	useKeys(keys);
 	const shot = list?.items[shotAt(list.items, wanted.value)];
-	const cameras = useCameras(one, shot);
+	const cameras = useCameras(one, shot, running);
 	useCameraKeys(cameras);
 	const balls = useBalls(one, shot);
 	useBallKeys(balls);
 	if (error) {
 		return html`
 			<${Trouble} title="The shots cannot be shown" error=${error} retry=${read} />
-			<section class="card" aria-label="Index"><${FindAgain} one=${one} label="Index it again" over=${() => { read(); reload(); }} /></section>
+			<section class="card" aria-label="Index"><${FindAgain} one=${one} running=${running} label="Index it again" over=${reload} /></section>
 		`;
 	}
 	if (!list) return html`<${Loading} what="shots" />`;
@@ -177,11 +174,11 @@ function Film({ one, reload }) {
 		<div class="film">
 			<${Stage} one=${one} seconds=${clock(list.items, one)} cameras=${cameras} balls=${balls} />
 			<div class="film__rail">
-				<${ShotCard} one=${one} shots=${list.items} at=${at} change=${change} remember=${remember} />
+				<${ShotCard} one=${one} running=${running} shots=${list.items} at=${at} change=${change} remember=${remember} />
 				<${BallCard} one=${one} shot=${shot} balls=${balls} />
 				<${CameraCard} one=${one} cameras=${cameras} />
 				<${LinkCard} one=${one} shots=${list.items} shot=${shot} links=${links} />
-				<${InstantsCard} one=${one} shot=${shot} instants=${instants} links=${links} />
+				<${InstantsCard} one=${one} running=${running} shot=${shot} instants=${instants} links=${links} />
 				<${ClockCard} one=${one} reload=${reload} />
 			</div>
 			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} balls=${balls} goTo=${goTo} />
@@ -190,11 +187,18 @@ function Film({ one, reload }) {
 	`;
 }
 
+/** A recording, or why its frames cannot be read now. @param {{one: RecordingJson, reload: () => void}} props */
+function Opened({ one, reload }) {
+	const running = useRunningJobs({ dataset: one.dataset }, ({ subject }) => subject?.recording === one.id);
+	const why = one.problem ?? (one.indexed ? null : 'It is not indexed yet.');
+	if (!why) return html`<${Film} one=${one} running=${running} reload=${reload} />`;
+	return html`<section class="card empty" role="alert"><h2>Its frames cannot be read now</h2><p>${why}</p><p>Groups that were taken from it still work. Put the file back, or index it again as it is now; shots stay if it is the same.</p><${FindAgain} one=${one} running=${running} label="Index it again" over=${reload} /></section>`;
+}
+
 export function RecordingPage() {
 	const id = 'recording' in page.value ? page.value.recording : 0;
 	const found = useResource((signal) => getRecording(id, signal), [id]);
 	const one = found.value;
-	const why = one && (one.problem ?? (one.indexed ? null : 'It is not indexed yet.'));
 	return html`
 		<${PageFrame}
 			current="recordings" title=${one ? one.name : 'Recording'}
@@ -202,8 +206,7 @@ export function RecordingPage() {
 		>
 			${found.error ? html`<${Trouble} title="This recording cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${!one && !found.error ? html`<${Loading} what="the recording" />` : null}
-			${why ? html`<section class="card empty" role="alert"><h2>Its frames cannot be read now</h2><p>${why}</p><p>Groups that were taken from it still work. Put the file back, or index it again as it is now; shots stay if it is the same.</p><${FindAgain} one=${one} label="Index it again" over=${found.reload} /></section>` : null}
-			${one && !why ? html`<${Film} key=${one.id} one=${one} reload=${found.reload} />` : null}
+			${one ? html`<${Opened} key=${one.id} one=${one} reload=${found.reload} />` : null}
 		<//>
 	`;
 }

@@ -11,12 +11,13 @@ import { withForm, withValue } from '../../lib/field.js';
 import { count, plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
-import { follow, isOver } from '../../state/jobs.js';
+import { isOver } from '../../state/jobs.js';
 import { lengthText } from '../../state/shots.js';
 import { addVideos, videoUploads } from '../../state/video_uploads.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { useEnded, useRunningJobs } from '../running_jobs.js';
 import { SourceChoice } from '../source_choice.js';
 import { When } from '../when.js';
 import { VideoField } from './video_uploads.js';
@@ -51,21 +52,21 @@ function Row({ one, remove }) {
 /** @param {{added: () => void}} props */
 function AddCard({ added }) {
 	const [source, setSource] = useState(/** @type {ImportSource | null} */ (null));
-	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+	const { jobs, watch } = useRunningJobs({ kind: 'recording' }, ({ kind }) => kind === 'recording');
 	const [typed, setTyped] = useState(/** @type {string | null} */ (null));
 	const { error, attempt } = useAttempt();
 	const waiting = videoUploads.value.some(({ state, dataset: its }) => its === null && ['queued', 'sending', 'waiting', 'here'].includes(state));
-	const busy = job !== null && !isOver(job) && source !== null;
+	// Those of uploads stand there.
+	const others = jobs.filter(({ id }) => !videoUploads.value.some(({ job }) => job?.id === id));
+	const busy = source !== null && others.some((job) => !isOver(job));
+	useEnded(others, added);
 	const why = busy ? 'A recording is being indexed' : source || waiting ? '' : 'Choose a file first';
 	const send = withForm((said) => {
 		if (why) return;
 		const name = String(said.get('dataset')).trim();
 		if (!source) addVideos(name);
 		else {
-			attempt(postRecording({ dataset: name, source }), async (begun) => {
-				await follow(begun, setJob);
-				added();
-			});
+			attempt(postRecording({ dataset: name, source }), watch);
 		}
 	});
 	return html`
@@ -81,8 +82,9 @@ function AddCard({ added }) {
 				<${SourceChoice} videos=${VideoField} onSource=${setSource} guess=${() => {}} />
 				<p class="buttons"><button class="button button--primary" type="submit" data-needs="lead" data-of="" aria-disabled=${why !== ''} title=${why}>Add and find its shots</button></p>
 				${error ? html`<${FormError} error=${error} />` : null}
-				${job ? html`<${JobProgress} job=${job} />` : null}
-				${job?.state === 'done' ? html`<p><a class="button" href=${`/recordings/${job.result.recording}`}>Open ${job.result.name}</a></p>` : null}
+				${others.map((job) => html`
+					<${JobProgress} key=${job.id} job=${job} />
+					${job.state === 'done' ? html`<p><a class="button" href=${`/recordings/${job.result.recording}`}>Open ${job.result.name}</a></p>` : null}`)}
 			</form>
 		</section>
 	`;

@@ -2,45 +2,44 @@
 /** The shot that is shown: what it is, and what can be done with it. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
 
 import { findShots } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
-import { follow, isOver } from '../../state/jobs.js';
+import { isOver, jobToShow } from '../../state/jobs.js';
 import { lengthText, changedAt, mergedWithNext, SHOT_KINDS, splitAt } from '../../state/shots.js';
 import { wanted } from '../../state/playback.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
+import { useEnded } from '../running_jobs.js';
 
-/** @import {JobJson} from '../../api/jobs.js' */
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
+/** @import {RunningJobs} from '../running_jobs.js' */
 
 const ENTERED = { start: 'the beginning of the recording', cut: 'after a cut', dissolve: 'after a dissolve', wipe: 'after a wipe', fade: 'after a fade' };
 
-/** Finds all shots anew, and indexes what is not indexed as it is now. @param {{one: RecordingJson, label: string, before?: () => void, over?: () => void}} props */
-export function FindAgain({ one, label, before = () => {}, over = () => {} }) {
-	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
+/** Finds all shots anew, and indexes what is not indexed as it is now. @param {{one: RecordingJson, running: RunningJobs, label: string, before?: () => void, over?: () => void}} props */
+export function FindAgain({ one, running: { jobs, watch }, label, before = () => {}, over = () => {} }) {
 	const { error, attempt } = useAttempt();
+	const finding = jobs.filter(({ kind }) => kind === 'recording');
+	const job = jobToShow(finding);
 	const busy = job !== null && !isOver(job);
+	useEnded(finding, over);
 	function find() {
 		if (busy) return;
 		before();
-		attempt(findShots(one.id), async (begun) => {
-			await follow(begun, setJob);
-			over();
-		});
+		attempt(findShots(one.id), watch);
 	}
 	return html`
-		<p class="buttons"><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy} onClick=${find}>${label}</button></p>
+		<p class="buttons"><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy} title=${busy ? 'Shots are being found' : ''} onClick=${find}>${label}</button></p>
 		${error ? html`<${FormError} error=${error} />` : null}
 		${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
 	`;
 }
 
-/** @param {{one: RecordingJson, shots: Shot[], at: number, change: (items: Shot[] | null, told: string) => void, remember: () => void}} props */
-export function ShotCard({ one, shots, at, change, remember }) {
+/** @param {{one: RecordingJson, running: RunningJobs, shots: Shot[], at: number, change: (items: Shot[] | null, told: string) => void, remember: () => void}} props */
+export function ShotCard({ one, running, shots, at, change, remember }) {
 	const shot = shots[at];
-	if (!shot) return html`<section class="card" aria-label="Shot"><h2>Shot</h2><p class="empty-note">This recording has no shot.</p><${FindAgain} one=${one} label="Find all shots again" before=${remember} /></section>`;
+	if (!shot) return html`<section class="card" aria-label="Shot"><h2>Shot</h2><p class="empty-note">This recording has no shot.</p><${FindAgain} one=${one} running=${running} label="Find all shots again" before=${remember} /></section>`;
 	const frame = wanted.value;
 	const split = splitAt(shots, frame) ? '' : 'Go to a frame within the shot first';
 	const merge = at + 1 < shots.length ? '' : 'This is the last shot';
@@ -62,7 +61,7 @@ export function ShotCard({ one, shots, at, change, remember }) {
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${split !== ''} title=${split} onClick=${() => change(splitAt(shots, frame), 'Split.')}>Split <kbd>S</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${merge !== ''} title=${merge} onClick=${() => change(mergedWithNext(shots, at), 'Merged with the next shot.')}>Merge <kbd>M</kbd></button>
 			</div>
-			<${FindAgain} one=${one} label="Find all shots again" before=${remember} />
+			<${FindAgain} one=${one} running=${running} label="Find all shots again" before=${remember} />
 			<p class="buttons">${/** @type {const} */ (['shots', 'links']).map((what) => html`<a key=${what} class="link" href=${`/api/v1/recordings/${one.id}/${what}.csv`} download>All ${what} as CSV</a>`)}</p>
 		</section>
 	`;

@@ -103,6 +103,53 @@ class TestFields:
         sentence = f"{pointer}: there is no such field; did you mean {nearest}?"
         assert answer.json()["detail"] == sentence
 
+    @pytest.mark.parametrize(
+        ("body", "pointer", "sentence"),
+        [
+            (
+                {"live": {"recording": 1, "first": 0, "last": 9}, "replay": {}},
+                "/live/recording",
+                "there is no such field, it belongs at /replay/recording; known here: first, last",
+            ),
+            (
+                {"live/recording": 1, "live": {"first": 0, "last": 9}},
+                "/live~1recording",
+                "there is no such field; known here: live, replay",
+            ),
+            (
+                {"live": {"frist": 0, "last": 9}, "replay": {}},
+                "/live/frist",
+                "there is no such field; did you mean first?",
+            ),
+        ],
+    )
+    def test_only_names_of_its_place_are_meant(self, api, body, pointer, sentence) -> None:
+        answer = api.post(f"{API}/recordings/1/links", json=body).json()
+        told = {one["pointer"]: one["detail"] for one in answer["errors"]}
+        assert told[pointer] == sentence
+
+    def test_no_error_names_a_field_that_its_place_does_not_have(self, api, app) -> None:
+        """Whatever is misspelt, in the outer object of each body of a recording's routes."""
+        document, seen = app.openapi(), 0
+        for path, operations in document["paths"].items():
+            for method, operation in operations.items():
+                content = operation.get("requestBody", {}).get("content", {})
+                name = content.get("application/json", {}).get("schema", {}).get("$ref", "")
+                known = document["components"]["schemas"].get(name.rpartition("/")[2])
+                if not path.startswith(f"{API}/recordings") or not known:
+                    continue
+                for wrong in ("recordings", "frames_", "zzz"):
+                    answer = api.request(method, re.sub(r"{\w+}", "1", path), json={wrong: 1})
+                    if answer.status_code != 422:
+                        continue
+                    seen += 1
+                    told = {one["pointer"]: one["detail"] for one in answer.json()["errors"]}
+                    meant = told[f"/{wrong}"].partition("did you mean ")[2].rstrip("?")
+                    listed = told[f"/{wrong}"].partition("known here: ")[2].split(", ")
+                    names = {meant, *listed} - {""}
+                    assert names <= set(known["properties"]), (path, told)
+        assert seen > 10
+
 
 class TestDryRun:
     def test_is_a_parameter_wherever_there_is_one(self, app) -> None:

@@ -35,7 +35,15 @@ class TestGetJob:
             "result": {"n": 1},
             "problem": None,
             "actor": "ann",
+            "subject": None,
         }
+
+    def test_says_what_it_works_on_and_nothing_else_of_what_was_asked(self, app, api) -> None:
+        asked = {"recording": 3, "first": 0, "last": 9, "uploads": {"live": "secret"}}
+        body = api.get(f"{API}/{submit(app, request=asked)}").json()
+        frames = {"recording": 3, "first": 0, "last": 9}
+        assert body["subject"] == {**frames, "link": None, "practice": None}
+        assert "secret" not in str(body)
 
     def test_of_an_unknown_id_is_404(self, api) -> None:
         assert api.get(f"{API}/77").status_code == 404
@@ -63,6 +71,19 @@ class TestListJobs:
         assert [item["id"] for item in done] == [other, *ids[::-1]]
         assert api.get(API, params={"dataset": "nothing"}).status_code == 404
         assert api.get(API, params={"cursor": "x"}).status_code == 400
+
+    def test_open_are_those_that_wait_or_run(self, app, api) -> None:
+        over, going = submit(app), threading.Event()
+        app.state.services.jobs.wait(over, SECONDS)
+
+        def held(_: JobProgress) -> int:
+            assert going.wait(SECONDS)
+            return 1
+
+        ids = [submit(app, held), submit(app)]
+        found = api.get(API, params={"state": "open"}).json()["items"]
+        going.set()
+        assert [item["id"] for item in found] == ids[::-1]
 
 
 class TestCancelJob:

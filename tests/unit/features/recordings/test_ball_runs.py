@@ -88,6 +88,26 @@ class TestFollow:
         again = api.get(made.headers["location"])
         assert again.json() == run and again.headers["etag"] == run["etag"]
 
+    def test_a_click_is_told_while_it_is_followed_and_kept(
+        self, app: Any, api: Any, recording: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        follower = app.state.services.balls
+        number, whole, told = int(recording.rpartition("/")[2]), follower.follow, []
+
+        def watched(*asked: Any) -> Any:
+            told.append((follower.frames_at_work(number), follower.frames_at_work(number + 1)))
+            return whole(*asked)
+
+        monkeypatch.setattr(follower, "follow", watched)
+        run = follow(api, recording).json()
+        path, tag = f"{recording}/ball-runs/{run['id']}/clicks", {"If-Match": run["etag"]}
+        x, y = place(20)
+        assert api.post(path, json={"frame": 20, "x": x, "y": y}, headers=tag).status_code == 200
+        refused = api.post(f"{recording}/ball-runs", json={"frame": 7, "x": 250, "y": 150})
+        assert refused.status_code == 400
+        assert told == [([5], []), ([20], []), ([7], [])]
+        assert api.get(f"{recording}/ball-runs").json()["following"] == []
+
     def test_where_no_ball_is_nothing_is_kept(self, api: Any, recording: str) -> None:
         refused = api.post(f"{recording}/ball-runs", json={"frame": 5, "x": 250, "y": 150})
         assert refused.status_code == 400
