@@ -27,7 +27,7 @@
     ShapeError(ValueError)  our own mistake, outside the tree
     JobCancelled            no error at all: somebody wants the work to end
 
-Only ``api/errors.py`` knows which HTTP status belongs to which branch, and only ``cli.py`` which
+Only ``http/errors.py`` knows which HTTP status belongs to which branch, and only ``cli.py`` which
 exit code.
 """
 

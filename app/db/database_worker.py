@@ -150,14 +150,14 @@ def run_in_worker(
     return result
 
 
-def run_here(
+def run_in_this_thread(
     store: Store,
     work: Callable[..., Result],
     *arguments: Any,
     progress: ReportProgress,
     answer: Callable[[Any], Any] = no_answer,
 ) -> Result:
-    """The same in this thread, for work that is done before a process would have started."""
+    """Like ``run_in_worker``, in this thread: for work that is done before a process would have started."""
 
     def on_message(message: Message) -> Answer:
         kind, value = message

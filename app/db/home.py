@@ -198,7 +198,7 @@ def installation_key(settings: Settings, name: str) -> bytes:
     if len(key) != _BYTES:
         raise DamagedError(
             f"{path} is not a key: it has {len(key)} bytes, not {_BYTES}",
-            hint="Put the file back from a copy. Deleted, it is made anew; what it was for ends then.",
+            hint="Restore the file from a copy. If you delete it, a new key is made, and what the old key signed or locked is no longer valid.",
         )
     return key
 

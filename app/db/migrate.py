@@ -154,8 +154,8 @@ def newer_schema(revision: str, settings: Settings) -> StorageError:
     """The refusal of a database that a newer version made, with the way back."""
     if revision == UNFINISHED:
         return StorageError(
-            "a transfer into this database has not come to its end",
-            hint="Run touchline transfer again, with what it was given.",
+            "a transfer into this database was interrupted",
+            hint="Run touchline transfer again with the same arguments.",
         )
     copy = settings.home / "backups" / COPY.format(revision)
     back = f" To go back to the state before its migration, run touchline restore {copy}."

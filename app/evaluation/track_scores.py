@@ -135,10 +135,10 @@ def evaluate_tracks(
     error = np.array(found.error)
     if not np.isfinite(error).any():
         raise InputError(
-            "nothing that is predicted is of an instant with a true ball: "
+            "no prediction is for an instant at which the true ball is known: "
             f"{_describe_names('the stretches', [track.key for track in truth])}"
             f"{_describe_names('; predicted', unknown) if unknown else ''}",
-            hint="Name folders by the stretches, and frames as exports of tracks do.",
+            hint="Name each folder after its stretch, and number frames as an export of tracks does.",
             pointer="/predictions",
         )
     missed = [track.key for track in truth if track.key not in own]

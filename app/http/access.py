@@ -109,8 +109,8 @@ class Access:
             require_scope(login.token.scopes, action)
         if login.must_enrol and not subject.permission.to_enrol:
             raise ForbiddenError(
-                "everybody needs a second factor here, and you have none yet",
-                hint="Make one under Account, before anything else.",
+                "this server requires a second factor, and you have none yet",
+                hint="Set one up on the page Account first.",
             )
         if not needs_database(subject, login):
             return require_allowed(self._store, subject, login)

@@ -44,7 +44,7 @@ from app.features.tracks.link_ball import resume_ball_links
 from app.features.versions.jobs import resume_versions
 from app.features.webhooks.sender import WebhookSender
 from app.features.what_if.service import YieldStore
-from app.features.what_if.statistics import StatisticsStore
+from app.features.what_if.statistics import StatisticsCache
 from app.finite import MAX_ID
 from app.http.access import current_login, current_visibility, current_whole_visibility
 from app.http.errors import PreconditionRequiredError
@@ -115,7 +115,7 @@ class Services:
     jobs: Jobs
     events: Events
     yields: YieldStore
-    statistics: StatisticsStore
+    statistics: StatisticsCache
     noises: NoiseStore
     upkeep: Upkeep
     webhooks: WebhookSender
@@ -146,7 +146,7 @@ class Services:
             jobs,
             Events(store, jobs),
             YieldStore(store),
-            StatisticsStore(store),
+            StatisticsCache(store),
             NoiseStore(store),
             Upkeep(store, jobs),
             WebhookSender(store, leads=jobs.is_leader),

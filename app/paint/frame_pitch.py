@@ -24,7 +24,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.pitch_size import PitchFrame, estimate_pitch
 from app.solving.tripod_pitch import (
-    PaintedFrame,
+    PaintSightings,
     TripodPitch,
     find_tripod_pitch,
     second_moment_about_plan,
@@ -90,7 +90,7 @@ def _is_near(camera: Camera, other: Camera | None) -> bool:
     return other is not None and bool(np.linalg.norm(camera.position - other.position) < NEAR_M)
 
 
-def make_painted_frame(snapped: SnappedCamera) -> PaintedFrame:
+def make_paint_sightings(snapped: SnappedCamera) -> PaintSightings:
     """A camera on its paint, as frames are solved together."""
     evidence, camera = snapped.evidence, snapped.camera
     traced = evidence.traced
@@ -98,7 +98,7 @@ def make_painted_frame(snapped: SnappedCamera) -> PaintedFrame:
     pixels = np.ascontiguousarray(pixels - camera.principal_point)
     half = float(np.hypot(*snapped.size)) / 2
     sightings = CurvePoints(pixels, traced.marking, np.ones(len(pixels)))
-    return PaintedFrame(parameters_from_camera(camera, half), sightings, evidence.sigmas)
+    return PaintSightings(parameters_from_camera(camera, half), sightings, evidence.sigmas)
 
 
 def find_shared_pitch(
@@ -118,7 +118,7 @@ def find_shared_pitch(
     if len({frame.size for frame in frames}) != 1:
         return None
     height, width = frames[0].size
-    painted = [make_painted_frame(frame) for frame in frames]
+    painted = [make_paint_sightings(frame) for frame in frames]
     shown = find_tripod_pitch(painted, ImageSize(width, height), pitch, policy)
     if shown is None:
         return None

@@ -35,7 +35,7 @@ def _threshold_field(
     later: bool = False,
     shown: bool = True,
 ) -> Any:
-    """A field of a policy with what ``Threshold`` says of it; ``told``: in its ``repr``."""
+    """A field of a policy with what ``Threshold`` says of it; ``shown``: whether its ``repr`` has it."""
     known = {
         "subject": subject,
         "label": label,

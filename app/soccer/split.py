@@ -113,7 +113,8 @@ def _draw_test_matches(split: Split, matches: set[str]) -> frozenset[str]:
     """The matches that test: those whose digests with the seed are the smallest."""
     if len(matches) < 2:
         raise InputError(
-            "a split by match needs at least two matches", hint="Take the given split instead."
+            "a split by match needs at least two matches",
+            hint="Use the split that came with the data (given).",
         )
     count = min(max(1, round(split.test_share * len(matches))), len(matches) - 1)
     ranked = sorted(matches, key=lambda match: (_seeded_digest(split.seed, match), match))

@@ -21,7 +21,7 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate_view, paint_search_key, usable_paint_reading
 from app.solving.paint_camera import WORST_PX, curve_points_of
 from app.solving.resect import ResectionProblem
-from app.solving.tripod_pitch import LEAST_FRAMES, PaintedFrame, find_tripod_pitch
+from app.solving.tripod_pitch import LEAST_FRAMES, PaintSightings, find_tripod_pitch
 
 LEAST_SHARE = 0.5
 """Of the frames, those that stand on one tripod: with fewer it is not known which of them do."""
@@ -29,7 +29,7 @@ LEAST_SHARE = 0.5
 
 @dataclass(frozen=True)
 class _MainFrame:
-    frame: PaintedFrame
+    frame: PaintSightings
     covariance: FloatArray
 
     @property
@@ -73,7 +73,7 @@ def readings_of_one_tripod(
         found[number] = alone
         problem = ResectionProblem.of(view.size, policy)
         points, sigmas = curve_points_of(reading.evidence, view.size)
-        frame = PaintedFrame(problem.parameters(calibration.camera), points, sigmas)
+        frame = PaintSightings(problem.parameters(calibration.camera), points, sigmas)
         at = (view.size, policy.fitted(group.pitch))
         frames.setdefault(at, {})[number] = _MainFrame(frame, np.reshape(known, (8, 8)))
     for (size, pitch), some in frames.items():

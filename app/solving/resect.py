@@ -192,7 +192,7 @@ class ResectionProblem:
         if self.distances(fit.parameters, observations).max() <= POOR_PX * self.unit:
             return fit
         fits = [fit]
-        if not is_nearly_ambiguous(observations):
+        if not has_few_measurements(observations):
             fits.append(self._search_all_stages(observations, THOROUGH))
         straight = observations.without(*CIRCLES)
         if (
@@ -204,7 +204,7 @@ class ResectionProblem:
 
     def search(self, observations: Observations) -> Resection:
         """The best camera from the whole bank of stands."""
-        plan = THOROUGH if is_nearly_ambiguous(observations) else QUICK
+        plan = THOROUGH if has_few_measurements(observations) else QUICK
         return self._search_all_stages(observations, plan)
 
     def _search_all_stages(self, observations: Observations, plan: SearchPlan) -> Resection:
@@ -403,7 +403,7 @@ def best_starts(fit: Fit, count: int) -> FloatArray:
     return fit.parameters[np.argsort(fit.cost, kind="stable")[:count]]
 
 
-def is_nearly_ambiguous(observations: Observations) -> bool:
+def has_few_measurements(observations: Observations) -> bool:
     """Whether several cameras may fit nearly as well."""
     return measurement_count(observations) < FEW_MEASUREMENTS
 

@@ -77,7 +77,7 @@ _OWN = [X, X + 1, Z, KAPPA]
 
 
 @dataclass(frozen=True)
-class PaintedFrame:
+class PaintSightings:
     """A frame with its camera on the plan, and its paint.
 
     Attributes:
@@ -185,12 +185,12 @@ class TripodPitch:
         which = np.full(len(points), MARKINGS.index(marking))
         return points + painted_shift(points[:, :2], which, self.terms, self.pitch)
 
-    def shift_of(self, frame: PaintedFrame) -> FloatArray:
+    def shift_of(self, frame: PaintSightings) -> FloatArray:
         """How far each place of paint lies off the plan of the size that is shown, metres, shape (N, 3)."""
         grass = grass_of(frame, self.size)
         return painted_shift(grass, frame.sightings.curve, self.terms, self.pitch)
 
-    def camera(self, frame: PaintedFrame) -> tuple[FloatArray, FloatArray]:
+    def camera(self, frame: PaintSightings) -> tuple[FloatArray, FloatArray]:
         """The camera of a frame on the pitch that is shown, shape (8,), and its covariance, shape (8, 8)."""
         frames = _Frames([frame], self.size, self.plan, self.policy, self)
         for _ in range(ALONE_ROUNDS):
@@ -200,13 +200,13 @@ class TripodPitch:
             )
         return frames.parameters[0], self.covariance_of(frame, frames.parameters[0])
 
-    def error_px(self, frame: PaintedFrame, parameters: FloatArray) -> float:
+    def error_px(self, frame: PaintSightings, parameters: FloatArray) -> float:
         """Median distance of a frame's paint from the pitch that is shown, by its camera there, pixels."""
         at = replace(frame, parameters=parameters)
         seen = _Frames([at], self.size, self.plan, self.policy, self).seen(0)
         return float(np.median(np.abs(seen.offsets)))
 
-    def covariance_of(self, frame: PaintedFrame, parameters: FloatArray) -> FloatArray:
+    def covariance_of(self, frame: PaintSightings, parameters: FloatArray) -> FloatArray:
         """The same of parameters that are known already, shape (8, 8)."""
         at = replace(frame, parameters=parameters)
         parts = _Frames([at], self.size, self.plan, self.policy, self).parts()
@@ -235,7 +235,7 @@ def second_moment_about_plan(
 
 
 def find_tripod_pitch(
-    frames: Sequence[PaintedFrame], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
+    frames: Sequence[PaintSightings], size: ImageSize, pitch: Pitch, policy: CalibrationPolicy
 ) -> TripodPitch | None:
     """The pitch that frames of one camera on a tripod show together.
 
@@ -290,7 +290,7 @@ class _Frames:
 
     def __init__(
         self,
-        frames: Sequence[PaintedFrame],
+        frames: Sequence[PaintSightings],
         size: ImageSize,
         plan: Pitch,
         policy: CalibrationPolicy,
@@ -420,7 +420,7 @@ def _without_frames(parts: _Parts, carried: FloatArray) -> FloatArray:
     return np.asarray(parts.common - np.einsum("nis,nit->st", parts.between, carried))
 
 
-def grass_of(frame: PaintedFrame, size: ImageSize) -> FloatArray:
+def grass_of(frame: PaintSightings, size: ImageSize) -> FloatArray:
     """Where on the grass each place of paint lies by the frame's camera, metres, shape (N, 2)."""
     center = principal_point(size)
     camera = camera_from_parameters(frame.parameters, center, size.diagonal / 2)

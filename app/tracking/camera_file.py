@@ -64,7 +64,7 @@ def frames_from_bytes(content: bytes) -> list[FrameCamera]:
     try:
         return _frames(content)
     except Exception as error:
-        raise InputError("no cameras of frames, or damaged; track the shot again") from error
+        raise InputError("the file of cameras is empty or damaged; track the shot again") from error
 
 
 def _frames(content: bytes) -> list[FrameCamera]:

@@ -37,7 +37,7 @@ from app.geometry.resection import (
     parameters_from_camera,
     projection_jacobians,
 )
-from app.paint.frame_pitch import make_painted_frame
+from app.paint.frame_pitch import make_paint_sightings
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
@@ -56,7 +56,7 @@ from app.solving.tripod_pitch import (
     DEVIATION_M,
     KAPPA_DEVIATION,
     KAPPA_SLOPE_SIGMA,
-    PaintedFrame,
+    PaintSightings,
     TripodPitch,
     find_tripod_pitch,
     grass_of,
@@ -219,10 +219,10 @@ class _Shot:
         assert frame.camera is not None
         return parameters_from_camera(frame.camera, self.half_diagonal)
 
-    def _sight(self, frame: TrackedFrame) -> PaintedFrame | None:
+    def _sight(self, frame: TrackedFrame) -> PaintSightings | None:
         if frame.outcome != TRACKED or frame.snapped is None:
             return None
-        return make_painted_frame(frame.snapped)
+        return make_paint_sightings(frame.snapped)
 
     def _turn(self, place: int, match: BackgroundMatches | None) -> tuple[FloatArray, FloatArray]:
         """How the camera turned and zoomed to the next frame, shape (4,), and its information."""
@@ -246,7 +246,7 @@ class _Shot:
             self.parameters[place], self.principal_point, self.half_diagonal
         )
 
-    def painted(self) -> dict[int, PaintedFrame]:
+    def painted(self) -> dict[int, PaintSightings]:
         """The frames with paint, by their place in the shot."""
         return {
             place: replace(sight, parameters=self.parameters[place])

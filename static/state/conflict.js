@@ -123,9 +123,9 @@ export function keepMine() {
 	resolve((field) => !same(field.mine, field.theirs), 'Your version is kept.');
 }
 
-/** Make again what they did not touch; where both changed the same, theirs stays. */
+/** Keep mine where they changed nothing; where both changed the same, theirs stays. */
 export function mergeBoth() {
-	resolve((field) => !field.overlaps && !same(field.mine, field.theirs), 'Both changes were kept.');
+	resolve((field) => !field.overlaps && !same(field.mine, field.theirs), 'Merged. Where both changed the same, their version was kept.');
 }
 
 /** Drop my edits and go on with theirs. */

@@ -15,7 +15,7 @@ const sigmaText = (sigma) => sigma.toFixed(sigma > 0 ? Math.min(Math.max(1 - Mat
 /** What is known of the times of a replay, in sentences. @param {LinkMap} map @param {number} fps of the live shot @returns {string[]} */
 export function mapText(map, fps) {
 	const told = timesText(map, fps);
-	return map.ball_reason ? [...told, `The ball does not tell the times. ${map.ball_reason}`] : told;
+	return map.ball_reason ? [...told, `The times could not be found from the ball. ${map.ball_reason}`] : told;
 }
 
 /** @param {LinkMap} map @param {number} fps */

@@ -132,7 +132,7 @@ export function QueueTools({ dataset, q, onQuery }) {
 			<${Ticked} ticked=${ticked} />
 			${whyNot('lead', dataset.name) ? null : html`<button class="button" type="button" aria-disabled=${reason !== ''} title=${reason || 'Make a batch of these groups for people to work on (Shift D)'} onClick=${give}>Assign…</button>`}
 			<button data-needs="review" class=${ticked > 0 ? 'button button--primary' : 'button'} type="button" aria-disabled=${reason !== ''} title=${reason} onClick=${open}>
-				${reason ? 'Decide…' : ticked > 0 ? `Decide ${count(ticked)} ticked…` : `Decide all ${count(total)}…`}
+				${reason ? 'Verdict…' : ticked > 0 ? `Verdict on ${count(ticked)} ticked…` : `Verdict on all ${count(total)}…`}
 			</button>
 			<${ValueOfReview} q=${q} />
 			${dataset.hides_groups && !error && total > 0 ? html`<p class="queue-tools__order" data-hidden-groups>${HIDDEN_WHY}</p>` : null}

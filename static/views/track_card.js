@@ -42,7 +42,7 @@ function Now({ around, frame }) {
 			<dt>Known</dt><dd>${STATES[around.state[place]]}</dd>
 			<dt>Left out</dt><dd>${left === null ? '–' : pixelText(left)}</dd>
 		</dl>
-		<p class="note">${against.length ? `${against.map(({ view }) => view).join(', ')} ${against.length > 1 ? 'contradict' : 'contradicts'} it.` : 'No ball of this frame contradicts it.'} Frames ${around.frame[0]} to ${around.frame.at(-1)} as their groups are now; the track itself waits to be made again.</p>
+		<p class="note">${against.length ? `${against.map(({ view }) => view).join(', ')} ${against.length > 1 ? 'contradict' : 'contradicts'} it.` : 'No ball of this frame contradicts it.'} Frames ${around.frame[0]} to ${around.frame.at(-1)} with the groups as they are now; the saved track is out of date until it is made again.</p>
 	`;
 }
 

@@ -23,7 +23,7 @@ from app.features.queue.service import find_neighbours, list_groups
 from app.features.queue.statistics import read_statistics
 from app.features.what_if.funnel import get_yield
 from app.features.what_if.service import YieldStore
-from app.features.what_if.statistics import StatisticsStore
+from app.features.what_if.statistics import StatisticsCache
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
 
@@ -96,7 +96,7 @@ def _statistics(store: Store) -> dict[str, float]:
     """Counted once; then first and later looks."""
     found = {}
     for what in ("statistics counted anew", "first statistics after a start"):
-        kept = StatisticsStore(store)
+        kept = StatisticsCache(store)
         start = time.perf_counter()
         kept.statistics(1)
         found[what] = 1000 * (time.perf_counter() - start)

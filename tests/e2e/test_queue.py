@@ -433,7 +433,7 @@ class TestTicks:
         row(page, 3).get_by_role("checkbox").click()
         expect(ticked(page)).to_have_text(f"{SEASON - 1:,} ticked")
         until(page, lambda: everything.evaluate("(box) => box.indeterminate"))
-        page.get_by_role("button", name=f"Decide {SEASON - 1:,} ticked").click()
+        page.get_by_role("button", name=f"Verdict on {SEASON - 1:,} ticked").click()
         page.get_by_label("Defer").check()
         page.get_by_role("button", name=f"Defer {SEASON - 1:,} groups").click()
         expect(page.locator(".bar")).to_contain_text(f"{SEASON - 1:,} groups deferred")

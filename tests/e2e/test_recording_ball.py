@@ -81,7 +81,7 @@ def test_one_click_follows_and_keys_accept_and_take_back(
     page.keyboard.press("o")
     expect(card).to_contain_text("confirmed")
     page.keyboard.press("y")
-    expect(card).to_contain_text("2 views got the ball")
+    expect(card).to_contain_text("the ball was added to 2 views")
     page.keyboard.press("u")
     expect(card).not_to_contain_text("Accepted")
     page.keyboard.press("Delete")

@@ -170,7 +170,7 @@ class TestSending:
         until(page, lambda: half_sent(page) > 0)
         network.detach()
         page.reload()
-        expect(uploads).to_contain_text("Choose the file again to go on")
+        expect(uploads).to_contain_text("Choose the file again to continue")
         there = half_sent(page)
         page.set_input_files("#import-file", films[0])
         expect(uploads).to_contain_text("uploaded")

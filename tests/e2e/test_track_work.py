@@ -66,7 +66,7 @@ class TestList:
         first = max(tracks(flights), key=lambda track: track["summary"]["p95_px"])
         expect(names.first).to_have_text(first["key"])
         flights.get_by_label("Show").select_option("rejected")
-        expect(flights.get_by_text("No track is like that.")).to_be_visible()
+        expect(flights.get_by_text("No track matches this filter.")).to_be_visible()
         flights.get_by_label("Show").select_option("")
         expect(names).to_have_count(2)
         assert serious_in_both(flights) == []

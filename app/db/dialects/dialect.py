@@ -223,7 +223,7 @@ def require_processes(settings: Settings, count: int) -> None:
     """
     if count > 1 and dialect_of(settings).is_file:
         raise InputError(
-            "several processes can serve a database on PostgreSQL alone, and this one is a file",
+            "several processes can serve a database only on PostgreSQL, and this one is a file",
             hint="Leave out --workers (TOUCHLINE_WEB_WORKERS), or set TOUCHLINE_DATABASE_URL:"
             " docs/operations.md.",
         )

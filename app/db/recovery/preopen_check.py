@@ -54,7 +54,8 @@ def require_sound(settings: Settings) -> None:
     if header is None:
         raise DamagedError(
             f"{database} is damaged or not a database",
-            hint="Run touchline restore BACKUP; it moves the file aside.",
+            hint="Run touchline restore BACKUP with your newest backup; the damaged file is kept"
+            " under another name.",
         )
     _require_whole(database, header, log)
     if read_anchor(database) is None:
@@ -75,7 +76,8 @@ def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -
     if not log.commits and size < expected:
         raise DamagedError(
             f"{database} is cut short: {size:,} of {expected:,} bytes are there",
-            hint="Run touchline restore BACKUP; it moves the file aside.",
+            hint="Run touchline restore BACKUP with your newest backup; the damaged file is kept"
+            " under another name.",
         )
 
 

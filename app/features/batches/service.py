@@ -422,9 +422,7 @@ def _check_request(new: NewBatch) -> None:
 def _check_tracks(new: NewBatch) -> None:
     """Tracks are judged, each by one reviewer."""
     if new.annotators:
-        raise InputError(
-            "nobody annotates tracks; a batch of them has reviewers", pointer="/annotators"
-        )
+        raise InputError("a batch of tracks takes reviewers, not annotators", pointer="/annotators")
     if new.query or new.verdicts != 1 or new.gold_every is not None:
         raise InputError(
             "a batch of tracks has no query, no gold groups, and one verdict on each",
@@ -435,7 +433,7 @@ def _check_tracks(new: NewBatch) -> None:
 
 def _check_gold(every: int | None) -> None:
     if every is not None and not 1 <= every <= RAREST_GOLD:
-        raise InputError(f"one of 1 to {RAREST_GOLD} groups is a gold one", pointer="/gold_every")
+        raise InputError(f"gold_every must be from 1 to {RAREST_GOLD}", pointer="/gold_every")
 
 
 def _require_gold(session: Session, dataset: int) -> None:

@@ -279,7 +279,7 @@ def _log_comment(
 def _checked_comment(text: str) -> str:
     text = text.strip()
     if not text:
-        raise InputError("a comment says something", pointer="/text")
+        raise InputError("a comment cannot be empty", pointer="/text")
     if len(text) > LONGEST:
         raise InputError(f"a comment has at most {LONGEST} characters", pointer="/text")
     return text

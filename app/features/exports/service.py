@@ -318,7 +318,7 @@ def _require_frames(dataset: str, files: Iterable[str]) -> None:
     """Raises InputError where images are wanted and no file of them is there."""
     if not any(is_address(file) or Path(file).exists() for file in files):
         raise InputError(
-            f'none of the images of "{dataset}" is there, so none can go with it',
+            f'no image file of "{dataset}" can be found, so the export cannot include images',
             hint="Export without images, or import the dataset again with its frames.",
             pointer="/images",
         )

@@ -236,7 +236,7 @@ def read_ball(
                 raise DatasetFormatError(name, f"line {line}", "frame", "is not a whole number")
             if frame in frames:
                 raise DatasetFormatError(
-                    str(path), f"line {line}", "frame", f"{frame:.0f} stands there a second time"
+                    str(path), f"line {line}", "frame", f"{frame:.0f} is listed twice"
                 )
         except DatasetFormatError as error:
             report.skip(error)

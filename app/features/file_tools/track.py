@@ -67,7 +67,7 @@ def track_files(
     """
     if turn and lines:
         raise InputError(
-            "lines say which half of the pitch is left: their cameras are not turned",
+            "the cameras cannot be turned: the given lines already say which half of the pitch is left",
             hint="Name the lines for the other half, or leave one of the two out.",
         )
     named = _parse_names(lines)

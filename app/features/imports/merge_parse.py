@@ -217,11 +217,13 @@ def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
         _require_list(fields["balls"], MAX_BALLS)
         _extras_of_record(fields["extras"])
         if view.included not in (True, False):
-            raise InputError("has another value where true or false is expected for a view")
+            raise InputError("has a view whose `included` is neither true nor false")
         if view.left_out is not None:
             _check_left_out(view)
         if not isinstance(fields["station"], str) and _checked_station(view.station).shared:
-            raise InputError(f"has the static camera {view.station.key} in a view")
+            raise InputError(
+                f"spells the static camera {view.station.key} inside a view, where only its key belongs"
+            )
     return group
 
 
@@ -251,13 +253,13 @@ def _checked_station(station: Station) -> Station:
             f"has {count:,} points in the lines of {station.key}, and a view may have {MAX_POINTS:,}"
         )
     if [*station.proposed] != [name for name in station.lines if name in station.proposed]:
-        raise InputError("has lines that were proposed and are not there")
+        raise InputError("names lines as proposed that the view does not have")
     return station
 
 
 def _require_truth_values(what: str, *values: object) -> None:
     if not all(isinstance(value, bool) for value in values):
-        raise InputError(f"has {what} with a value in the place of true or false")
+        raise InputError(f"has {what} with a value that is neither true nor false")
 
 
 def _verdict_of_record(value: Json) -> Mapping[str, Any]:
@@ -343,7 +345,7 @@ def _require_list(value: Json, most: int) -> list[Json]:
 
 def _require_text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> str:
     if value == "" and not empty:
-        raise InputError("has an empty text where one is expected that says something")
+        raise InputError("has an empty text where a text is required")
     if not isinstance(value, str) or len(value) > most:
         raise InputError(
             f"has {_describe_value(value)} where a text of at most {most} letters is expected"

@@ -162,7 +162,8 @@ def begin_in_session(
             return one
     if annotation_of_copy(session, group_id) is not None:
         raise ConflictError(
-            "this is an own annotation already", hint="Begin from the group that it is of."
+            "this is an independent annotation already",
+            hint="Start from the group that it was made from.",
         )
     place = count_annotations(session, batch_id, person) + 1
     ready = [one.copy_id for one in others if one.submitted is not None]

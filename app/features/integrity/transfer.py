@@ -201,7 +201,9 @@ def transfer_database(
         DamagedError: The source is damaged, or the copy is not equal to it.
     """
     if source.database == target.database:
-        raise InputError("a database cannot be transferred into itself")
+        raise InputError(
+            "source and target are the same database", hint="Name a target other than the source."
+        )
     dialect = dialect_of(target)
     with ExitStack() as held:
         held.enter_context(server_lock(source))

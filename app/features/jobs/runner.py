@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import structlog
 
-from app.db.database_worker import no_answer, run_here, run_in_worker, with_grace
+from app.db.database_worker import no_answer, run_in_this_thread, run_in_worker, with_grace
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
@@ -41,7 +41,7 @@ _ENDS: dict[EndReason, tuple[str, str]] = {
     "terminated": ("was stopped", _AGAIN),
     "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
     "processor": ("took too long to work out", _AGAIN),
-    "silence": ("came to no next step", f"{_AGAIN} The disk or a store may not answer."),
+    "silence": ("made no progress for too long", f"{_AGAIN} The disk or a store may not answer."),
 }
 """How a process ended, and what to do about it."""
 
@@ -259,7 +259,7 @@ def run_job_in_worker(
     """
     report = report or progress
     if dataset_id is not None and _is_small_dataset(store, dataset_id):
-        return run_here(store, work, *arguments, progress=report, answer=answer)
+        return run_in_this_thread(store, work, *arguments, progress=report, answer=answer)
     stop = with_grace(progress.check)
     try:
         with left_to_next_server(progress):

@@ -47,6 +47,7 @@ log = structlog.get_logger("touchline.jobs")
 CAPACITY = 32
 """Jobs that may wait; one more is told to come back."""
 CLOSE_SECONDS = 10.0
+WAIT_FOR_JOB = "Wait until it ends (page Jobs), then try again."
 """How long a server that stops waits for the running job's next step."""
 LEFT_TO_OTHERS = 4
 """One person leaves this part of the waiting places (one of so many) to others."""
@@ -254,7 +255,9 @@ class Jobs(JobRecords):
         self.cancel_kind(dataset_id)
         for run in self._queue.running:
             if run.job.dataset_id == dataset_id and not run.over.wait(CLOSE_SECONDS):
-                raise ConflictError(f"job {run.job.id} of this dataset is still running")
+                raise ConflictError(
+                    f"job {run.job.id} of this dataset did not stop in time", hint=WAIT_FOR_JOB
+                )
 
     def wait(self, job_id: int, seconds: float) -> Job:
         """A job once it is over, or as it stands after some seconds."""

@@ -36,7 +36,7 @@ from app.features.jobs.queries import (
 )
 from app.features.jobs.records import cancelled_by, need_job
 from app.features.jobs.runner import JobProgress, JobRun, Work
-from app.features.jobs.service import CLOSE_SECONDS, KEPT, Jobs, Pool
+from app.features.jobs.service import CLOSE_SECONDS, KEPT, WAIT_FOR_JOB, Jobs, Pool
 
 log = structlog.get_logger("touchline.jobs")
 
@@ -147,7 +147,9 @@ class SharedJobs(Jobs):
         until = time.monotonic() + CLOSE_SECONDS
         while left := self._running_of(dataset_id):
             if time.monotonic() > until:
-                raise ConflictError(f"job {left[0]} of this dataset is still running")
+                raise ConflictError(
+                    f"job {left[0]} of this dataset did not stop in time", hint=WAIT_FOR_JOB
+                )
             time.sleep(POLL_SECONDS)
 
     def wait(self, job_id: int, seconds: float) -> Job:

@@ -237,7 +237,9 @@ def _checked_name(text: str) -> str:
 
 def _require_free_name_and_count(names: Sequence[str], name: str) -> None:
     if name in names:
-        raise ConflictError(f"you have a token {name} already", hint="End it, or choose a name.")
+        raise ConflictError(
+            f"you have a token {name} already", hint="Revoke it, or choose another name."
+        )
     if len(names) >= MOST:
         raise ConflictError(
             f"you already have {MOST} tokens, the most that one person may have",

@@ -235,7 +235,7 @@ def _invitation_row(number: int, columns: Sequence[str], values: Sequence[str]) 
 def _checked_invitation(one: InvitationRow, seen: dict[str, int]) -> tuple[str, Role, str | None]:
     name = checked_name(one.name)
     if name in seen:
-        raise InputError(f"{name} stands in row {seen[name]}, too")
+        raise InputError(f"{name} is already in row {seen[name]}")
     try:
         role = Role(one.role.strip().lower())
     except ValueError:

@@ -168,7 +168,9 @@ class Passkeys:
             rows = list_passkeys(session, login.person_id)
             _require_few_passkeys(rows)
             if name in {row.name for row in rows}:
-                raise ConflictError(f"you have a passkey {name} already", hint="Name it otherwise.")
+                raise ConflictError(
+                    f"you have a passkey {name} already", hint="Choose another name."
+                )
             if find_passkey(session, values["credential"]) is not None:
                 raise ConflictError("this passkey is registered already")
             number = insert_passkey(session, values)

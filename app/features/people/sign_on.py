@@ -358,7 +358,7 @@ class SignOn:
     def _already_linked_error(self) -> ConflictError:
         return ConflictError(
             f"the account that {self.rules.label} names is linked with another person here",
-            hint="Log out at the provider, and come with your own.",
+            hint="Log out at the provider, then log in with your own account.",
         )
 
 

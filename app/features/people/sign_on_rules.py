@@ -72,8 +72,8 @@ class SignOnRules:
             and _verified_email_domain(claims) not in self.domains
         ):
             raise NotLoggedInError(
-                f"{self.label} does not vouch for an e-mail address of yours that may come in here",
-                hint="Use the account of your work, and see that its address is verified.",
+                f"{self.label} did not confirm an e-mail address of yours that may log in here",
+                hint="Use your work account, and make sure that its address is verified.",
             )
         if self.group_claim and self.groups.isdisjoint(_claim_texts(claims.get(self.group_claim))):
             raise NotLoggedInError(
@@ -308,7 +308,8 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
             raise NotFoundError("no account of a provider is linked with that person")
         if person.role == Role.ADMIN and not count_people_who_can_log_in(session, Role.ADMIN):
             raise ConflictError(
-                f"{person.name} is the last admin who can log in", hint="Make another one first."
+                f"{person.name} is the last admin who can log in",
+                hint="Make another person admin first.",
             )
         delete_logins(session, person_id, way=LoginMethod.SIGN_ON)
         log_account_event(session, actor, person.name, "single sign-on unlinked", person.role)

@@ -229,7 +229,7 @@ def _requested_size(state: PitchState, text: str) -> Pitch:
         return parse_pitch(text)
     if state.previous is None:
         raise InputError(
-            f"the pitch of {state.match or 'groups without a match'} has no size before this one",
+            f"{state.match or 'groups without a match'}: there is no earlier pitch size to restore",
             hint="It was never changed. Give a size, such as 105x68.",
         )
     return state.previous

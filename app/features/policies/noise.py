@@ -203,7 +203,7 @@ def apply_noise(store: Store, noise: Noise, *, actor: str) -> PolicyState:
         InputError: The dataset says nothing about its noise, or nothing new.
     """
     if not noise.values and not noise.is_new:
-        raise InputError(f'"{noise.dataset}" shows no other noise than it is judged with')
+        raise InputError(f'the noise measured in "{noise.dataset}" is what its policy already uses')
     state = read_policy(store, noise.dataset_id)
     with store.write() as session:
         accept_noise(session, noise, state, actor)

@@ -274,8 +274,8 @@ def _make_problem(row: StoredView, problem: str) -> dict[str, Any]:
 def _nothing_seen(rows: list[StoredView], problems: list[dict[str, Any]]) -> InputError:
     if not rows:
         return InputError(
-            "no view is to be looked at: the query finds none, or all that it finds have a ball",
-            hint="Ask with another query, or without --missing.",
+            "there is no view to search: the query matches none, or all that match already have a ball",
+            hint="Use another query, or leave out --missing.",
         )
     return InputError(
         f"none of the {len(rows)} frames could be read: {problems[0]['problem']}",

@@ -189,7 +189,9 @@ def change_run(
     groups: Mapping[str, int] = {}
     if change.accepted is not None:
         if change.accepted and before.stale:
-            raise ConflictError("the video is another one since", hint="Follow the ball again.")
+            raise ConflictError(
+                "the video file has changed since then", hint="Follow the ball again."
+            )
         with without_response():
             groups = _place(store, before, change.accepted, actor, paint)
     with store.write() as session:

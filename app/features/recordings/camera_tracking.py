@@ -208,11 +208,12 @@ def require_turnable(store: Store, recording_id: int, frame: int, turned: bool) 
     """
     found = get_cameras(store, recording_id, frame)
     if found.stale:
-        raise ConflictError("the video is another one since", hint="Track the shot again.")
+        raise ConflictError("the video file has changed since then", hint="Track the shot again.")
     fixed = sorted(set(found.summary.annotated) - set(found.summary.unusable))
     if fixed and turned != found.summary.turned:
         raise ConflictError(
-            f"the lines of frame {fixed[0]} say which half of the pitch is left",
+            f"the cameras cannot be turned: the lines of frame {fixed[0]} already say which half of the"
+            " pitch is left",
             hint="Name its lines for the other half, and track the shot again.",
         )
     return found

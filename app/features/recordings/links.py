@@ -210,7 +210,9 @@ def set_instants(
         if if_match is not None:
             require_etag(etag_of(row), if_match, "this link")
         if (row.live_sha256, row.replay_sha256) != (seen.live_sha256, seen.replay_sha256):
-            raise ConflictError("a recording is another file by now", hint="Link the shots again.")
+            raise ConflictError(
+                "the file of a recording has changed since then", hint="Link the shots again."
+            )
         if save_map(session, row, pairs, made, residuals, assumed_speed=assumed_speed):
             note_link(session, actor, "instants linked", row)
         found = link_of(find_link(session, link_id))

@@ -343,7 +343,7 @@ def _is_undetermined(body: bytes) -> bool:
     return b'"camera":null' in text or b'"unobservable":[]' not in text
 
 
-def known_calibrations(session: Session, keys: Iterable[str]) -> set[str]:
+def stored_calibration_keys(session: Session, keys: Iterable[str]) -> set[str]:
     """Those of the keys under which a calibration is kept."""
     return set(session.scalars(_KEPT, {"keys": list(keys)}))
 

@@ -244,7 +244,7 @@ def _rays(
         where = "in its groups" if upload is None else "in the file"
         raise InputError(
             f"frames {shot.first} to {shot.last} of {shot.name} have "
-            f"{plural(len(inside), 'ball')} {where}, and no camera for one of them",
+            f"{plural(len(inside), 'ball')} {where}, but none in a frame that has a camera",
             hint="Track the camera of the shot, and mark the ball in frames of it or send a ball.csv.",
         )
     left_out = len(seen) - sum(number in seen for number in inside)

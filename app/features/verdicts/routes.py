@@ -16,7 +16,6 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.features.verdicts import bulk, bulk_undo
-from app.features.verdicts import bulk_undo as bulk_redo
 from app.features.verdicts.bulk import BatchReport, BulkPlan, Refusal, SampleGroup
 from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.service import set_verdict
@@ -272,13 +271,13 @@ def list_batches(
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
 @responds(document)
-def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_redo.RedoReport:
+def redo_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
     Groups that somebody has judged or edited since stay as they are. 409 when the batch was not
     taken back, or was given again already.
     """
-    return bulk_redo.redo_batch(store, batch, actor=actor)
+    return bulk_undo.redo_batch(store, batch, actor=actor)
 
 
 @router.post(

@@ -22,9 +22,9 @@ from app.features.findings.queries import GroupDismissals, findings_from_rows
 from app.features.groups.queries import read_groups
 from app.features.queue.refresh_queries import read_import_findings
 from app.features.solutions.queries import (
-    known_calibrations,
     present_bodies,
     read_calibration_bodies,
+    stored_calibration_keys,
 )
 from app.features.tracks.service import accepted_tracks
 from app.features.versions.frozen_queries import (
@@ -311,7 +311,7 @@ class _FreezeRun:
     def _deleted_calibrations(self, session: Session, names: set[str]) -> dict[str, bytes]:
         """Calibrations that somebody deleted since the snapshot, as they are in it."""
         keys = {name.removeprefix(CALIBRATION) for name in names}
-        gone = keys - known_calibrations(session, keys)
+        gone = keys - stored_calibration_keys(session, keys)
         bodies = read_calibration_bodies(self._session, gone) if gone else {}
         return {CALIBRATION + key: body for key, body in bodies.items()}
 

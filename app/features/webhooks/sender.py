@@ -116,7 +116,7 @@ def _is_unambiguous_address(text: str, parts: SplitResult) -> bool:
 def _address_error(text: str, pointer: str | None) -> InputError:
     return InputError(
         f"{text[:100]!r} is not an address that messages can be sent to",
-        hint="Like https://hooks.example.org/touchline: http or https, without user, # and dots.",
+        hint="Like https://hooks.example.org/touchline: http or https, without a user name, a # part, or . and .. in the path.",
         pointer=pointer,
     )
 

@@ -1,4 +1,4 @@
-"""StatisticsStore: what statistics count, a row a group, kept in step with the database.
+"""StatisticsCache: what statistics count, a row a group, kept in step with the database.
 
 29 bytes a group lie in memory and in the cache. A look reads again what has changed since the last
 one: groups that the database has marked, and groups that somebody has judged.
@@ -62,7 +62,7 @@ class _DatasetColumns:
     noted: int = 0
 
 
-class StatisticsStore:
+class StatisticsCache:
     """The statistics of whole datasets that somebody asked about."""
 
     def __init__(self, store: Store):

@@ -39,7 +39,7 @@ export function RecordingPracticePart({ onLeave }) {
 	return html`
 		<section class="practice" aria-labelledby="practice-recording">
 			<h3 id="practice-recording">With a recording</h3>
-			<p>A made-up film of 23 seconds with four known faults: a cut is missing, a shot is called what it is not, a camera is lost, and a replay is neither on its side nor linked. You mend it as in real work; here stands, in words and numbers, what is right by now. It takes about ten minutes, and a minute to be drawn.</p>
+			<p>A made-up film of 23 seconds with four known faults: a missing cut, a shot of the wrong kind, a lost camera, and a replay that is tracked from the wrong side and not linked. Correct them as in real work; this page shows what is right so far. Allow ten minutes, and a minute to draw the film.</p>
 			${error ? html`<p role="alert">The practice on a recording could not be read.</p>` : null}
 			<p class="buttons">
 				${lessons.length === 0 ? html`<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(false)}>Make the recording</button>`

@@ -94,7 +94,7 @@ export function useBalls(one, shot) {
 		if (!run) announce('No ball is followed in this frame.');
 		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This run is accepted.' : 'This run is not accepted.');
 		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept }) => (accepted
-			? `Accepted: ${plural(placed ?? 0, 'view')} got the ball${kept ? `, ${kept} had another one` : ''}.`
+			? `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}.`
 			: 'Taken back.'));
 	}
 	function confirm() {

@@ -46,11 +46,11 @@ export function CameraCard({ one, cameras }) {
 			${stretch ? html`<${Counts} stretch=${stretch} old=${before} />` : html`<p>A camera for each frame of this shot is found from its paint. Groups of its frames then need no proposal.</p>`}
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
-			${stretch?.stale ? html`<p class="form__error">The video is another one since: track the shot again.</p>` : null}
-			${fresh.length ? html`<p role="status">${fresh.length === 1 ? `Frame ${fresh[0]} has` : `${plural(fresh.length, 'frame')} have`} lines since. Track again, and the shot follows them.</p>` : null}
+			${stretch?.stale ? html`<p class="form__error">The video file has changed since then: track the shot again.</p>` : null}
+			${fresh.length ? html`<p role="status">Lines were drawn in ${fresh.length === 1 ? `frame ${fresh[0]}` : plural(fresh.length, 'frame')} after the shot was tracked. Track again to use them.</p>` : null}
 			${useless.length ? html`<p class="form__error">Frame ${useless.join(', ')} has too few lines for a camera, and was not used.</p>` : null}
 			${shown?.other ? html`
-				<p role="status">Its frames show another pitch than its match has${frames ? ` (${pitchSize({ length: frames.pitch[0], width: frames.pitch[1] })})` : ''}: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}. With that size groups of the match are solved again, and the shot is tracked again.${noGroup ? ` ${noGroup}.` : ''}</p>
+				<p role="status">The frames of this shot show another pitch size than the match has${frames ? ` (${pitchSize({ length: frames.pitch[0], width: frames.pitch[1] })})` : ''}: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}. If you use it, the groups of the match are solved again and the shot is tracked again.${noGroup ? ` ${noGroup}.` : ''}</p>
 				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== '' || noGroup !== ''} title=${busy || noGroup || 'Statistics restores the size before'} onClick=${noGroup ? undefined : cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
 			<p class="buttons">
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>

@@ -62,7 +62,7 @@ export function useCameras(one, shot, { jobs, watch }) {
 	const job = jobToShow(here.some((one) => !isOver(one)) || tracking.every(isOver) ? here : tracking);
 	useEnded(tracking, list.reload);
 	useEffect(() => listen('job', () => {}, list.reload), [one.id]);
-	const busy = jobs.some((one) => !isOver(one) && (one.kind === 'track' || one.id === drawing)) ? 'A job is at work' : shot ? '' : 'This recording has no shot';
+	const busy = jobs.some((one) => !isOver(one) && (one.kind === 'track' || one.id === drawing)) ? 'A job is running' : shot ? '' : 'This recording has no shot';
 	function track() {
 		if (busy || !shot) return;
 		const asked = stretch && stretch.first <= shot.first && shot.last <= stretch.last ? stretch : shot;
@@ -115,7 +115,7 @@ export function useCameras(one, shot, { jobs, watch }) {
 		turnBefore: () => {
 			if (!stretch?.before) return;
 			setBefore(!old);
-			announce(old ? 'The present cameras are shown.' : 'The cameras before are shown.');
+			announce(old ? 'Showing the present cameras.' : 'Showing the previous cameras.');
 		},
 		turnLines: () => {
 			setLines(!lines);

@@ -24,7 +24,7 @@ import { JobProgress } from '../job_progress.js';
 /** What became of them, in words. @param {JobJson['result']} result */
 function madeText({ new: made, changed, unchanged, linked_views: views, outside, dry_run: dry }) {
 	return [
-		dry ? 'Nothing is kept yet. So it would be:' : '',
+		dry ? 'Dry run, nothing was saved. It would be:' : '',
 		`${plural(made, 'group')} made.`,
 		changed ? `${plural(changed, 'group')} got views of replays.` : '',
 		unchanged ? `${plural(unchanged, 'frame')} ${unchanged === 1 ? 'was already a group and was not changed' : 'were already groups and were not changed'}.` : '',

@@ -58,7 +58,7 @@ export function BallCard({ link, dataset, reload }) {
 			<h2>Ball</h2>
 			<p>Rays of the ball meet where both frames show the same instant. Both shots need tracked cameras, and the ball: marked in groups that were taken from them, or in a file <code>ball.csv</code> (<code>frame,time_s,x,y</code>).</p>
 			${turned ? html`
-				<p role="status">The cameras of the replay stand on the other side of the pitch: turned by half a turn, its rays meet the live ones.
+				<p role="status">The replay was tracked from the wrong side of the pitch: its rays meet the live ones once its cameras are turned by half a turn.
 					<button class="button button--small" type="button" data-needs="lead" data-of=${dataset} aria-disabled=${runs} onClick=${turn}>Turn the replay’s cameras</button></p>` : null}
 			<form class="linking__files" ref=${form} onSubmit=${(/** @type {SubmitEvent} */ event) => { event.preventDefault(); if (!runs) look(); }}>
 				<label>ball.csv of the live recording <input type="file" name="live" accept=".csv" /></label>

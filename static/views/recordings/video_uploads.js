@@ -24,8 +24,8 @@ function sentence({ state, bytes, size, error, dataset, left }) {
 	const share = `${Math.floor((100 * bytes) / size)} % of ${sizeText(size)}`;
 	const then = dataset ? ` Then it becomes a recording of ${dataset}.` : '';
 	if (state === 'refused') return error;
-	if (state === 'half') return `${share} are there. Choose the file again to go on; else it is deleted ${plural(uploadDays.value, 'day')} after its last part.`;
-	if (state === 'waiting') return `${error || 'The server cannot be reached.'} ${share} are there; it goes on by itself.${then}`;
+	if (state === 'half') return `${share} is uploaded. Choose the file again to continue; otherwise it is deleted ${plural(uploadDays.value, 'day')} after the last part arrived.`;
+	if (state === 'waiting') return `${error || 'The server cannot be reached.'} ${share} is uploaded; it continues by itself.${then}`;
 	if (state === 'sending') return `${share}${left === null ? '' : `, ${left < 90 ? 'about a minute' : `${Math.round(left / 60)} minutes`} left`}.${then}`;
 	if (state === 'queued') return `${sizeText(size)}.${then}`;
 	return `${sizeText(size)}.`;
@@ -44,7 +44,7 @@ function Row({ one }) {
 				<strong>${name}</strong>
 				<span class=${state === 'refused' ? 'job__sentence form__error' : 'job__sentence'}>${sentence(one)}</span>
 				${state === 'refused' ? html`<button class="button button--small" type="button" onClick=${() => sendAgain(one)}>Try again<span class="hidden-text"> with ${name}</span></button>` : null}
-				${isOver ? null : html`<button class="button button--small" type="button" title="What came of it is deleted" onClick=${() => dropVideo(one)}>Remove<span class="hidden-text"> the upload of ${name}</span></button>`}
+				${isOver ? null : html`<button class="button button--small" type="button" title="Deletes the part that is uploaded" onClick=${() => dropVideo(one)}>Remove<span class="hidden-text"> the upload of ${name}</span></button>`}
 			</div>
 			${state === 'here' || isOver ? null : html`<div class="meter" role="progressbar" aria-label=${`Upload of ${name}`} aria-valuemin="0" aria-valuemax="100" aria-valuenow=${percent}><span style=${{ width: `${percent}%` }}></span></div>`}
 			${job ? html`<${JobProgress} job=${job} />` : null}

@@ -179,8 +179,8 @@ function VerdictCard({ track, judge }) {
 		<section class="card" aria-labelledby="track-title">
 			<h2 id="track-title">Track</h2>
 			<p>${verdictText(track)}${track.judged_by && track.verdict ? html` by ${track.judged_by}` : null}</p>
-			<p class="note">${summary.median_px === null ? 'Nothing could be left out' : `Left out and predicted: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? `, ${summary.contradicted} contradict it` : ''}.</p>
-			${(summary.median_px ?? 0) > CLICK_PX ? html`<p class="note">Left-out balls are missed by more than clicks are: its cameras contradict each other. An adjustment to lines and balls (<code>touchline rig</code>) may bring them together.</p>` : null}
+			<p class="note">${summary.median_px === null ? 'Nothing could be left out' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? `; ${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track` : ''}.</p>
+			${(summary.median_px ?? 0) > CLICK_PX ? html`<p class="note">Left-out balls are predicted less exactly than a click: the cameras contradict each other. An adjustment to lines and balls (<code>touchline rig</code>) may bring them together.</p>` : null}
 			<p class="buttons">
 				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'accepted'} aria-disabled=${why !== ''} title=${why} onClick=${() => { if (!why) press('accepted'); }}>Accept <kbd>a</kbd></button>
 				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'rejected'} onClick=${() => press('rejected')}>Reject <kbd>x</kbd></button>

@@ -96,7 +96,7 @@ function Tracks({ one }) {
 		${!found.value && !found.error ? html`<${Loading} what="tracks" />` : null}
 		${items.length || chosen ? html`<${ListTools} values=${values} />` : null}
 		${giving ? html`<${AssignTracks} dataset=${one.name} id=${one.id} tracks=${open} onClose=${() => setGiving(false)} onDone=${found.reload} />` : null}
-		${found.value && chosen && !items.length ? html`<p class="empty-note" role="status">No track is like that.</p>` : null}
+		${found.value && chosen && !items.length ? html`<p class="empty-note" role="status">No track matches this filter.</p>` : null}
 		${items.length ? html`
 			<section class="card card--flush" aria-label="Tracks">
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Table of tracks">

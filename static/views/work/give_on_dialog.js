@@ -25,7 +25,7 @@ export function ReassignDialog({ one, onClose, onDone }) {
 	}), () => { onClose(); onDone(); });
 	return html`
 		<${FormDialog} title=${`Reassign: ${batch.name}`} onClose=${onClose} onSubmit=${send} buttons=${html`<button class="button button--primary" type="submit">Save</button>`}>
-			<p>${batch.kind === 'tracks' ? 'Tracks that are judged stay so.' : 'Submitted and reviewed groups stay; a person who has a group open keeps it until they leave.'}</p>
+			<p>${batch.kind === 'tracks' ? 'Tracks that already have a verdict keep it.' : 'Submitted and reviewed groups stay; a person who has a group open keeps it until they leave.'}</p>
 			<div class="form__row"><label for="give-name">Name</label><input class="field" id="give-name" name="name" required maxlength="80" autocomplete="off" defaultValue=${batch.name} /></div>
 			<div class="form__columns">
 			<div class="form__row"><label for="give-due">Due</label><input class="field" id="give-due" name="due" type="date" defaultValue=${batch.due ?? ''} /></div>

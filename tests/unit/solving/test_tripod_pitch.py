@@ -24,7 +24,7 @@ from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import CROWN, INWARD, TERMS, painted_shift
 from app.solving.resect import ResectionProblem
 from app.solving.tripod_pitch import (
-    PaintedFrame,
+    PaintSightings,
     TripodPitch,
     find_tripod_pitch,
     second_moment_about_plan,
@@ -54,7 +54,7 @@ def laid(crown: float = 0.0, inward: float = 0.0) -> FloatArray:
 
 def painted(
     truth: FloatArray, pitch: Pitch, values: FloatArray, rng: np.random.Generator
-) -> PaintedFrame:
+) -> PaintSightings:
     """Paint of a frame, and the camera that lays the plan's markings on it."""
     camera = camera_from_parameters(truth, MAIN.principal_point, HALF)
     places, marking = [], []
@@ -75,18 +75,18 @@ def painted(
     for at in range(ROUNDS):
         offsets = measure_offsets(problem, parameters, curves, sigmas, PLAN)
         parameters = parameters + problem.step(parameters, offsets, strict=at >= ROUNDS - STRICT)
-    return PaintedFrame(parameters, curves, sigmas)
+    return PaintSightings(parameters, curves, sigmas)
 
 
 def film(
     pitch: Pitch, values: FloatArray, seed: int = 1
-) -> tuple[list[FloatArray], list[PaintedFrame]]:
+) -> tuple[list[FloatArray], list[PaintSightings]]:
     rng = np.random.default_rng(seed)
     truths = [posed(pan, 1 + 0.02 * at) for at, pan in enumerate(np.linspace(-22, 22, 8))]
     return truths, [painted(truth, pitch, values, rng) for truth in truths]
 
 
-def shown_by(frames: list[PaintedFrame]) -> TripodPitch:
+def shown_by(frames: list[PaintSightings]) -> TripodPitch:
     found = find_tripod_pitch(frames, SIZE, PLAN, POLICY)
     assert found is not None
     return found

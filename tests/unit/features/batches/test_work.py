@@ -315,10 +315,10 @@ class TestLeases:
     def test_gold_groups_come_at_least_once_in_a_thousand(self, store, dataset, groups, every):
         make_gold(store, groups[5])
         kept = make_batch(store, dataset, NewBatch("a", size=1, gold_every=1000), actor="lead").id
-        with pytest.raises(InputError, match="one of 1 to 1000 groups is a gold one") as refused:
+        with pytest.raises(InputError, match="gold_every must be from 1 to 1000") as refused:
             make_batch(store, dataset, NewBatch("b", size=1, gold_every=every), actor="lead")
         assert refused.value.pointer == "/gold_every"
-        with pytest.raises(InputError, match="one of 1 to 1000"):
+        with pytest.raises(InputError, match="from 1 to 1000"):
             change_batch(store, kept, gold_every=every, actor="lead")
         assert [(one.id, one.gold_every) for one in list_batches(store, dataset)] == [(kept, 1000)]
 

@@ -10,7 +10,7 @@ from app.features.datasets.queries import (
     list_solution_ids,
     unused_calibrations,
 )
-from app.features.solutions.queries import CalibrationModel, SolutionModel, known_calibrations
+from app.features.solutions.queries import CalibrationModel, SolutionModel, stored_calibration_keys
 
 KEYS = ("a", "b", "c")
 
@@ -37,13 +37,13 @@ class TestSpareCalibrations:
             delete_solutions(session, [1])
             assert unused_calibrations(session) == ["a"]
             assert delete_if_unused(session, KEYS[:2]) == 1
-            assert known_calibrations(session, KEYS) == {"b", "c"}
+            assert stored_calibration_keys(session, KEYS) == {"b", "c"}
 
     def test_only_those_that_were_found_go(self, solved: Store) -> None:
         with solved.write() as session:
             delete_solutions(session, [1, 2])
             assert delete_if_unused(session, KEYS[:2]) == 2
-            assert known_calibrations(session, KEYS) == {"c"}
+            assert stored_calibration_keys(session, KEYS) == {"c"}
 
     def test_they_stay_while_a_group_waits_to_be_solved(self, solved: Store) -> None:
         with solved.write() as session:

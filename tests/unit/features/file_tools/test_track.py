@@ -120,7 +120,7 @@ def test_cameras_of_the_far_side_are_turned_where_no_lines_say_it(
     x, y, z = CAMERA.position
     assert read_cameras(out, Report())["0"].position == pytest.approx([-x, -y, z])
     code, _, err = touchline("track", clip, out, "--turn", "--lines", "lines.json@0")
-    assert code == 1 and "lines say which half of the pitch is left" in err
+    assert code == 1 and "the given lines already say which half of the pitch is left" in err
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,9 @@ class TestStation:
             "Middle line",
         )
         for wrong in (["Circle left"], "Middle line", ["Middle line", "Middle line"], [7]):
-            with pytest.raises(InputError, match="were proposed and are not there"):
+            with pytest.raises(
+                InputError, match="names lines as proposed that the view does not have"
+            ):
                 _station_of_record({**value, "proposed": wrong})
 
     def test_lines_have_no_more_points_than_those_of_other_imports(self) -> None:
@@ -82,7 +84,7 @@ class TestStation:
 
 class TestParseGroup:
     @pytest.mark.parametrize(
-        ("shared", "said"), [(True, "has the static camera"), ("yes", "in the place of true")]
+        ("shared", "said"), [(True, "spells the static camera"), ("yes", "neither true nor false")]
     )
     def test_a_static_camera_is_named_by_a_view_and_never_stands_in_it(
         self, shared: Any, said: str

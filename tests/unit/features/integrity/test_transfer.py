@@ -70,7 +70,7 @@ class TestTransfer:
 
         with pytest.raises(KeyboardInterrupt):
             transfer_database(source, target, stop)
-        with pytest.raises(StorageError, match="has not come to its end"):
+        with pytest.raises(StorageError, match="was interrupted"):
             Store.open(target.model_copy(update={"home": source.home.parent / "else"}))
         seen: list[str] = []
         done = transfer_database(source, target, lambda name, _: seen.append(name))
@@ -87,7 +87,7 @@ class TestTransfer:
         with pytest.raises(DamagedError, match="is not equal"):
             transfer_database(source, target)
         monkeypatch.undo()
-        with pytest.raises(StorageError, match="has not come to its end"):
+        with pytest.raises(StorageError, match="was interrupted"):
             Store.open(target.model_copy(update={"home": source.home.parent / "else"}))
 
     def test_a_database_in_use_is_left_alone(self, source: Settings, filled: Store) -> None:

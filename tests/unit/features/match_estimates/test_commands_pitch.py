@@ -79,7 +79,11 @@ class TestPitch:
             (("demo", "--set", "100x64"), 2, "--set needs --match"),
             (("demo", "--match", "final"), 1, "has no match final"),
             (("demo", "--match", MATCH, "--set", "big"), 1, "write it as 105x68"),
-            (("demo", "--match", MATCH, "--set", "previous"), 1, "has no size before this one"),
+            (
+                ("demo", "--match", MATCH, "--set", "previous"),
+                1,
+                "there is no earlier pitch size to restore",
+            ),
             (("nothing",), 1, "nothing"),
             ((), 2, "give either line files or --dataset"),
             (("demo", "--dataset", "demo"), 2, "give either line files or --dataset"),

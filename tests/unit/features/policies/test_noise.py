@@ -236,7 +236,7 @@ class TestApplyNoise:
         again = read_noise(store, "demo")
         assert all(item.agrees for item in again.advice)
         assert (again.values, again.notices) == ({}, ())
-        with pytest.raises(InputError, match="shows no other noise"):
+        with pytest.raises(InputError, match="is what its policy already uses"):
             apply_noise(store, again, actor="ben")
 
     def test_a_second_estimate_is_the_first(self, store: Store) -> None:

@@ -365,7 +365,7 @@ def test_cameras_that_lines_put_on_their_side_or_that_others_tracked_are_not_tur
     track(api, recording, finished)
     answer = api.patch(f"{recording}/cameras/5", json={"turned": True})
     assert answer.status_code == 409
-    assert "lines of frame 7 say which half of the pitch" in answer.json()["detail"]
+    assert "lines of frame 7 already say which half of the pitch" in answer.json()["detail"]
     turned = Tracked([tracker.frame(number, {}) for number in range(4, 12)], (), True)
     with pytest.raises(ConflictError, match="somebody tracked this shot meanwhile"):
         module.save_cameras(store, found, (4, 11), turned, [], "ann", turned_from=present)

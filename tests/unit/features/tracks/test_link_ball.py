@@ -163,7 +163,9 @@ class TestLinkByBall:
         sent = uploads(api, both(REST))
         job = finished(api.post(f"{link}/ball", json=sent))
         assert job.state == "failed"
-        assert "150 balls in the file, and no camera for one of them" in job.problem["detail"]
+        assert (
+            "150 balls in the file, but none in a frame that has a camera" in job.problem["detail"]
+        )
         assert "Track the camera of the shot" in job.problem["hint"]
         assert api.post(f"{link}/ball", json={"live_upload": "0" * 32}).status_code == 404
 

@@ -128,7 +128,7 @@ class TestBatchesOfTracks:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"annotators": ["ada"]}, "nobody annotates tracks"),
+            ({"annotators": ["ada"]}, "takes reviewers, not annotators"),
             ({"verdicts": 2}, "one verdict on each"),
             ({"gold_every": 5}, "no gold groups"),
             ({"query": "status:accepted"}, "has no query"),

@@ -21,7 +21,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.verdicts.bulk import give_verdicts, list_batches
 from app.features.verdicts.bulk_undo import undo_batch
 from app.features.what_if import statistics as kept
-from app.features.what_if.statistics import StatisticsStore
+from app.features.what_if.statistics import StatisticsCache
 from app.soccer.policy import PAPER
 
 SPLITS = ("train", "valid", "test")
@@ -53,7 +53,7 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
     rng = random.Random(5)
     ids = fill(*(make_group(number, split=rng.choice(SPLITS)) for number in range(7, 12)))
     names = dict(zip(ids, range(7, 12), strict=True))
-    held = StatisticsStore(store)
+    held = StatisticsCache(store)
 
     def edit() -> None:
         group = rng.choice(ids)
@@ -87,7 +87,7 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
     for step in (*steps, *(rng.choice(steps) for _ in range(6))):
         step()
         if rng.random() < 0.3:
-            held = StatisticsStore(store)
+            held = StatisticsCache(store)
         assert held.statistics(1) == read_statistics(store, 1), step.__name__
     # Another policy, and a group that came: nothing else is worth reading all.
     assert 1 <= len(looked) <= 1 + sum(step is move for step in steps) + 6
@@ -95,22 +95,22 @@ def test_after_any_changes_they_are_those_of_reading_all(store, fill, make_group
 
 def test_one_change_reads_one_group_also_after_a_restart(store, fill, make_group, looked) -> None:
     (group, *_) = fill(*(make_group(number) for number in range(7, 12)))
-    StatisticsStore(store).statistics(1)
+    StatisticsCache(store).statistics(1)
     assert len(looked) == 1
     etag = load(store, group).etag
     submit(store, group, SetBall("7.png", None), if_match=etag, actor="ann")
     give_verdicts(store, 1, "passes:no", "rejected", "other", "no ball", actor="ben")
-    assert StatisticsStore(store).statistics(1) == read_statistics(store, 1)
+    assert StatisticsCache(store).statistics(1) == read_statistics(store, 1)
     assert len(looked) == 1
 
 
 def test_what_the_cache_lost_or_got_wrong_is_read_anew(store, fill, make_group, looked) -> None:
     fill(*(make_group(number) for number in range(7, 12)))
-    whole = StatisticsStore(store).statistics(1)
+    whole = StatisticsCache(store).statistics(1)
     good = file(store).read_bytes()
     for bad in (b"", good[:-70], good[:-40] + bytes([good[-40] ^ 1]) + good[-39:]):
         file(store).write_bytes(bad)
-        assert StatisticsStore(store).statistics(1) == whole
+        assert StatisticsCache(store).statistics(1) == whole
     assert len(looked) == 4
 
 
@@ -118,20 +118,20 @@ def test_a_file_of_another_database_is_not_used(
     store, fill, make_group, looked, monkeypatch
 ) -> None:
     fill(*(make_group(number) for number in range(7, 12)))
-    StatisticsStore(store).statistics(1)
+    StatisticsCache(store).statistics(1)
     monkeypatch.setattr(kept, "entry_hash", lambda *_: "another")
-    StatisticsStore(store).statistics(1)
+    StatisticsCache(store).statistics(1)
     assert len(looked) == 2
 
 
 def test_there_is_nothing_of_a_dataset_that_is_not_there(store) -> None:
     with pytest.raises(NotFoundError):
-        StatisticsStore(store).statistics(99)
+        StatisticsCache(store).statistics(99)
 
 
 def test_groups_take_29_bytes_each(store, fill, make_group) -> None:
     fill(*(make_group(number) for number in range(7, 12)))
-    held = StatisticsStore(store)
+    held = StatisticsCache(store)
     held.statistics(1)
     counted = held._kept[1].counted
     size = 8 + sum(getattr(counted, name)[..., :1].nbytes for name in kept._ARRAYS)
