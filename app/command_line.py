@@ -32,7 +32,7 @@ from app.features.predictions import commands as predictions
 from app.features.solve import commands as solve
 from app.features.verdicts import commands as verdicts
 from app.features.versions import commands as versions
-from app.finite import quoted
+from app.json_text import quoted
 from app.terminal.options import act_as
 from app.terminal.server import work_against_server
 from app.terminal.terminal import allow_any_text, escape_controls, print_error

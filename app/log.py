@@ -9,7 +9,7 @@ from typing import Any, Literal, TextIO, cast
 
 import structlog
 
-from app.finite import finite
+from app.json_text import finite
 
 LogFormat = Literal["text", "json"]
 

@@ -21,7 +21,7 @@ import structlog
 from app.config import Settings, is_local
 from app.durable import read_private
 from app.errors import InputError
-from app.finite import quoted
+from app.json_text import quoted
 
 log = structlog.get_logger("touchline.mail")
 

@@ -54,7 +54,6 @@ from app.formats.manifest import software_version
 from app.http import event_routes as http_event
 from app.http import openapi
 from app.http.access import Access
-from app.http.bodies import MAX_JSON_BYTES
 from app.http.deps import Services
 from app.http.errors import install_handlers
 from app.http.headers import KnownHosts, SameOrigin, SecurityHeaders
@@ -64,7 +63,13 @@ from app.http.openapi import describe
 from app.http.pages import STATIC, Site, install_pages
 from app.http.request_limits import THREADS, RequestLimits
 from app.http.request_log import RequestLog
-from app.http.requests import HeadAsGet, OneLength, OneRange, refuse_unknown_parameters
+from app.http.requests import (
+    MAX_JSON_BYTES,
+    HeadAsGet,
+    OneLength,
+    OneRange,
+    refuse_unknown_parameters,
+)
 from app.http.route import Gate, Route, answer_no_route, require_permissions
 from app.http.team import Team, allowed_hosts
 

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, camera_file_text
 from app.formats.view_files import write_file_below
 from app.geometry.arrays import FloatArray
-from app.geometry.camera import Camera
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.lens import ARCTAN_POLYNOMIAL, FISHEYE
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.frames import ImageSize
 
 SIZE = ImageSize(1280, 720)

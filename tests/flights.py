@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from app.canonical import canonical
 from app.db.json_columns import pack
 from app.db.session import Session, now
 from app.db.store import Store
@@ -23,6 +22,7 @@ from app.formats.export_record import ExportRecord
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import output_tree
 from app.formats.tracks_writer import TrackRecord
+from app.json_text import canonical
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, Station, View

@@ -32,7 +32,7 @@ from app.db.recovery.preopen_check import require_sound, signs_of_use
 from app.db.session import Session, now
 from app.durable import PARTIAL, sync
 from app.errors import EXAMINE, DamagedError, InputError, StorageError
-from app.finite import json_text
+from app.json_text import json_text
 
 FORMAT, FORMAT_VERSION = "touchline-backup", 1
 DATABASE, MANIFEST = "touchline.db", "manifest.json"

@@ -126,7 +126,7 @@ def _files_of_database(home: Path, database: Path) -> Iterator[Path]:
 def _is_own_database(file: Path) -> bool:
     """Whether a file is the database of the installation that is named beside it."""
     # It needs numpy, and commands that only print a help text come by here.
-    from app.db.recovery.wal import read_header
+    from app.db.recovery.preopen_check import read_header
 
     try:
         header, anchor = read_header(file), read_anchor(file)

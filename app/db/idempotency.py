@@ -16,12 +16,12 @@ from sqlalchemy import Index, LargeBinary, Table, bindparam, delete, or_, select
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.statements import insert
+from app.db.dialects.dialect import insert
 from app.db.json_columns import Json, decompress, parse
 from app.db.session import Base, Session, now, pending_response, text_of
 from app.db.store import Store
 from app.errors import ConflictError
-from app.finite import json_text
+from app.json_text import json_text
 
 
 class StoredResponseModel(Base):

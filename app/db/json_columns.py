@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import msgspec
 from zlib_ng import zlib_ng
 
-from app.canonical import canonical
 from app.errors import EXAMINE, DamagedError, GeometryError, InputError
+from app.json_text import canonical
 
 Shape = TypeVar("Shape")
 Json = Any

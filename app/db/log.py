@@ -21,11 +21,11 @@ from sqlalchemy import (
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.canonical import canonical
 from app.db.dialects.dialect import dialect_in
 from app.db.json_columns import Json, unpack
 from app.db.session import Base, Session
 from app.errors import DamagedError
+from app.json_text import canonical
 
 
 class LogModel(Base):

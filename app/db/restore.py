@@ -17,8 +17,7 @@ from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_private, refused_fil
 from app.db.locks import database_alone, server_lock
 from app.db.migrate import KNOWN_REVISIONS, newer_schema
 from app.db.recovery.anchor import Anchor, anchor_file, make_anchor
-from app.db.recovery.preopen_check import log_file
-from app.db.recovery.wal import MAGIC, read_header, read_log
+from app.db.recovery.preopen_check import MAGIC, log_file, read_header, read_log
 from app.durable import sync
 from app.errors import DamagedError, InputError
 

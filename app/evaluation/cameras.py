@@ -22,10 +22,10 @@ from app.evaluation.result import (
     Table,
 )
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.solution import GAMMAS_PERCENT
 from app.solving.score import SHARE_ABOVE, FrameScore, score_frame, score_frames
+from app.wording import plural
 
 COLUMNS = (
     Column("completeness", "Calibrated", "", "higher"),

@@ -25,7 +25,7 @@ from app.evaluation.result import (
 )
 from app.geometry.camera import Camera
 from app.geometry.sphere import position_from_diameter
-from app.plural import plural
+from app.wording import plural
 
 
 def measure_frame(

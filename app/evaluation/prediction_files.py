@@ -37,18 +37,17 @@ from app.evaluation.prediction_run import (
     noted,
     read_field,
 )
-from app.evaluation.prediction_table import is_mot, read_table
-from app.evaluation.track_files import is_ball_table, read_tracks
-from app.finite import quoted
+from app.evaluation.prediction_table import is_ball_table, is_mot, read_table, read_tracks
 from app.formats import fields
 from app.formats.ball_names import is_ball
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.fields import IdIndex, id_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
-from app.formats.json_text import describe_document, read_json, read_json_lines
+from app.formats.json_reader import describe_document, read_json, read_json_lines
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
+from app.json_text import quoted
 from app.soccer.choices import PredictionFormat
 from app.soccer.frames import Box, ImageSize
 from app.soccer.picture import size_centred_on_principal_point

@@ -11,6 +11,7 @@ import numpy as np
 from app.errors import InputError
 from app.evaluation.bootstrap import RESAMPLES, SEED, Resamples
 from app.evaluation.prediction_run import PredictedTrack
+from app.evaluation.prediction_table import KINDS
 from app.evaluation.result import (
     Axis,
     Cell,
@@ -23,9 +24,8 @@ from app.evaluation.result import (
     Series,
     Table,
 )
-from app.evaluation.track_files import KINDS
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.plural import plural
+from app.wording import plural
 
 NEAR_M = 2.0
 EVENT_FRAMES = 2

@@ -9,7 +9,6 @@ that have been imported.
 
 from __future__ import annotations
 
-from app.db import ephemeral_state, idempotency, log  # noqa: F401
 from app.db.session import Base as Base
 from app.features.agreement import queries as agreement  # noqa: F401
 from app.features.batches import tables as batches  # noqa: F401
@@ -19,6 +18,7 @@ from app.features.findings import queries as findings  # noqa: F401
 from app.features.independent_annotations import tables as independent_annotations  # noqa: F401
 from app.features.jobs import queries as jobs  # noqa: F401
 from app.features.paint import queries as paint  # noqa: F401
+from app.features.people import login_queries  # noqa: F401
 from app.features.people import tables as people  # noqa: F401
 from app.features.pitches import queries as pitches  # noqa: F401
 from app.features.predictions import tables as predictions  # noqa: F401
@@ -28,5 +28,5 @@ from app.features.saved_views import queries as saved_views  # noqa: F401
 from app.features.solutions import queries as solutions  # noqa: F401
 from app.features.tracks import tables as tracks  # noqa: F401
 from app.features.verdicts import tables as verdicts  # noqa: F401
-from app.features.versions import tables as versions  # noqa: F401
+from app.features.versions import queries as versions  # noqa: F401
 from app.features.webhooks import tables as webhooks  # noqa: F401

@@ -11,7 +11,7 @@ from typing import Any
 
 from app.formats.fields import IdIndex, id_text
 from app.formats.report import Report
-from app.plural import plural
+from app.wording import plural
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+")
 _BALLS = frozenset(

@@ -8,13 +8,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from app.errors import DatasetFormatError, GeometryError
-from app.finite import quoted
 from app.formats import fields
 from app.geometry.arrays import FloatArray, row_by_row
-from app.geometry.camera import Camera, camera_covariance
+from app.geometry.camera import Camera, camera_covariance, rotation_from_pan_tilt_roll
 from app.geometry.lens import BROWN_CONRADY, LENSES
 from app.geometry.resection import KAPPA, LOG_FOCAL, PAN, PARAMETERS, ROLL, X, Z
-from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.json_text import quoted
 from app.soccer.frames import ImageSize
 
 MAX_DISAGREEMENT_DEGREES = 0.01

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from app.finite import quoted
 from app.formats import fields
 from app.formats.fields import IdIndex, id_text
 from app.formats.picture_finder import picture_name_parts
 from app.formats.report import Report
+from app.json_text import quoted
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, box_from_corner
 

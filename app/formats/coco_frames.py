@@ -25,11 +25,11 @@ from app.formats.picture_finder import (
 )
 from app.formats.report import Report
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import Pitch
+from app.wording import plural
 
 SAME_PX = 1.0
 """How far two annotations of one ball may be apart, pixels: files round."""

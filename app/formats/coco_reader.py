@@ -33,7 +33,7 @@ from app.formats.coco_frames import Frame, FrameFile, group_frames, split_of_fol
 from app.formats.fields import id_text
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import UNASSIGNED
-from app.formats.json_text import describe_document, is_gamestate, read_json
+from app.formats.json_reader import describe_document, is_gamestate, read_json
 from app.formats.picture_finder import (
     LabelLocation,
     PictureFinder,
@@ -46,10 +46,10 @@ from app.formats.synloc import camera_from_synloc, is_synloc
 from app.formats.trees import opened_tree
 from app.formats.view_state import PlacedView, StateReader, ViewGroups
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, box_from_corner
 from app.soccer.group import Group, Media, View
+from app.wording import plural
 
 _OURS = ("manifest.json", "findings.json", "propose.json", "calibrate.json")
 """JSON files that lie in folders of exports and are no labels."""

@@ -12,12 +12,12 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
-from app.finite import json_text
 from app.formats.ball_names import CAMERA, CORNER, ORIGIN, OUTSIDE, PREFIX, STATE
 from app.formats.camera_json import camera_to_json
 from app.formats.export_record import ExportRecord, chosen_box, frame_name
 from app.formats.frame_names import UNASSIGNED
 from app.formats.view_state import head_to_json, view_to_json
+from app.json_text import json_text
 from app.soccer.frames import Box, box_to_corner
 from app.soccer.group import View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit

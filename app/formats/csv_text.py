@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import IO, Any
 
 from app.errors import DatasetFormatError
-from app.finite import quoted
 from app.formats.file_tree import Limits
+from app.json_text import quoted
 
 MAX_CELL = 1024 * 1024
 """Longest cell, characters; a camera takes about a thousand."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from app.errors import InputError
-from app.formats.cameras_writer import camera_name_claims, write_camera_files
+from app.formats.cameras import camera_name_claims, write_camera_files
 from app.formats.coco_writer import write_coco
 from app.formats.export_record import ExportRecord
 from app.formats.frame_names import (
@@ -23,10 +23,10 @@ from app.formats.frame_names import (
 from app.formats.gamestate_reader import sequence_frame_path, sequence_name_claims
 from app.formats.gamestate_writer import write_gamestate
 from app.formats.issia import FramePersons
-from app.formats.issia_3d_writer import write_issia_3d
+from app.formats.issia_3d import write_issia_3d
 from app.formats.issia_writer import write_issia
 from app.formats.manifest import SOFTWARE, software_version
-from app.formats.parquet_writer import write_parquet
+from app.formats.parquet import write_parquet
 from app.formats.sn_calibration import line_frame_path, line_name_claims
 from app.formats.sn_calibration_writer import write_sn_calibration
 from app.formats.soccernet_v3_writer import labels_frame_path, write_soccernet_v3
@@ -41,9 +41,9 @@ from app.formats.tracks_writer import (
 )
 from app.formats.view_files import PutText
 from app.formats.yolo_writer import write_yolo
-from app.plural import plural
 from app.soccer.choices import ExportFormat
 from app.soccer.group import Group
+from app.wording import plural
 
 FORMATS: tuple[str, ...] = get_args(ExportFormat)
 CONTENT = {

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
-from app.finite import quoted
+from app.json_text import quoted
 from app.soccer.frames import MAX_PIXEL, MAX_SIDE, ImageSize
 
 T = TypeVar("T")

@@ -17,7 +17,7 @@ from app.object_store.path import StoredPath
 from app.soccer.group import Media
 
 if TYPE_CHECKING:
-    from app.formats.zip_tree import ZipTree
+    from app.formats.trees import ZipTree
 
 _CHUNK = 1024 * 1024
 BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError, OSError)

@@ -14,14 +14,14 @@ from app.config import Settings
 from app.errors import DatasetFormatError, ImageError, InputError, NotFoundError, TooLargeError
 from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
-from app.formats.json_text import read_json
+from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import read_regular_file, require_safe_path
 from app.formats.trees import opened_tree
 from app.object_store.path import StoredPath, find_path, is_address, seal_address, target_path
-from app.plural import plural
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View
+from app.wording import plural
 
 _HEADS = (16 * 1024, 1024 * 1024)
 """Bytes of a picture in which its size is looked for."""

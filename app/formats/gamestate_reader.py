@@ -13,7 +13,7 @@ from app.formats.ball_names import is_ball
 from app.formats.fields import IdIndex
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
 from app.formats.frame_names import UNASSIGNED, view_stem
-from app.formats.json_text import read_json
+from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
 from app.formats.sn_calibration_reader import lines_from_json

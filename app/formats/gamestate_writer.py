@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from app.errors import InputError
-from app.finite import json_text
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
 from app.formats.export_record import ExportRecord
@@ -33,6 +32,7 @@ from app.formats.gamestate_reader import (
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration_writer import lines_to_json
 from app.geometry.camera import Camera
+from app.json_text import json_text
 from app.soccer.annotation import CORNERS, BallAnnotation
 from app.soccer.group import Group, View
 from app.soccer.pitch import MARKINGS

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 from app.errors import ReviewError
 from app.formats.file_tree import BROKEN, FileTree, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_file
-from app.formats.json_text import EVALUATE, EXPORT
+from app.formats.json_reader import EVALUATE, EXPORT
 from app.formats.report import Report
 from app.formats.safe_path import MAX_PART
 from app.formats.trees import opened_tree

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
 
-from app.formats.cameras_reader import read_camera_files
+from app.formats.cameras import read_camera_files
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 from app.formats.issia import (
@@ -26,11 +26,11 @@ from app.formats.sn_calibration_reader import read_line_files, read_line_files_o
 from app.formats.trees import FolderTree, opened_tree
 from app.formats.viper_reader import ViperTrack, is_viper, read_viper
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.split import TEST_CAMERAS
+from app.wording import plural
 
 # "Film Role-0 ID-3 T-0 ...", "cam3", "camera_3", "ground_truth_3": what follows says nothing.
 _NUMBERED = (

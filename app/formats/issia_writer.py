@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import IO, Any
 from xml.sax.saxutils import quoteattr
 
-from app.finite import json_text
 from app.formats import fields
 from app.formats.camera_json import camera_to_json
 from app.formats.issia import CALIBRATION, DEFAULT_OFFSET, FramePersons, IssiaNumberOwners
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration_writer import line_file_text
 from app.formats.view_files import Key, SortedSpill, open_spill
+from app.json_text import json_text
 from app.soccer.annotation import CORNERS
 from app.soccer.group import Group, Station, View
 

@@ -10,8 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from app.finite import json_text
 from app.formats.view_files import FilesToPack
+from app.json_text import json_text
 from app.progress import ReportProgress, told
 
 MANIFEST = "manifest.json"

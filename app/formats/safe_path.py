@@ -11,7 +11,7 @@ from typing import IO
 from urllib.parse import unquote
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.finite import quoted
+from app.json_text import quoted
 
 _DRIVE = re.compile(r"[A-Za-z]:")
 _CONTROL = re.compile(r"[\\\x00-\x1f\x7f]")

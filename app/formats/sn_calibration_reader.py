@@ -13,28 +13,26 @@ from app.errors import DatasetFormatError, UnknownMarkingError
 from app.formats import fields
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.frame_names import IMAGE_SUFFIXES
-from app.formats.match_info import (
-    METADATA,
-    PLACE,
-    match_of_record,
-    original_frame_path,
-    read_match_info,
-)
 from app.formats.report import Report
 from app.formats.sn_calibration import (
     LARGEST_UNIT,
+    MATCH_INFO_METADATA,
+    MATCH_INFO_PLACE,
     LineDocument,
     LineFile,
+    match_of_record,
+    original_frame_path,
     read_line_documents,
+    read_match_info,
     split_and_size,
 )
 from app.formats.soccernet_v3 import SPLITS
 from app.formats.trees import opened_tree
-from app.plural import plural
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import HALF, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.pitch import WITHOUT_GEOMETRY, find_marking_like
+from app.wording import plural
 
 _OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
 _OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
@@ -322,9 +320,9 @@ def read_sn_calibration(
 
 
 def _make_group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:
-    info = {name: value for name, value in record.items() if name != PLACE}
+    info = {name: value for name, value in record.items() if name != MATCH_INFO_PLACE}
     station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
-    extras = Extras(lines=file.others, metadata={METADATA: info} if info else {})
+    extras = Extras(lines=file.others, metadata={MATCH_INFO_METADATA: info} if info else {})
     view = View(file.stem, station, media=file.media, extras=extras)
     match, folders = match_of_record(info), PurePosixPath(file.place).parts[:-1]
     splits = (_split_of_folder(folder) for folder in reversed(folders))

@@ -7,23 +7,25 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import InputError
-from app.finite import json_text
 from app.formats import fields
-from app.formats.cameras_writer import camera_file_name, camera_file_text, camera_owner
+from app.formats.cameras import camera_file_name, camera_file_text, camera_owner
 from app.formats.export_record import ExportRecord
 from app.formats.fields import exact_inverse
 from app.formats.frame_names import fold_file_name, view_file_path
-from app.formats.match_info import PLACE, MatchInfoWriter, match_info_of_view
 from app.formats.sn_calibration import (
     CAMERAS,
     LARGEST_UNIT,
     LINES,
+    MATCH_INFO_PLACE,
     LineFile,
+    MatchInfoWriter,
     flat_frame_name,
-    soccernet_marking_name,
+    match_info_of_view,
     split_folder_name,
 )
+from app.formats.soccernet_v3 import soccernet_marking_name
 from app.formats.view_files import PutText, write_file_below, write_to_disk
+from app.json_text import json_text
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 
@@ -142,7 +144,7 @@ def write_sn_calibration(
                 if not known:
                     lines, others = view.station.lines, view.extras.lines
                     put(f"{LINES}/{name}.json", line_file_text(lines, view.size, others))
-                    origin = {**match_info_of_view(record.group, view), PLACE: place}
+                    origin = {**match_info_of_view(record.group, view), MATCH_INFO_PLACE: place}
                     info.add(f"{LINES}/{name}.jpg", origin)
                     counts["frames"] += 1
                 if camera is not None and name not in with_camera:

@@ -9,22 +9,26 @@ from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
-from app.formats.json_text import read_json
+from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
-from app.formats.soccernet_record import GAME, IMAGE, REST, ImageRecord, record_from_json
 from app.formats.soccernet_v3 import (
+    GAME,
+    IMAGE,
     IMAGE_LISTS,
     IMAGE_NAME,
     LABELS,
     MATCH_DEPTH,
+    REST,
     SPLITS,
+    ImageRecord,
     MatchFrames,
     group_label,
+    record_from_json,
 )
 from app.formats.trees import opened_tree
-from app.plural import plural
 from app.soccer.group import Group, Station, View
+from app.wording import plural
 
 
 def read_soccernet_v3(

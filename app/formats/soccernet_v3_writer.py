@@ -10,11 +10,18 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import InputError
-from app.finite import json_text
 from app.formats.frame_names import fold_file_name, frame_path_by_match
 from app.formats.safe_path import resolve_inside
-from app.formats.soccernet_record import GAME, REST, record_to_json
-from app.formats.soccernet_v3 import JOINED_LISTS, LABELS, MATCH_DEPTH, image_numbers
+from app.formats.soccernet_v3 import (
+    GAME,
+    JOINED_LISTS,
+    LABELS,
+    MATCH_DEPTH,
+    REST,
+    image_numbers,
+    record_to_json,
+)
+from app.json_text import json_text
 from app.soccer.group import Group, View
 
 

@@ -8,24 +8,23 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from app.errors import DatasetFormatError, UnsafePathError
-from app.finite import quoted
 from app.formats import fields
 from app.formats.camera_json import camera_from_json
 from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits, Root, files_inside
-from app.formats.json_text import parse_literal
+from app.formats.json_reader import parse_literal
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
-from app.formats.soccernet_record import GAME, IMAGE
+from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, MatchFrames, group_label
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
-from app.formats.soccernet_v3 import SPLIT_FILES, TABLE, MatchFrames, group_label
 from app.formats.soccernet_v3_reader import MatchReader
 from app.formats.trees import opened_tree
 from app.geometry.camera import Camera
-from app.plural import plural
+from app.json_text import quoted
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import MAX_SIDE, Box, ImageSize
 from app.soccer.group import Group, Station, View
+from app.wording import plural
 
 REQUIRED = ("league", "season", "match", "main_action", "action", "replay", "img_w", "img_h")
 _TRUE, _FALSE = ("true", "1", "1.0"), ("false", "0", "0.0")

@@ -9,14 +9,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, TextIO
 
-from app.finite import finite
 from app.formats.camera_json import camera_to_json
 from app.formats.csv_text import CsvTable, Value, list_text
 from app.formats.export_record import ExportRecord, chosen_box
-from app.formats.soccernet_record import GAME, IMAGE
+from app.formats.soccernet_v3 import GAME, IMAGE, SPLIT_FILES, TABLE, image_numbers
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
-from app.formats.soccernet_v3 import SPLIT_FILES, TABLE, image_numbers
 from app.formats.soccernet_v3_writer import LabelsWriter, labels_to_json, split_key
+from app.json_text import finite
 from app.soccer.frames import Box
 from app.soccer.group import Group, View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit

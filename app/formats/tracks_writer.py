@@ -14,12 +14,12 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from app.errors import InputError
-from app.finite import json_text
-from app.formats.camera_arrays import camera_arrays
+from app.formats.camera_matrix import camera_arrays
 from app.formats.csv_text import csv_line
-from app.formats.parquet_writer import import_pyarrow
+from app.formats.parquet import import_pyarrow
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
+from app.json_text import json_text
 from app.soccer.pitch import Pitch
 
 BALL, EVENTS, NPZ = "ball.csv", "events.csv", "ball.npz"

@@ -15,9 +15,8 @@ from app.formats import fields
 from app.formats.camera_json import camera_from_json, camera_to_json
 from app.formats.report import Report
 from app.formats.safe_path import require_safe_path
-from app.formats.soccernet_record import BALLS, GAME, IMAGE, RECORD, REST
+from app.formats.soccernet_v3 import BALLS, GAME, IMAGE, RECORD, REST
 from app.geometry.camera import camera_covariance
-from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Extras, Lines, make_lines
 from app.soccer.codec import (
     ball_to_json,
@@ -30,6 +29,7 @@ from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import CALIBRATIONS, Group, LeftOut, Station, View, make_left_out
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch, canonical_marking
+from app.wording import plural
 
 MAX_TEXT = 1000
 """Longest key or label, characters."""

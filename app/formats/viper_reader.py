@@ -16,13 +16,13 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import iterparse
 
 from app.errors import DatasetFormatError
-from app.finite import quoted
 from app.formats import fields
 from app.formats.ball_names import is_ball
 from app.formats.file_tree import DEFAULT_LIMITS, FileTree, Limits
 from app.formats.report import Report
-from app.plural import plural
+from app.json_text import quoted
 from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.wording import plural
 
 MAX_SPAN = 10_000
 """Most frames that one framespan may cover; ISSIA's longest covers its 3,029 frames."""

@@ -11,14 +11,14 @@ from contextlib import ExitStack
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
-from app.finite import json_text
 from app.formats.csv_text import CsvTable
 from app.formats.export_record import ExportRecord, chosen_box
 from app.formats.frame_names import expected_frame_suffix, frame_path_in_split, split_folder
 from app.formats.view_files import PutText, write_to_disk
-from app.plural import plural
+from app.json_text import json_text
 from app.soccer.frames import Box, ImageSize, box_to_corner
 from app.soccer.group import View
+from app.wording import plural
 
 LISTS = ("train", "val", "test")
 HELD_OUT = 10

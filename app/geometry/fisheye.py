@@ -1,6 +1,6 @@
 """Fisheye: lenses whose image radius is a polynomial of the angle between a ray and the axis.
 
-Two spellings of one model, on normalised image coordinates like ``geometry.distortion``:
+Two spellings of one model, on normalised image coordinates like ``geometry.lens``:
 
 - Kannala-Brandt, k1 k2 k3 k4: ``r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9`` (``cv2.fisheye``).
 - Arctangent polynomial, a0 .. a8: ``r = a0 + a1 t + ... + a8 t^8`` with ``t = arctan(R)``, R the

@@ -14,8 +14,13 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import MIN_DEPTH, Camera
-from app.geometry.distortion import compiled, distorted_fast, lens_coefficients, slopes_fast
-from app.geometry.lens import BROWN_CONRADY
+from app.geometry.lens import (
+    BROWN_CONRADY,
+    compiled,
+    distorted_fast,
+    lens_coefficients,
+    slopes_fast,
+)
 
 STEPS = 8
 ARRIVED_M = 1e-6

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
-from app.geometry.camera import Camera
+from app.geometry.camera import Camera, pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
 from app.geometry.curve_residuals import (
     accumulate_equations,
     derivative_rows_of_points,
@@ -30,7 +30,6 @@ from app.geometry.curve_residuals import (
 )
 from app.geometry.least_squares import CONVERGED, OUT_OF_STEPS, STUCK, Fit
 from app.geometry.resection_kernels import minimize_curve_costs
-from app.geometry.rotation import pan_tilt_roll_from_rotation, rotation_from_pan_tilt_roll
 
 PARAMETERS = 8
 PAN, TILT, ROLL, X, Y, Z, LOG_FOCAL, KAPPA = range(PARAMETERS)

@@ -13,8 +13,8 @@ from fastapi import Query
 from pydantic import BaseModel
 
 from app.errors import InputError
-from app.finite import MAX_ID, json_text
 from app.http.documents import ListDocument
+from app.json_text import MAX_ID, json_text
 
 MAX_DIGITS = 18
 """Longer ones do not fit into the database."""

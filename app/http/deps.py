@@ -45,10 +45,10 @@ from app.features.versions.jobs import resume_versions
 from app.features.webhooks.sender import WebhookSender
 from app.features.what_if.service import YieldStore
 from app.features.what_if.statistics import StatisticsCache
-from app.finite import MAX_ID
 from app.http.access import current_login, current_visibility, current_whole_visibility
 from app.http.errors import PreconditionRequiredError
 from app.http.events import Events
+from app.json_text import MAX_ID
 from app.media.frames import Frames
 from app.soccer.actors import LOCAL_USER, script_name
 from app.solving.solve import warm_up

@@ -21,7 +21,6 @@ from fastapi import Request
 from starlette.responses import Response
 from starlette.types import Message
 
-from app.canonical import canonical
 from app.db.idempotency import (
     IdempotencyKey,
     KeyedRequest,
@@ -33,10 +32,11 @@ from app.db.idempotency import (
 )
 from app.db.store import Store
 from app.errors import BusyError, OverloadedError, StorageError
-from app.http.bodies import TimedBody
 from app.http.deps import ACTOR_HEADER
 from app.http.documents import KEYED_REQUEST, stored_form
 from app.http.problem import make_problem, problem_response
+from app.http.requests import TimedBody
+from app.json_text import canonical
 
 log = structlog.get_logger("touchline.api")
 

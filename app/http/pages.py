@@ -20,13 +20,13 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
-from app.canonical import digest_of
 from app.config import own_folder
 from app.errors import StorageError
 from app.http.headers import content_security_policy
 from app.http.permissions import open_to_all
 from app.http.request_limits import limit
 from app.http.route import Route
+from app.json_text import digest_of
 
 FOLDER = "built"
 APART = ("node_modules", FOLDER, f"{FOLDER}.new")

@@ -30,7 +30,7 @@ from app.features.people.roles import Action as Action
 from app.features.people.roles import DatasetRoles, Role, require_permission
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.fields import reads_hidden_work
-from app.finite import MAX_ID, quoted
+from app.json_text import MAX_ID, quoted
 
 E = TypeVar("E", bound=Callable[..., Any])
 

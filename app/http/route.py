@@ -22,7 +22,11 @@ from starlette.websockets import WebSocketClose
 
 from app.features.people.logins import Login
 from app.http.access import Access, actor_name
-from app.http.bodies import (
+from app.http.headers import SAFE_METHODS
+from app.http.idempotency import Idempotency, RequestDigest
+from app.http.permissions import OwnedMention, Permission, RequestSubject, find_permission
+from app.http.request_limits import RequestLimits, request_class_of
+from app.http.requests import (
     BYTES,
     MAX_STRANGERS_BYTES,
     BodyError,
@@ -31,10 +35,6 @@ from app.http.bodies import (
     require_bytes,
     require_json_type,
 )
-from app.http.headers import SAFE_METHODS
-from app.http.idempotency import Idempotency, RequestDigest
-from app.http.permissions import OwnedMention, Permission, RequestSubject, find_permission
-from app.http.request_limits import RequestLimits, request_class_of
 from app.soccer.actors import LOCAL_USER
 
 Handler = Callable[[Request], Coroutine[Any, Any, Response]]

@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from app.canonical import digest_of
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.json_text import digest_of
 from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
 from app.media.object_frames import Archives, is_stored, read_object
 from app.media.video import Times, frame_at, kept_index, make_index, open_video
 from app.object_store.path import unseal_address
-from app.plural import plural
 from app.soccer.group import Media
+from app.wording import plural
 
 JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."

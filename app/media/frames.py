@@ -18,7 +18,6 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from app.canonical import digest_of
 from app.config import Settings
 from app.errors import (
     ImageError,
@@ -28,6 +27,7 @@ from app.errors import (
     StorageError,
     TooLargeError,
 )
+from app.json_text import digest_of
 from app.media.files import (
     cached_frame,
     content_type,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.sample.instant import Instant, advance_instant
+from app.sample.play import Instant, advance_instant
 from app.sample.scene import FAULT_KINDS, PlantedFault
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.group import View

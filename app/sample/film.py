@@ -14,13 +14,12 @@ import cv2
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
-from app.sample.figures import draw_distant_person, draw_person, people_in_view
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
+from app.sample.cameras import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
+from app.sample.figures import draw_distant_person, draw_person, people_in_view, pose_people
 from app.sample.fixture import Look
-from app.sample.instant import HALF_LENGTH, Instant
 from app.sample.patch import Image
-from app.sample.pose import pose_people
+from app.sample.play import HALF_LENGTH, Instant
 from app.sample.props import draw_ball, draw_goal_posts, draw_net
 from app.sample.render import (
     light_direction_in_image,
@@ -31,7 +30,6 @@ from app.sample.render import (
     shading_stadium,
 )
 from app.sample.surface import shade_frame
-from app.sample.views import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
 
 STRIP = 16
 """Columns of a cylinder that are drawn as a plane: their middle is 0.4 degrees from their rim at most."""

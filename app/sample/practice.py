@@ -12,9 +12,9 @@ from pathlib import Path
 
 import cv2
 
-from app.finite import json_text
 from app.formats.soccernet_v3 import ARCHIVE
 from app.formats.soccernet_v3_writer import write_soccernet_v3
+from app.json_text import json_text
 from app.progress import ReportProgress
 from app.sample.faults import FaultPlan
 from app.sample.render import render

@@ -12,8 +12,8 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.sphere import tight_box
 from app.sample.fixture import Colour, Fixture
-from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, Instant
 from app.sample.patch import Image, Patch
+from app.sample.play import BALL_DIAMETER, HALF_LENGTH, Instant
 from app.soccer.pitch import GOAL_HEIGHT, GOAL_WIDTH
 
 POST_RADIUS = 0.06

@@ -19,11 +19,12 @@ from scipy.ndimage import gaussian_filter1d
 
 from app.durable import PARTIAL
 from app.errors import InputError
-from app.finite import json_text
 from app.formats.camera_json import camera_to_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
+from app.json_text import json_text
 from app.progress import ReportProgress
+from app.sample.cameras import HEIGHT, WIDTH, is_inside_image
 from app.sample.film import (
     Backdrop,
     add_grain,
@@ -33,12 +34,10 @@ from app.sample.film import (
     render_picture,
 )
 from app.sample.fixture import make_fixture
-from app.sample.instant import BALL_DIAMETER, TEAM, shirt_numbers
 from app.sample.order import RECORDING_SECONDS, SEED, SHORTEST_RECORDING
 from app.sample.patch import Image
-from app.sample.play import Play, make_play
+from app.sample.play import BALL_DIAMETER, TEAM, Play, make_play, shirt_numbers
 from app.sample.props import draw_scoreboard
-from app.sample.views import HEIGHT, WIDTH, is_inside_image
 
 FPS, REPLAY_FPS = 25, 50
 """Of the video and of the main camera; of the cameras of replays."""

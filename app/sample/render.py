@@ -10,13 +10,21 @@ import numpy as np
 import numpy.typing as npt
 
 from app.errors import NotFoundError
-from app.formats.soccernet_record import IMAGE
+from app.formats.soccernet_v3 import IMAGE
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.sample.figures import DrawnPerson, draw_person, people_in_view
+from app.sample.cameras import HEIGHT, WIDTH
+from app.sample.figures import (
+    INDEX,
+    LIMBS,
+    DrawnPerson,
+    Pose,
+    draw_person,
+    people_in_view,
+    pose_people,
+)
 from app.sample.fixture import Colour, Lamp, Light, Look
-from app.sample.instant import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
-from app.sample.pose import INDEX, LIMBS, Pose, pose_people
+from app.sample.play import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
 from app.sample.props import draw_ball, draw_goal_posts, draw_net, draw_scoreboard
 from app.sample.scene import Scene
 from app.sample.surface import (
@@ -27,7 +35,6 @@ from app.sample.surface import (
     ShadingStadium,
     shade_frame,
 )
-from app.sample.views import HEIGHT, WIDTH
 
 Tile = npt.NDArray[np.float32]
 

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import IO, Any
 
 from app.errors import DatasetFormatError
-from app.finite import json_text
 from app.formats.camera_json import camera_from_json, camera_to_json
 from app.formats.fields import whole_number
-from app.formats.json_text import read_json
+from app.formats.json_reader import read_json
 from app.geometry.camera import Camera
+from app.json_text import json_text
 from app.sample.fixture import Fixture
-from app.sample.instant import Instant
+from app.sample.play import Instant
 from app.soccer.frames import Box
 from app.soccer.group import Group
 

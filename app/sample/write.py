@@ -18,9 +18,9 @@ import cv2
 
 from app.durable import PARTIAL
 from app.errors import InputError
-from app.finite import json_text
 from app.formats.soccernet_v3 import ARCHIVE
 from app.formats.soccernet_v3_writer import write_soccernet_v3
+from app.json_text import json_text
 from app.progress import ReportProgress
 from app.sample.fixture import group_counts, make_fixture
 from app.sample.order import GROUPS, SEED

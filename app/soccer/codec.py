@@ -14,9 +14,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from app.finite import look_through
 from app.geometry.camera import Camera, camera_covariance
 from app.geometry.lens import BROWN_CONRADY
+from app.json_text import look_through
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, LeftOut, Media, SharedPosition, Station, View

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-from app.canonical import digest_of
 from app.errors import InputError
+from app.json_text import digest_of
 from app.soccer.annotation import Lines, make_lines
 from app.soccer.choices import ProposalOutcome
 from app.soccer.frames import ImagePoint

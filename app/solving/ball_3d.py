@@ -19,8 +19,8 @@ from app.solving.ball_covariance import MeanCovariance, major_axis_sigma, ray_co
 from app.solving.chi_square import group_sigma_widening
 from app.solving.facts import Facts
 from app.solving.judgement import PASSES, Judgement
-from app.solving.numbers import format_metres
 from app.solving.triangulate import BallObservation, PairPoint
+from app.wording import format_metres
 
 LOW_BALL_M = 2.0
 """Up to this height beside the pitch a ball counts as one that lies there."""

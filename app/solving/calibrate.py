@@ -8,12 +8,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from app.canonical import digest_of
 from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, row_by_row
 from app.geometry.camera import Camera
 from app.geometry.resection import LOG_FOCAL, PARAMETERS, X, Z
-from app.plural import plural
+from app.json_text import digest_of
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, SharedPosition, Station, View
@@ -42,8 +41,13 @@ from app.solving.labels import find_suspects
 from app.solving.lone_frame import LoneFrame, estimate_lone_frame
 from app.solving.observations import Observations, observations_of_lines
 from app.solving.paint_camera import PaintProblem, solve_paint
-from app.solving.picture_camera import WIDTH, PictureProblem, estimate_picture, warp_of
-from app.solving.picture_findings import find_picture
+from app.solving.picture_camera import (
+    WIDTH,
+    PictureProblem,
+    estimate_picture,
+    find_picture,
+    warp_of,
+)
 from app.solving.resect import (
     REFERENCE_DIAGONAL,
     Resection,
@@ -51,6 +55,7 @@ from app.solving.resect import (
     measurement_count,
 )
 from app.solving.tripod_pitch import second_moment_about_plan
+from app.wording import plural
 
 MIN_MEASUREMENTS = 7
 """A camera with one focal length has seven unknowns; the distortion has a prior."""

@@ -16,8 +16,8 @@ from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration, ViewSolution
 from app.solving.calibrate import MAX_POSITION_SIGMA_M, usable_paint_reading
 from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrame
-from app.solving.numbers import format_metres, format_pixels
-from app.solving.picture_findings import BELIEVED, MIN_SHIFT, MIN_STRETCH
+from app.solving.picture_camera import BELIEVED, MIN_SHIFT, MIN_STRETCH
+from app.wording import format_metres, format_pixels
 
 MAX_CAMERA_HEIGHT_M = 100.0
 MAX_CAMERA_DISTANCE_M = 250.0

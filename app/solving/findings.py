@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from app.plural import plural
 from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, Fix
 from app.soccer.group import Group, View, view_letter
 from app.soccer.pitch import Pitch
@@ -15,9 +14,9 @@ from app.solving.calibration_findings import calibration_findings, paint_finding
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
 from app.solving.gates import odds_text
-from app.solving.numbers import format_degrees, format_metres, format_pixels
 from app.solving.sides import SwappedView, find_swaps
 from app.solving.triangulate import BallObservation
+from app.wording import format_degrees, format_metres, format_pixels, plural
 
 MAX_SIZE_RATIO = 2.0
 """A ball box may be so many times larger or smaller than the 3D point implies."""

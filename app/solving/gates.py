@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, isnan, log10
 
-from app.plural import plural
 from app.soccer.policy import Policy
 from app.soccer.solution import (
     GATES,
@@ -22,7 +21,7 @@ from app.soccer.solution import (
 )
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.judgement import MIN_VIEWS, Judgement
-from app.solving.numbers import format_degrees, format_metres, format_percent, format_pixels
+from app.wording import format_degrees, format_metres, format_percent, format_pixels, plural
 
 UNLIKELY_P_VALUE = 0.05
 """Below: consistent views have residuals as large as these in fewer than one of twenty groups."""

@@ -21,7 +21,9 @@ from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.many_frames import (
+from app.solving.observations import Observations, observations_of_lines
+from app.solving.picture_camera import PictureProblem, picture_of, undo_warp
+from app.solving.pitch_size import (
     CERTAIN_SIGMAS,
     MAX_FRAMES,
     Share,
@@ -30,8 +32,6 @@ from app.solving.many_frames import (
     frames_with_enough_measurements,
     sigmas_of_shared_numbers,
 )
-from app.solving.observations import Observations, observations_of_lines
-from app.solving.picture_camera import PictureProblem, picture_of, undo_warp
 from app.solving.resect import ResectionProblem
 
 MIN_FRAMES = 3

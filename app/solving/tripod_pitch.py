@@ -36,7 +36,6 @@ from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.camera_positions import MAIN_MEAN, MAIN_SIGMA, is_main_position
 from app.solving.lone_frame import CROWN_SIGMA_M, INWARD_SIGMA_M, PAINT_SIZE_SIGMA_M
-from app.solving.many_frames import CERTAIN_SIGMAS
 from app.solving.observations import principal_point
 from app.solving.paint_camera import PaintProblem, measure_offsets
 from app.solving.paint_noise import (
@@ -51,7 +50,7 @@ from app.solving.paint_noise import (
     painted_shift,
     shifted_offsets,
 )
-from app.solving.pitch_size import LEAST_DIFFERENCE_M, UNKNOWN_SIGMA_M
+from app.solving.pitch_size import CERTAIN_SIGMAS, LEAST_DIFFERENCE_M, UNKNOWN_SIGMA_M
 from app.solving.resect import ResectionProblem
 
 LEAST_FRAMES, MOST_FRAMES = 3, 24

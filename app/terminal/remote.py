@@ -13,6 +13,21 @@ from app.terminal.terminal import INTERRUPTED, print_error
 if TYPE_CHECKING:
     from app.soccer.policy import Policy
     from touchline.client import Client
+import shutil
+import tempfile
+import zipfile
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.errors import InputError, NotFoundError
+from app.formats.safe_path import resolve_inside
+from app.object_store.path import is_address
+
+if TYPE_CHECKING:
+    from app.features.predictions.evaluation_run import SourcesRequest
+    from app.features.predictions.reader import PredictionFiles
+    from touchline.client import Client
+
 
 BATCH = (
     "id",
@@ -247,3 +262,215 @@ def quote_address_part(name: str) -> str:
 def select_values(values: Mapping[str, Any], *names: str) -> dict[str, Any]:
     """The values of some names, in their order."""
     return {name: values[name] for name in names}
+
+
+def import_values(
+    client: Client,
+    dataset: str,
+    format_: str,
+    path: Path | str,
+    options: Mapping[str, Any],
+    *,
+    lines: Path | None,
+    frames: str | None,
+    policy: str | None,
+    dry_run: bool,
+    progress: ReportProgress,
+) -> tuple[dict[str, Any], tuple[str, str | None] | None]:
+    """Send files, and let the server read them; a text is an address in a store of the server.
+
+    Returns:
+        The report, and why nothing was read, where nothing was.
+
+    Raises:
+        InputError: The policy is a file, which this cannot send.
+        JobError: It failed otherwise.
+    """
+    from app.soccer.policy import POLICIES
+    from touchline.errors import JobError
+
+    if policy is not None and policy not in POLICIES:
+        raise InputError(
+            "a policy in a file cannot be sent with an import",
+            hint=f"Name one of {', '.join(POLICIES)}, and change its thresholds in the browser.",
+        )
+    more: dict[str, Any] = {} if lines is None else {"lines": {"upload": send_file(client, lines)}}
+    if frames is not None:
+        stored = is_address(frames)
+        more["frames"] = (
+            {"folder": frames} if stored else {"upload": send_file(client, Path(frames))}
+        )
+    body = {
+        "dataset": dataset,
+        "format": format_,
+        "source": {"folder": path}
+        if isinstance(path, str)
+        else {"upload": send_file(client, path)},
+        "options": {**options, **more},
+        "policy": policy,
+        "dry_run": dry_run,
+    }
+    try:
+        report = follow_job(client, client.post("imports", body), progress)["result"]
+    except JobError as error:
+        report, problem = error.job["result"], error.job["problem"]
+        if not report or not problem:
+            raise
+        return _import_report_values(report), (problem["detail"], problem["hint"])
+    return _import_report_values(report), None
+
+
+def _import_report_values(result: Mapping[str, Any]) -> dict[str, Any]:
+    """As ``import`` has it; the server keeps names in their alphabetical order."""
+    skipped = [
+        select_values(item, "file", "record", "field", "problem") for item in result["skipped"]
+    ]
+    return {**select_values(result, *IMPORT), "skipped": skipped}
+
+
+def export_values(
+    client: Client, out: Path | str, request: Mapping[str, Any], progress: ReportProgress
+) -> dict[str, Any]:
+    """Let the server write an export, and fetch it to ``out``: a folder, or a zip by its ending.
+
+    A text is an address in a store of the server, which writes it there.
+    """
+    if isinstance(out, str):
+        job = follow_job(client, client.post("exports", {**request, "to": out}), progress)
+        report = _export_report_values(client.get(f"exports/{job['id']}"))
+        return {"out": out, "format": request["format"], **report}
+    from app.formats.output import output_tree
+
+    with output_tree(out) as folder, tempfile.TemporaryDirectory() as held:
+        job = client.post("exports", request)
+        follow_job(client, job, progress)
+        found = client.get(f"exports/{job['id']}")
+        content = client.download(f"exports/{job['id']}/content", Path(held) / "export.zip")
+        unpack_zip(content, folder)
+    return {"out": str(out), "format": request["format"], **_export_report_values(found)}
+
+
+def _export_report_values(found: Mapping[str, Any]) -> dict[str, Any]:
+    return select_values(found, "counts", "left_out", "missing_images")
+
+
+def evaluate(
+    client: Client,
+    dataset: str,
+    request: SourcesRequest,
+    progress: ReportProgress,
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Send predictions, and let the server measure them.
+
+    Returns:
+        The evaluation, and the sets that were made or found for it.
+    """
+    named = {"predictions": request.predictions, "careful": request.careful}
+    sets = {
+        name: _prediction_set_values(client, dataset, source)
+        for name, source in named.items()
+        if not source.is_empty
+    }
+    found_sets = {name: found["id"] for name, found in sets.items()}
+    body = {**vars(request.request), **found_sets, "version": request.version}
+    place = f"datasets/{quote_address_part(dataset)}/evaluations"
+    job = follow_job(client, client.post(place, body), progress)
+    found = client.get(f"evaluations/{job['result']['evaluation']}")
+    dataset_id = client.get(f"datasets/{quote_address_part(dataset)}")["id"]
+    names = {
+        "predictions": "prediction_set_id",
+        "careful": "careful_set_id",
+        "version": "version_id",
+    }
+    values = {names.get(name, name): found[name] for name in found if name != "headline"}
+    created = time_text(found["created"])
+    return {**values, "dataset_id": dataset_id, "created": created}, list(sets.values())
+
+
+def write_evaluation(client: Client, values: Mapping[str, Any], out: Path) -> None:
+    """Fetch everything of an evaluation into a folder.
+
+    Raises:
+        InputError: The folder cannot be written.
+        UnsafePathError: The server names what would lie outside of it.
+    """
+    from app.features.predictions.evaluation import write_parts
+
+    place = f"evaluations/{values['id']}"
+
+    def fetch(kind: str, name: str, file: Path) -> None:
+        client.download(f"{place}/{kind}/{quote_address_part(name)}", file)
+
+    write_parts(out, values, client.pages(f"{place}/frames"), fetch)
+
+
+def _prediction_set_values(client: Client, dataset: str, source: PredictionFiles) -> dict[str, Any]:
+    """The set of a source: of its files, which are read once, or of its name."""
+    place = f"datasets/{quote_address_part(dataset)}/predictions"
+    path = source.path
+    if path is not None and not path.exists():
+        known = {item["name"]: item for item in client.get(place)["items"]}
+        if source.cameras is not None or str(path) not in known:
+            raise NotFoundError(
+                f"there is no file {path} here, and no set of predictions of that name on the server"
+            )
+        return dict(known[str(path)])
+    files = {"upload": path, "images_upload": source.images, "cameras_upload": source.cameras}
+    sizes = {"size": source.size, "cameras_size": source.cameras_size}
+    body: dict[str, Any] = {
+        **{field: send_file(client, file) for field, file in files.items() if file is not None},
+        **{name: [size.width, size.height] for name, size in sizes.items() if size is not None},
+        "format": source.format,
+        "category": source.category,
+    }
+    return dict(client.post(place, body))
+
+
+def send_file(client: Client, path: Path) -> str:
+    """Id of an upload of a file, or of a folder as a zip; what is there already is not sent again."""
+    from app.features.imports.upload_queries import upload_id
+    from touchline.errors import NotFoundError as NotThere
+
+    with zip_folder(path) as file:
+        try:
+            return str(client.get(f"uploads/{upload_id(file)}")["id"])
+        except NotThere:
+            return client.upload(file)
+
+
+COMPRESSED = frozenset({".jpg", ".jpeg", ".png", ".webp", ".mp4", ".zip", ".parquet"})
+"""Endings of files that are compressed already."""
+_CHUNK = 1 << 20
+
+
+@contextmanager
+def zip_folder(path: Path) -> Iterator[Path]:
+    """A file itself, or all files of a folder as a zip of its name, there until the block ends.
+
+    The same files make the same zip, so that it is known again.
+    """
+    if not path.is_dir():
+        yield path
+        return
+    from app.formats.output import write_files_to_zip
+
+    with tempfile.TemporaryDirectory() as held:
+        packed = Path(held) / f"{path.resolve().name}.zip"
+        files = (file for file in sorted(path.rglob("*")) if file.is_file())
+        named = ((file.relative_to(path).as_posix(), file) for file in files)
+        write_files_to_zip(named, packed, COMPRESSED)
+        yield packed
+
+
+def unpack_zip(packed: Path, folder: Path) -> None:
+    """All files of a zip into a folder.
+
+    Raises:
+        UnsafePathError: A name leads out of it.
+    """
+    with zipfile.ZipFile(packed) as archive:
+        for name in archive.namelist():
+            target = resolve_inside(folder, name)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with archive.open(name) as source, target.open("wb") as file:
+                shutil.copyfileobj(source, file, _CHUNK)

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from threading import Event
 from typing import Any, TypeVar
 
-from app.finite import finite, json_text
+from app.json_text import finite, json_text
 from app.progress import ReportProgress
 
 Row = TypeVar("Row")

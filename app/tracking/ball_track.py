@@ -13,8 +13,8 @@ import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.soccer.choices import BallEventKind
+from app.wording import plural
 
 BallState = Literal["measured", "one_view", "predicted", "bridged", "gap"]
 """How a frame's ball is known: by two views or more, by one, by physics from one side of a gap or

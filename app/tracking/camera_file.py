@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from app.errors import InputError
-from app.finite import json_text
 from app.geometry.camera import Camera
 from app.geometry.resection import PARAMETERS
+from app.json_text import json_text
 from app.soccer.frames import ImageSize
 from app.tracking.follow import OUTCOMES
 from app.tracking.track import FrameCamera

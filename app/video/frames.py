@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from app.errors import ImageError, NotFoundError
 from app.media.video import FrameReader
-from app.plural import plural
 from app.video.index import RecordingIndex
+from app.wording import plural
 
 Image = npt.NDArray[np.uint8]
 

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from app.errors import InputError
-from app.finite import json_text
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
+from app.json_text import json_text
 from app.video.measures import MEASURES, Measured
 
 VERSION = 3

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.soccer.policy import Policy
-from app.solving.source_noise import BallSource, SourceFactors, estimate_sources
+from app.solving.dataset_noise import BallSource, SourceFactors, estimate_sources
 from tests.bench.cases import Case, Made, make_case
 from tests.bench.table import print_table
 from tests.bench.truth import GROUPS, SEED, judge, misses_in, with_noise

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.sample.annotate import CENTER_SIGMA_PX, CENTER_SIGMA_SHARE
 from app.sample.scene import Scene
+from app.sample.scenes import CENTER_SIGMA_PX, CENTER_SIGMA_SHARE
 from app.soccer.frames import Box
 from app.soccer.group import View
 from app.soccer.policy import PAPER

@@ -12,8 +12,7 @@ from functools import cache
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View

@@ -14,11 +14,10 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.sample.annotate import click_lines, loose_box
 from app.sample.cameras import find_camera, parallax_angle_at_ball
 from app.sample.faults import FaultPlan, plant_annotation_fault
 from app.sample.scene import Scene, ViewTruth
-from app.sample.scenes import true_ball_box
+from app.sample.scenes import click_lines, loose_box, true_ball_box
 from app.soccer.group import Group, View
 from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration, Solution

@@ -24,9 +24,8 @@ from app.features.solutions.service import solve_dataset
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.arrays import FloatArray
-from app.geometry.camera import Camera
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.resection import parameters_from_camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.agreement import measure_agreement
 from app.paint.grass import field_of_play
 from app.paint.ridges import find_line_like

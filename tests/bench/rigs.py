@@ -21,10 +21,10 @@ from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
 from app.solving.ball_noise import RayResidual, estimate_ball_noise, ray_residuals
+from app.solving.dataset_noise import BallSource, SourceFactors, estimate_sources
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import propose_rig
 from app.solving.solve import solve
-from app.solving.source_noise import BallSource, SourceFactors, estimate_sources
 from app.solving.triangulate import ball_observations
 from tests.bench.table import print_table
 

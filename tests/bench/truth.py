@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
+from app.features.groups.solution_schemas import camera_sigma
 from app.geometry.arrays import FloatArray
-from app.soccer.camera_sigma import camera_sigma
 from app.soccer.picture import OPEN
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy

@@ -32,13 +32,13 @@ from app.features.imports.sources import (
 )
 from app.features.policies.service import MAX_CHARACTERS, policy_from_yaml
 from app.features.queue.query import parse_query
-from app.finite import json_text
 from app.formats.export_formats import FORMATS, WriteOptions, write_format
 from app.formats.export_record import ExportRecord
 from app.formats.file_tree import Limits
 from app.formats.guess_format import guess_format
 from app.formats.output import output_tree
 from app.formats.report import Report
+from app.json_text import json_text
 from app.media.files import read_frame
 from app.soccer.choices import ImportFormat
 from app.soccer.group import Group, Media

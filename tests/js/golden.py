@@ -15,13 +15,12 @@ import numpy as np
 from app.errors import DegenerateGeometryError
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.queue.fields import FIELDS
-from app.features.queue.schemas import QueryFieldDocument
+from app.features.queue.routes import QueryFieldDocument
 from app.formats.camera_json import camera_to_json
 from app.geometry.arrays import FloatArray
-from app.geometry.camera import Camera
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.lens import ARCTAN_POLYNOMIAL as ARCTAN
 from app.geometry.lens import BROWN_CONRADY, FISHEYE, LENSES
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.geometry.sphere import optimal_diameter, tight_box
 from app.geometry.triangulation import parallax_angle, triangulate_pairs
 from app.sample.scene import Scene

@@ -12,7 +12,7 @@ import numpy as np
 from app.config import Settings
 from app.db.store import Store
 from app.evaluation.evaluate import Evaluation
-from app.evaluation.figure_png import figure_png
+from app.evaluation.result import figure_png
 from tests.paper.issia import run_issia
 from tests.paper.page import page
 from tests.paper.printed_jac import both_directions

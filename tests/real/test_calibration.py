@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.frames import ImageSize

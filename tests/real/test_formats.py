@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from app.formats.camera_json import camera_from_json, camera_to_json
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.export_record import ExportRecord
-from app.formats.issia_3d_writer import write_issia_3d
+from app.formats.issia_3d import write_issia_3d
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
 from app.formats.report import Report
 from app.formats.sn_calibration import DEFAULT_SIZE

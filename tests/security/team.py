@@ -9,9 +9,9 @@ from typing import Any
 from fastapi import FastAPI
 from sqlalchemy import delete
 
-from app.db.ephemeral_state import AttemptModel
 from app.db.store import Store
 from app.features.people import links
+from app.features.people.login_queries import AttemptModel
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from tests.security.asking import Answer, Asker

@@ -20,7 +20,7 @@ from sqlalchemy import text
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.integrity.database import examine_database
+from app.features.integrity.checks import examine_database
 from app.formats.manifest import MANIFEST
 from tests.e2e.service import ROOT, SERVE, run_touchline
 from tests.starting import Process

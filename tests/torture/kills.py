@@ -26,7 +26,7 @@ from app.config import Settings
 from app.db.log import read_log
 from app.db.store import Store
 from app.features.datasets.service import list_datasets
-from app.features.integrity.database import examine_database
+from app.features.integrity.checks import examine_database
 from tests.e2e.service import ROOT, SERVE, free_port, run_touchline
 from tests.starting import Process
 from tests.torture.connection import API

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.features.datasets.service import list_datasets
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
-from app.features.integrity.database import examine_database
+from app.features.integrity.checks import examine_database
 from app.features.verdicts.queries import read_verdicts
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset

@@ -20,13 +20,13 @@ from app.features.imports.ingest import ingest
 from app.features.jobs import runner as job_run
 from app.features.solutions.service import solve_dataset
 from app.geometry.camera import Camera
-from app.http.bodies import MAX_JSON_BYTES
 from app.http.deps import Services
 from app.http.errors import install_handlers
 from app.http.headers import SecurityHeaders
 from app.http.idempotency import Idempotency
 from app.http.pages import Site, install_pages
 from app.http.request_limits import RequestLimits
+from app.http.requests import MAX_JSON_BYTES
 from app.http.route import Gate
 from app.main import create_app
 from app.soccer.annotation import Lines, make_lines

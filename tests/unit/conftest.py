@@ -76,7 +76,7 @@ def _no_setting_of_tests() -> None:
 
 ON_BOTH = frozenset(
     {
-        "features/integrity/test_database.py",
+        "features/integrity/test_checks_database.py",
         "features/groups/test_submit.py",
         "features/verdicts/test_service_verdict.py",
         "features/integrity/test_records_versions.py",

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from sqlalchemy import insert
 
-from app.canonical import canonical
 from app.config import Settings
 from app.db.store import Store
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import NewRows
 from app.features.queue.refresh_queries import refresh_queue
 from app.geometry.camera import Camera
+from app.json_text import canonical
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.codec import policy_to_json
 from app.soccer.frames import Box, ImagePoint, ImageSize

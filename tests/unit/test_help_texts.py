@@ -25,38 +25,37 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
     3d accept access account action actions actors address adjudicate adjust adjustments adopt
-    advice after ahead anchor annotate app around arrays arrival ask assign attempt axis backup bar
-    bars batches before binned block blocks bodies body boxes browser bulk bundle button buttons
-    cache calibrate candidates canonical canvas caption card cards cell changes chart chip choice
-    chooser class cli client clip clock cluster codec colours command comment comments
-    compare comparison completion config confirm constraints contact copy copying correct cross css
-    csv cursor curve cuts database datasets day delete deps descriptions details detect devices
-    diagram dialect dialog diff differences dismissals distance documents drags drawing durable
-    editor empty endings enrol ephemeral equations errors estimates estimator evaluate event events
-    executors export exports facets facts faults fields figure figures files film filter finder
-    finite first fit fixture folders follow form format formats frozen gestures give glossary gold
-    grass grid guess guide guideline guidelines header headers heat help histograms history hit home
-    hooks idempotency identity if image images import imports index indexing info init insert
-    insight invitation invitations invite items jaccard join json kept kernels key keys known konva
-    last latest lazy lease leases least legend lens lesson lessons letter limits links list listing
-    live local locks login logins lone loupe mail main maintenance making many map markdown marks
-    match matches matrix me measurements measures membership mentions menu merge messages metrics
-    migrate mini models motion name names navigation needs neighbours notice nudge numbers object on
-    open openapi opentrackio options order other output own ownership packing page pages paint
-    palette panel parquet parse parts patch path pen people permissions pins pitch pitches pixel
-    place places play playback player plural png pointer policies pool popover pose position
-    postgresql preopen preview problem process profile progress projection proof property proposal
-    propose props provider queries query quota rail rater reader reasons record refresh reimport
-    remote render repeats report requests resect resource restore result rethreshold return revert
-    reviewers rights roles rotation router routes row rows rules run runner running runs safe save scale
+    advice after ahead anchor app around arrays arrival ask assign attempt axis backup bar bars
+    batches before block blocks body boxes browser bulk bundle button buttons cache calibrate
+    candidates canvas caption card cards cell changes chart chip choice chooser class cli client
+    clip clock cluster codec colours command comment comments compare comparison completion config
+    confirm constraints contact copy copying correct cross css csv cursor curve cuts database
+    datasets day delete deps descriptions details detect devices diagram dialect dialog diff
+    differences dismissals distance documents drags drawing durable editor empty enrol equations
+    errors estimates estimator evaluate event events executors export exports facets facts faults
+    fields figure figures files film filter finder first fit fixture follow form format formats
+    frozen gestures give glossary gold grass grid guess guide guideline guidelines header headers
+    heat help histograms history hit home hooks idempotency identity if image images import imports
+    index indexing init insert insight invitation invitations invite items jaccard join json kept
+    kernels key keys known konva last latest lazy lease leases least legend lens lesson lessons
+    letter limits links list listing live local locks login logins lone loupe mail main maintenance
+    making many map markdown marks match matches matrix me measurements measures membership mentions
+    menu merge messages metrics migrate mini models motion name names navigation needs neighbours
+    notice nudge numbers object on open openapi opentrackio options order other output own ownership
+    packing page pages paint palette panel parquet parse parts patch path pen people permissions
+    pins pitch pitches pixel place places play playback player pointer policies pool popover
+    position postgresql preopen preview problem process profile progress projection proof property
+    proposal propose props provider queries query quota rail rater reader reasons record refresh
+    reimport remote render repeats report requests resect resource restore result return revert
+    reviewers rights roles router routes row rows rules run runner running runs safe save scale
     scene scene3d scenes schemas score scoring scroll search sender sending serve server service
-    serving session sets shared sharing sheet sign snapshot solve solving source sources sphere
-    spread sqlite squares stacks stage staging standpoints state statements statistics steps storage
-    store stored stream stretches submit suggested suggestions summary surface swap synloc tab table
-    tall team term terminal text threads threshold ticks time tokens tools tracing track tracking
-    transfer transitions tree trees triangulate tripod truth types undo undrawn upload v3 v3d video
-    viewport viewports virtual visibility wal walk what when window words work worker workspace
-    write writer zip
+    session sets shared sharing sheet sign snapshot solve solving source sources sphere spread
+    sqlite squares stacks stage staging standpoints state statistics steps storage store stored
+    stream stretches submit suggested suggestions summary surface swap synloc tab table tall team
+    term terminal text threads threshold ticks time tokens tools tracing track tracking transfer
+    transitions tree trees triangulate tripod truth types undo undrawn upload v3 v3d video viewport
+    viewports virtual visibility walk what when window wording words work worker workspace write
+    writer zip
 """
 PLAIN = frozenset(PLAIN_WORDS.split())
 """Words of file names that are plain English, or that every programmer knows; any other has to be

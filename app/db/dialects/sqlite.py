@@ -127,7 +127,7 @@ class SQLite:
         return nullcontext()
 
     def settle(self, connection: Connection, tables: Sequence[Table], key: str) -> None:
-        """See ``Dialect``; ids follow the rows, and the first page says whose they are (``recovery.wal``)."""
+        """See ``Dialect``; ids follow the rows, and the first page says whose they are (``recovery.preopen_check``)."""
         connection.exec_driver_sql(f"PRAGMA application_id = {int(key[:7], 16)}")
 
     def file_faults(self, session: Session, most: int = 5, *, thorough: bool = False) -> list[str]:

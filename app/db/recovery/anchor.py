@@ -24,7 +24,7 @@ from app.config import Settings
 from app.db.dialects.dialect import dialect_of
 from app.durable import replace_file, sync
 from app.errors import DamagedError
-from app.finite import json_text
+from app.json_text import json_text
 
 ANCHOR_BYTES = 512
 AGAIN_SECONDS = 0.01

@@ -24,7 +24,7 @@ from app.features.independent_annotations.queries import IndependentAnnotation
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.people.roles import Action, role_allows
 from app.features.people.service import list_members
-from app.finite import Moment
+from app.json_text import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
 

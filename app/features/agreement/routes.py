@@ -8,12 +8,11 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.evaluation.agreement_limits import AgreementLimits, Disagreement, Spread
 from app.evaluation.annotation_distance import (
     Ball3DDistance,
     ViewDistance,
 )
-from app.evaluation.rater_agreement import Coefficient
+from app.evaluation.rater_agreement import AgreementLimits, Coefficient, Disagreement, Spread
 from app.features.agreement import adjudicate
 from app.features.agreement import service as limits
 from app.features.agreement.adjudicate import Case, OpenCase
@@ -27,9 +26,8 @@ from app.features.agreement.summary import (
 from app.features.groups.routes import ETAG, group_answer
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
-from app.features.independent_annotations.schemas import AnnotationReturn
+from app.features.independent_annotations.routes import AnnotationReturn
 from app.features.independent_annotations.service import DisclosedAnnotation
-from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.documents import Document, ListDocument, document, no_content, responds
@@ -37,6 +35,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 from app.soccer.choices import VerdictState
 
 router = APIRouter(tags=["agreement"], route_class=Route)

@@ -14,8 +14,8 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError, ReviewError, StorageError
-from app.evaluation.agreement_limits import AgreementLimits, Disagreement, find_disagreements
 from app.evaluation.annotation_distance import GroupDistance, compare_annotations
+from app.evaluation.rater_agreement import AgreementLimits, Disagreement, find_disagreements
 from app.features.agreement.queries import (
     AGREED,
     DECIDED,

@@ -10,12 +10,15 @@ from typing import Any
 
 from app.db.json_columns import unpack
 from app.db.store import Store
-from app.evaluation.agreement_limits import MEASURES, AgreementLimits, Spread, measure_spreads
 from app.evaluation.rater_agreement import (
+    MEASURES,
+    AgreementLimits,
     Coefficient,
+    Spread,
     cohen_kappa,
     fleiss_kappa,
     krippendorff_alpha,
+    measure_spreads,
 )
 from app.features.agreement.queries import AGREED, DECIDED, OPEN, list_agreements
 from app.features.agreement.service import AnnotationComparison, StoredComparison, read_limits

@@ -17,7 +17,6 @@ from app.features.audit.queries import AuditQuery
 from app.features.audit.service import KINDS, AuditEntry, AuditPage, Family
 from app.features.datasets.service import dataset_id
 from app.features.people.visibility_queries import EVERYTHING, Visibility
-from app.finite import MAX_ID
 from app.formats.csv_text import csv_line
 from app.http.access import current_login
 from app.http.cursor import Before, Cursor, first_below
@@ -26,6 +25,7 @@ from app.http.documents import ListDocument, json_of
 from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.route import Route
+from app.json_text import MAX_ID
 
 router = APIRouter(prefix="/audit", tags=["users"], route_class=Route)
 COLUMNS = tuple(field.name for field in fields(AuditEntry))

@@ -6,13 +6,13 @@ from collections.abc import Collection, Mapping
 
 from sqlalchemy import bindparam, delete, exists, select, update
 
-from app.db.dialects.statements import numbers_given
+from app.db.dialects.dialect import numbers_given
 from app.db.session import Session
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, LeaseModel
 from app.features.webhooks.queries import DONE, announce_batch
 from app.features.webhooks.tables import WebhookModel
-from app.finite import json_text
+from app.json_text import json_text
 
 _BATCH = BatchModel.__table__
 _IS_SINGLE = (_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)

@@ -23,7 +23,7 @@ from sqlalchemy import (
     update,
 )
 
-from app.db.dialects.statements import insert as upsert
+from app.db.dialects.dialect import insert as upsert
 from app.db.log import LogModel
 from app.db.session import Session
 from app.features.batches.tables import (

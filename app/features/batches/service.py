@@ -41,9 +41,9 @@ from app.features.queue.queries import Listing
 from app.features.queue.query import MAX_LISTED_LENGTH, Query, parse_query
 from app.features.tracks.queries import list_rows
 from app.features.webhooks.queries import GIVEN_OUT, HANDED_ON, announce_batch
-from app.finite import Moment
-from app.plural import plural
+from app.json_text import Moment
 from app.soccer.actors import person_of
+from app.wording import plural
 
 BatchKind = Literal["groups", "tracks"]
 GROUPS: BatchKind = "groups"

@@ -28,9 +28,8 @@ from sqlalchemy import (
     update,
 )
 
-from app.canonical import canonical
 from app.config import Settings
-from app.db.dialects.statements import DeferReferences, insert_or_replace, items_of, texts_in
+from app.db.dialects.dialect import DeferReferences, insert_or_replace, items_of, texts_in
 from app.db.home import DAY, last_written
 from app.db.json_columns import as_written, parse
 from app.db.session import COPIES_USED, Session, UsedIdModel
@@ -48,8 +47,8 @@ from app.features.solutions.queries import CalibrationModel, SolutionModel
 from app.features.tables import Base
 from app.features.tracks.tables import TrackModel
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
-from app.features.versions.tables import VersionModel
-from app.finite import MAX_ID
+from app.features.versions.queries import VersionModel
+from app.json_text import MAX_ID, canonical
 from app.object_store.path import is_address
 from app.soccer.codec import policy_from_json, policy_to_json
 from app.soccer.policy import Policy

@@ -35,9 +35,9 @@ from app.features.independent_annotations.queries import (
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility, is_blind
 from app.features.queue.queries import count_states
 from app.features.queue.refresh_queries import refresh_queue
-from app.finite import quoted
 from app.formats.issia import MATCH as ISSIA
 from app.formats.manifest import LICENCES, UNKNOWN_LICENCE
+from app.json_text import quoted
 from app.sample.fixture import LEAGUES
 from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy

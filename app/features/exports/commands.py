@@ -133,7 +133,7 @@ def import_(
     path = paths[0]
     server = current_server()
     if server is not None:
-        from app.terminal import remote_files
+        from app.terminal import remote
 
         options: dict[str, Any] = {
             **({} if calibration is None else {"calibration": calibration}),
@@ -145,7 +145,7 @@ def import_(
             **({} if propose else {"propose": False}),
         }
         with connect_to_server(server) as client, show_progress("Importing") as progress:
-            values, nothing = remote_files.import_values(
+            values, nothing = remote.import_values(
                 client, dataset, format_, path if is_address(path) else Path(path), options,
                 lines=lines, frames=frames, policy=policy or _usual_policy(format_),
                 dry_run=dry_run, progress=progress,
@@ -193,7 +193,7 @@ def import_(
 
 def _propose_cameras(dataset: str, settings: Settings, *, silent: bool) -> None:
     """Propose cameras for pictures that were imported; Ctrl+C keeps what was found until then."""
-    from app.features.jobs.endings import ending_sentence
+    from app.features.jobs.runner import ending_sentence
     from app.features.paint.proposals import propose_views
 
     with opened_store(settings) as store, show_progress("Proposing cameras") as progress:
@@ -245,14 +245,14 @@ def export(
     }
     server = current_server()
     if server is not None:
-        from app.terminal import remote_files
+        from app.terminal import remote
 
         if images == "link":
             raise typer.BadParameter("a server cannot link to frames here; choose copy or none")
         request = {"dataset": dataset, "format": format_, "all": everything, **options}
         with connect_to_server(server) as client, show_progress("Exporting") as progress:
             sent_to = out if is_address(out) else Path(out)
-            values = remote_files.export_values(client, sent_to, request, progress)
+            values = remote.export_values(client, sent_to, request, progress)
         print_export(values, json_)
         return
     from app.features.exports.service import export_dataset as run_export

@@ -26,16 +26,16 @@ from app.features.exports.service import ExportReport, export_dataset, require_p
 from app.features.jobs.queries import EXPORT, Job
 from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
 from app.features.jobs.service import Jobs
-from app.finite import json_text
 from app.formats.export_formats import missing_for_use
 from app.formats.file_tree import Root
 from app.formats.output import require_absent_in_store
 from app.formats.safe_path import require_safe_path
+from app.json_text import json_text
 from app.media.frames import Frames, SentPicture
 from app.object_store.path import StoredPath, target_path
 from app.object_store.store import SCHEME
-from app.plural import plural
 from app.soccer.group import Media
+from app.wording import plural
 
 _ID = re.compile(r"[0-9a-f]{32}|[1-9][0-9]{0,18}")
 """Ids of jobs, and those of exports that were made before there were jobs."""

@@ -28,7 +28,7 @@ from app.features.exports.source import (
 from app.features.groups.view_queries import frame_files
 from app.features.imports.edits_export import FORMAT as CARRY
 from app.features.imports.edits_export import export_edits
-from app.features.imports.unassigned import unassigned_persons
+from app.features.imports.ingest import unassigned_persons
 from app.features.tracks.export import TrackSource, frozen_records
 from app.features.tracks.service import track_source
 from app.features.versions.frozen_queries import read_frozen, read_json

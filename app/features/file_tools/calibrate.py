@@ -22,15 +22,14 @@ from app.features.file_tools.matches import (
     points_as_taken,
     read_matches,
 )
-from app.finite import json_text
-from app.formats.cameras_reader import read_cameras
-from app.formats.cameras_writer import camera_file_name, camera_file_text
-from app.formats.json_text import read_json
+from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
+from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import read_regular_file
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files
 from app.geometry.camera import Camera
+from app.json_text import json_text
 from app.progress import ReportProgress
 from app.soccer.annotation import lines_without
 from app.soccer.finding import Finding

@@ -13,12 +13,12 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
-from app.finite import json_text
-from app.formats.camera_arrays import camera_arrays
-from app.formats.cameras_reader import read_cameras
+from app.formats.camera_matrix import camera_arrays
+from app.formats.cameras import read_cameras
 from app.formats.opentrackio_writer import frame_rate, opentrackio_problem, opentrackio_sample
 from app.formats.report import Report
 from app.geometry.camera import Camera
+from app.json_text import json_text
 from app.soccer.frames import ImageSize
 
 T = TypeVar("T")

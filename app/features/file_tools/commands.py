@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from app.plural import plural
 from app.soccer.frames import ImageSize
 from app.terminal.options import Json, Size, Workers, parse_size, read_settings
 from app.terminal.terminal import print_error, print_json, print_values, say, show_progress
+from app.wording import plural
 
 commands = typer.Typer()
 

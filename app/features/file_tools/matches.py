@@ -14,10 +14,10 @@ from typing import Any
 from app.durable import replace_file
 from app.errors import DatasetFormatError, GeometryError, InputError
 from app.features.file_tools.track import pitch_row
-from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, camera_file_text
 from app.formats.csv_text import read_rows
 from app.formats.file_tree import Limits
-from app.formats.json_text import read_json
+from app.formats.json_reader import read_json
 from app.formats.report import Report
 from app.formats.safe_path import read_regular_file, resolve_inside
 from app.formats.sn_calibration import LineFile

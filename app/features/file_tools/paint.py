@@ -17,9 +17,7 @@ from app.config import Settings
 from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
 from app.features.file_tools.matches import DrawnFrame, share_tripods
-from app.finite import json_text
-from app.formats.cameras_reader import read_cameras
-from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
 from app.formats.file_tree import Limits
 from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.report import Report
@@ -32,6 +30,7 @@ from app.formats.view_files import write_file_below
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
+from app.json_text import json_text
 from app.media.files import decode_picture
 from app.media.frames import LIMITS
 from app.paint.agreement import measure_agreement

@@ -16,13 +16,12 @@ from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.features.file_tools.matches import DrawnFrame, share_tripods
 from app.features.file_tools.paint import PictureFile, UniqueNames, read_pictures
-from app.finite import json_text
-from app.formats.cameras_reader import read_cameras
-from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
 from app.formats.report import Report
 from app.formats.safe_path import resolve_inside
 from app.geometry.arrays import row_by_row
 from app.geometry.camera import Camera
+from app.json_text import json_text
 from app.paint.frame_pitch import agreed_pitch, group_by_position, make_pitch_frame
 from app.paint.propose import FrameProposal, propose_camera
 from app.progress import ReportProgress

@@ -17,11 +17,11 @@ from app.config import Settings
 from app.durable import replace_file
 from app.errors import DatasetFormatError, ImageError, InputError, TooLargeError
 from app.features.file_tools.camera_export import by_frame
-from app.finite import json_text
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
+from app.json_text import json_text
 from app.progress import ReportProgress
 from app.tracking.ball_rays import BallRays, ball_rays
 from app.tracking.link import find_time_map

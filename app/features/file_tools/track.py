@@ -13,12 +13,12 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import InputError, UnsafePathError
-from app.finite import json_text
-from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, camera_file_text
 from app.formats.report import Report
 from app.formats.sn_calibration import read_line_documents
 from app.formats.sn_calibration_reader import lines_from_json
 from app.geometry.resection import LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Z
+from app.json_text import json_text
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize

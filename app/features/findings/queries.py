@@ -9,13 +9,13 @@ from typing import Any, cast
 from sqlalchemy import Double, ForeignKey, Index, Table, delete, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.canonical import canonical
 from app.db.json_columns import as_written, parse
 from app.db.log import Entry, append
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.visibility_queries import shown_actor
+from app.json_text import canonical
 from app.soccer.finding import (
     PICTURE_GEOMETRY,
     PITCH_SIZE,

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query
 
 from app.features.datasets.service import dataset_id
 from app.features.findings.service import count_groups, read_findings
-from app.features.queue.schemas import FindingList, FindingRow
+from app.features.queue.routes import FindingList, FindingRow
 from app.http.cursor import parse_cursor
 from app.http.deps import AppStore, DatasetQuery
 from app.http.permissions import Action, OwnedKind, may

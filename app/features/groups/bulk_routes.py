@@ -23,7 +23,6 @@ from app.features.groups.bulk_edits import (
 from app.features.groups.edit import Edit, SetBall, SetLines
 from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
 from app.features.solutions.service import solve_encoded
-from app.finite import MAX_ID
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
 from app.http.documents import Document, as_document, document, responds
 from app.http.errors import http_status
@@ -31,6 +30,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 from app.soccer.pitch import MARKINGS
 
 _Key = Annotated[str, Field(min_length=1, max_length=1000)]

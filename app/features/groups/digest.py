@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from app.canonical import canonical, digest_of
 from app.db.json_columns import Json
+from app.json_text import canonical, digest_of
 from app.soccer.codec import (
     ball_to_json,
     group_without_views_to_json,

@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select, text
 
-from app.db.dialects.statements import DeferReferences
+from app.db.dialects.dialect import DeferReferences
 from app.db.session import Session
 from app.features.datasets.tables import (
     GroupModel,

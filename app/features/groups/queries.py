@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import BindParameter, bindparam, null, or_, select
 from sqlalchemy.sql import FromClause
 
-from app.db.dialects.statements import insert
+from app.db.dialects.dialect import insert
 from app.db.json_columns import as_written, parse, unpack
 from app.db.session import Session
 from app.errors import NotFoundError

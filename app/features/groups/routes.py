@@ -25,9 +25,8 @@ from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.people.roles import role_allows
 from app.features.queue import service as queue
-from app.features.queue.schemas import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
+from app.features.queue.routes import GroupPage, GroupRow, History, LogEntryDocument, Neighbours
 from app.features.queue.service import MatchingGroups
-from app.finite import MAX_ID
 from app.http.access import current_login
 from app.http.cursor import foreign_cursor, paged
 from app.http.deps import (
@@ -46,6 +45,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 from app.soccer.group import View, view_letter
 
 router = APIRouter(prefix="/groups", tags=["groups"], route_class=Route)

@@ -22,7 +22,6 @@ from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.policies.schemas import PolicyDocument
 from app.http.documents import Document, IdentityCache, ListDocument
-from app.plural import plural
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
@@ -37,6 +36,7 @@ from app.soccer.group import (
 )
 from app.soccer.picture import ASPECTS, MAX_SHIFT, OPEN, PictureGeometry
 from app.soccer.pitch import MARKINGS, canonical_marking
+from app.wording import plural
 
 
 def _known_marking(name: str) -> str:

@@ -26,9 +26,9 @@ from app.soccer.group import Group, View, view_letter
 from app.soccer.policy import Policy
 from app.soccer.solution import Calibration, Gate, MarkingFit, Solution, ViewSolution
 from app.solving.jaccard import project_markings
-from app.solving.numbers import format_pixels
 from app.solving.resect import REFERENCE_DIAGONAL
 from app.solving.solve import solve
+from app.wording import format_pixels
 
 MOST_TRIALS = 24
 """A person waits for the answer; what helps is nearly always among the first."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sqlalchemy import func, select
 
-from app.db.dialects.statements import insert
+from app.db.dialects.dialect import insert
 from app.db.session import Session, now
 from app.features.independent_annotations.tables import (
     CopyDatasetModel,

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from app.features.guidelines import service as guidelines
 from app.features.guidelines.service import Guidelines
-from app.features.independent_annotations.schemas import (
+from app.features.independent_annotations.routes import (
     GuidelinePictureDocument,
     GuidelinesEdit,
     NewGuidelinePicture,

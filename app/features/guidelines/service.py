@@ -21,7 +21,7 @@ from app.features.guidelines.queries import (
     insert_picture,
 )
 from app.features.imports.upload_queries import upload_path
-from app.finite import Moment
+from app.json_text import Moment
 from app.media.frames import Frames
 from app.soccer.group import Media
 

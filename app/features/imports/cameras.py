@@ -70,7 +70,7 @@ def ingest_cameras(
     Args:
         store: The database.
         dataset: Name of an existing dataset.
-        cameras: By name, as ``datasets.cameras_reader.read_cameras`` reads them.
+        cameras: By name, as ``formats.cameras.read_cameras`` reads them.
         source: Where they come from, for the log.
         actor: Who imports.
         size: Size of the images that the cameras were made for; None: that of each view.

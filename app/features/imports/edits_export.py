@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from app.canonical import canonical
 from app.db.json_columns import Json, unpack
 from app.db.log import LogEntry, group_entries, station_entries
 from app.db.session import Session
@@ -23,10 +22,10 @@ from app.features.findings.queries import dismissals_to_merge
 from app.features.groups.queries import StoredGroup, read_groups, sorted_unassigned_rows
 from app.features.groups.undo_stacks import RevisionChain, RevisionChains, station_revision_chain
 from app.features.imports.queries import group_verdicts, known_groups, shared_stations
-from app.finite import json_text
 from app.formats.file_tree import Root
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import output_anywhere
+from app.json_text import canonical, json_text
 from app.progress import ReportProgress
 from app.soccer.codec import (
     group_without_views_to_json,

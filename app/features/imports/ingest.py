@@ -1,19 +1,21 @@
-"""Ingest: groups from an importer into a dataset; again and again without doing anything twice."""
+"""Ingest: groups and unassigned frames from an importer into a dataset; again and again without doing anything twice."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
+from app.db.json_columns import pack, unpack
 from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.datasets.queries import find_dataset
-from app.features.datasets.service import insert_dataset
+from app.features.datasets.service import insert_dataset, read_dataset_head
 from app.features.findings.queries import (
     group_findings,
     groups_with_finding,
@@ -23,7 +25,13 @@ from app.features.groups.digest import source_hash
 from app.features.groups.edit import SetPaint, SetPositions
 from app.features.groups.insert_queries import NewRows
 from app.features.groups.pictures import mark_outdated_where_people_moved
-from app.features.groups.queries import StoredGroup, read_groups
+from app.features.groups.queries import (
+    StoredGroup,
+    read_groups,
+    unassigned_extras,
+    unassigned_rows,
+    upsert_unassigned,
+)
 from app.features.groups.reimport import KIND, KeptEdit, SharedStations, update_group_from_dataset
 from app.features.groups.revision_queries import save_group
 from app.features.imports.body import (
@@ -42,13 +50,16 @@ from app.features.pitches.queries import edited_pitches, is_pitch_edited
 from app.features.pitches.service import give_pitch
 from app.features.policies.service import first_policy
 from app.features.queue.refresh_queries import refresh_queue
+from app.formats.issia import FramePersons
 from app.formats.report import Report
 from app.object_store.path import is_address
-from app.plural import plural
 from app.progress import ReportProgress
+from app.soccer.annotation import Extras
+from app.soccer.codec import extras_from_json
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
+from app.wording import plural
 
 BATCH = 20
 """Groups a transaction: one import holds the writers up for a fraction of a second at a time."""
@@ -359,3 +370,82 @@ def save_findings(
     sentences = ((item.view, item.sentence) for item in noticed)
     replace_group_findings(session, stored.id, KIND, sentences)
     return noticed
+
+
+UNASSIGNED_AT_ONCE = 1000
+"""Frames a transaction and a log entry."""
+_NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
+_CAMERA = re.compile(r"cam[1-6]", re.ASCII)
+
+
+@dataclass(frozen=True)
+class UnassignedFrame:
+    """One image: the camera that took it, its frame, and what is known of it."""
+
+    camera: str
+    frame: str
+    extras: Extras
+
+
+def ingest_unassigned(
+    store: Store, dataset: str, frames: Iterable[UnassignedFrame], *, source: str, actor: str
+) -> IngestReport:
+    """Keep unassigned frames with a dataset; keeping them again changes nothing.
+
+    People do not edit them, so they follow whatever the dataset brings.
+    """
+    report, items = IngestReport(), iter(frames)
+    while batch := list(islice(items, UNASSIGNED_AT_ONCE)):
+        dataset_id = ensure_dataset(store, dataset, actor)
+        with store.write() as session:
+            _save_batch(session, dataset_id, batch, source, actor, report)
+    return report
+
+
+def unassigned_frames(session: Session, dataset_id: int) -> Iterator[UnassignedFrame]:
+    """The unassigned frames of a dataset, by camera and frame as texts."""
+    for row in unassigned_rows(session, dataset_id):
+        yield UnassignedFrame(row.camera, row.frame, extras_from_json(unpack(row.extras)))
+
+
+def unassigned_persons(session: Session, dataset: str | int) -> Iterator[FramePersons]:
+    """People of the unassigned frames of a dataset of ISSIA, for its original shape."""
+    for item in unassigned_frames(session, read_dataset_head(session, dataset).id):
+        if _NUMBER.fullmatch(item.frame) and _CAMERA.fullmatch(item.camera):
+            yield FramePersons(int(item.frame), item.camera, item.extras.boxes)
+
+
+def _save_batch(
+    session: Session,
+    dataset_id: int,
+    batch: Sequence[UnassignedFrame],
+    source: str,
+    actor: str,
+    report: IngestReport,
+) -> None:
+    known = unassigned_extras(session, dataset_id, {item.frame for item in batch})
+    fresh = {}
+    for item in batch:
+        place, body = (item.camera, item.frame), pack(item.extras.values())
+        if known.get(place) == body:
+            report.unchanged += 1
+        else:
+            report.changed += place in known
+            report.new += place not in known
+            fresh[place] = body
+    _write_unassigned(session, dataset_id, fresh, source, actor)
+
+
+def _write_unassigned(
+    session: Session,
+    dataset_id: int,
+    fresh: dict[tuple[str, str], bytes],
+    source: str,
+    actor: str,
+) -> None:
+    if not fresh:
+        return
+    upsert_unassigned(session, dataset_id, fresh)
+    frames = [[camera, frame, unpack(body)] for (camera, frame), body in fresh.items()]
+    body = {"source": source, "frames": frames}
+    append(session, [Entry("spare", actor, now(), body, dataset_id)])

@@ -14,9 +14,9 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, TooLargeError
 from app.features.datasets.queries import find_dataset, has_more_groups
 from app.features.datasets.service import get_dataset_head, require_name
-from app.features.imports.folders import resolve_folder
 from app.features.imports.sources import FORMATS, Source, import_source
 from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
+from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import FailedWithReportError, JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
@@ -25,10 +25,10 @@ from app.features.paint.jobs import PAINT, PROPOSALS
 from app.features.paint.service import has_pictures
 from app.features.solve.jobs import request_solve
 from app.formats.file_tree import Root
-from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.policy import POLICIES, Policy
+from app.wording import plural
 from app.worker_process import WorkerEnded, WorkerLimits
 
 KIND = "import"

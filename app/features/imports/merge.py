@@ -27,7 +27,14 @@ from app.features.groups.undo_stacks import (
 )
 from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
 from app.features.imports.edits_export import GROUPS, SPARE, STATIONS
-from app.features.imports.ingest import IngestReport, Origin, ingest_batch, ingest_session
+from app.features.imports.ingest import (
+    IngestReport,
+    Origin,
+    UnassignedFrame,
+    ingest_batch,
+    ingest_session,
+    ingest_unassigned,
+)
 from app.features.imports.merge_group import (
     CONFLICT,
     FOLLOW,
@@ -49,7 +56,6 @@ from app.features.imports.merge_parse import (
     read_merge_header,
 )
 from app.features.imports.queries import known_groups, shared_stations
-from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.file_tree import FileTree, Limits, Root
 from app.formats.report import Report

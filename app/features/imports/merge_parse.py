@@ -16,10 +16,10 @@ from app.features.imports.edits_export import EDIT_KINDS, FORMAT, FORMAT_VERSION
 from app.features.imports.queries import VERDICT
 from app.features.policies.service import CUSTOM, policy_values, policy_with
 from app.features.verdicts.service import STATES
-from app.finite import json_text
 from app.formats.file_tree import BROKEN, FileTree
-from app.formats.json_text import read_json
+from app.formats.json_reader import read_json
 from app.formats.report import Report
+from app.json_text import json_text
 from app.soccer.annotation import Extras
 from app.soccer.codec import extras_from_json, policy_from_json, station_from_json
 from app.soccer.finding import FINDING_KINDS

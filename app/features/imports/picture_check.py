@@ -16,10 +16,10 @@ from app.formats.report import Report
 from app.media.files import picture_header, video_length, video_times
 from app.media.images import SIDEWAYS, ImageHeader
 from app.paint.view_paint import SHAPES_APART
-from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, View
+from app.wording import plural
 
 OUTSIDE = 0.02
 """Of a side; annotators of public datasets clicked up to 1 % beyond the border of a picture."""

@@ -13,7 +13,11 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
 from app.errors import InputError, OverloadedError
-from app.features.imports.folders import (
+from app.features.imports.jobs import request_import
+from app.features.imports.schemas import FolderDocument, ImportBody, UploadDocument, UploadList
+from app.features.imports.upload_queries import Upload, UploadWriter
+from app.features.imports.upload_quota import person_quota, used_bytes
+from app.features.imports.uploads import (
     FolderListing,
     PartWriter,
     begin_part,
@@ -25,13 +29,8 @@ from app.features.imports.folders import (
     list_folder,
     own_uploads,
 )
-from app.features.imports.jobs import request_import
-from app.features.imports.schemas import FolderDocument, ImportBody, UploadDocument, UploadList
-from app.features.imports.upload_queries import Upload, UploadWriter
-from app.features.imports.upload_quota import person_quota, used_bytes
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import by_job, job_answer
-from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, DryRun, Sees, Services
 from app.http.documents import no_content, responds
@@ -39,6 +38,7 @@ from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 
 imports_router = APIRouter(prefix="/imports", tags=["imports"], route_class=Route)
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
-from app.features.imports.folders import FolderItem
 from app.features.imports.jobs import ImportRequest
+from app.features.imports.uploads import FolderItem
 from app.http.documents import Document, ListDocument
 from app.soccer.choices import CalibrationChoice, ImportFormat, PolicyName
 from app.soccer.frames import MAX_SIDE

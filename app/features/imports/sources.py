@@ -12,25 +12,23 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import DatasetFormatError, InputError
 from app.features.imports.cameras import ingest_cameras
-from app.features.imports.ingest import IngestReport, ingest
+from app.features.imports.ingest import IngestReport, UnassignedFrame, ingest, ingest_unassigned
 from app.features.imports.picture_check import PictureCheck
-from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.file_tree import Limits, Root
 from app.formats.frames_reader import check_grouping, read_frame_list, read_frames
 from app.formats.gamestate_reader import read_gamestate
 from app.formats.guess_format import guess_format, guess_from_content, holds_only_videos
-from app.formats.issia_3d_reader import open_issia_3d
+from app.formats.issia_3d import open_issia_3d
 from app.formats.issia_reader import IssiaFolder, IssiaOptions, open_issia
-from app.formats.parquet_reader import read_parquet
+from app.formats.parquet import read_parquet
 from app.formats.report import Report
 from app.formats.sn_calibration import DEFAULT_SIZE
 from app.formats.sn_calibration_reader import read_sn_calibration
 from app.formats.soccernet_v3_reader import read_soccernet_v3
 from app.formats.soccernet_v3d_reader import read_soccernet_v3d
 from app.media.images import check_size, read_header
-from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
 from app.soccer.choices import CalibrationChoice, ImportFormat
@@ -38,6 +36,7 @@ from app.soccer.frames import ImageSize
 from app.soccer.group import Group
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy
+from app.wording import plural
 
 FORMATS: tuple[str, ...] = get_args(ImportFormat)
 STATIC = ("issia", "issia-3d")

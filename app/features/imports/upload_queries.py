@@ -28,7 +28,7 @@ from app.db.session import now
 from app.durable import replace_file, sync
 from app.errors import ConflictError, InputError, NotFoundError, StorageError, TooLargeError
 from app.features.imports.upload_quota import person_quota, require_quota, used_bytes
-from app.finite import json_text
+from app.json_text import json_text
 
 _ID = re.compile(r"[0-9a-f]{32}")
 _UNSAFE = re.compile(r"[^A-Za-z0-9._ -]")

@@ -13,17 +13,17 @@ from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.datasets.service import need_dataset
-from app.features.groups.state import GroupState, need_group, read_states
-from app.features.groups.submit import load_solved
-from app.features.groups.view_queries import group_dataset
-from app.features.independent_annotations.copying import rename_views_as_original
-from app.features.independent_annotations.errors import (
+from app.evaluation.annotation_distance import (
     DistanceFromTruth,
     TrueView,
     distance_from_truth,
     world_error,
 )
+from app.features.datasets.service import need_dataset
+from app.features.groups.state import GroupState, need_group, read_states
+from app.features.groups.submit import load_solved
+from app.features.groups.view_queries import group_dataset
+from app.features.independent_annotations.copying import rename_views_as_original
 from app.features.independent_annotations.queries import (
     GOLD,
     STARTS,
@@ -39,8 +39,8 @@ from app.features.independent_annotations.queries import (
 )
 from app.features.independent_annotations.submission_queries import list_submissions
 from app.features.solutions.service import known_calibrations
-from app.finite import Moment
 from app.formats.camera_json import camera_from_json
+from app.json_text import Moment
 from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group

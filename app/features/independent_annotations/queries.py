@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, get_args
 from sqlalchemy import Select, bindparam, delete, exists, func, insert, or_, select, update
 from sqlalchemy.orm import aliased
 
-from app.db.dialects.statements import insert as insert_or_update
+from app.db.dialects.dialect import insert as insert_or_update
 from app.db.json_columns import Json, pack, unpack
 from app.db.session import Session, now
 from app.features.batches.tables import BatchGroupModel

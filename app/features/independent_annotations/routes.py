@@ -1,38 +1,179 @@
-"""Independent annotations and gold groups."""
+"""Independent annotations and gold groups, and how they travel."""
 
 from __future__ import annotations
 
-from fastapi import APIRouter, BackgroundTasks, Request, Response
+from datetime import datetime
+from typing import Annotated, Literal
 
+from fastapi import APIRouter, BackgroundTasks, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.evaluation.annotation_distance import DistanceFromTruth
 from app.features.agreement.adjudicate import adopt_into_group
 from app.features.agreement.service import after_submission
 from app.features.groups.routes import ETAG, group_answer
 from app.features.groups.schemas import GroupDocument
 from app.features.groups.state import GroupState
+from app.features.guidelines.service import MAX_LETTERS
 from app.features.independent_annotations import gold, service
-from app.features.independent_annotations.adopt import return_annotation
-from app.features.independent_annotations.gold import GoldGroup
+from app.features.independent_annotations.adopt import MAX_REASON, return_annotation
+from app.features.independent_annotations.gold import (
+    GoldGroup,
+    GoldResult,
+    MedianInterval,
+    PersonResults,
+)
 from app.features.independent_annotations.known_truth import (
+    MOST,
     GoldChoice,
     GoldChoiceResult,
     mark_known,
 )
-from app.features.independent_annotations.schemas import (
-    GoldChoiceDocument,
-    GoldEdit,
-    GoldReportDocument,
-    IndependentAnnotationList,
-    ReturnReason,
-)
 from app.features.independent_annotations.service import DisclosedAnnotation
 from app.features.people.roles import role_allows
+from app.features.queue.query import MAX_LISTED_LENGTH
 from app.http.access import current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.documents import document, responds
+from app.http.documents import Document, ListDocument, document, responds
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
+from app.json_text import MAX_ID
+from app.soccer.choices import GoldStart
+
+
+class ReturnReason(BaseModel):
+    """Why something that was submitted goes back."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"reason": "The far goal line is missing in view B."}]},
+    )
+
+    reason: Annotated[str, Field(max_length=MAX_REASON)] = Field(
+        default="", description="A sentence for the person who gets the group back."
+    )
+
+
+class AnnotationReturn(ReturnReason):
+    """Which annotation of a group goes back, and why."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"annotation": 7, "reason": "The ball in B is the spot."}]},
+    )
+
+    annotation: Annotated[int, Field(ge=1, le=MAX_ID)]
+
+
+class IndependentAnnotationList(ListDocument[DisclosedAnnotation]):
+    """Own annotations, oldest first: for a lead everybody's, else those of whoever asks."""
+
+
+class GoldEdit(BaseModel):
+    """What annotators of a gold group begin with.
+
+    `imported`: as its dataset brought it; `without_balls`: what it holds but for the balls;
+    `bare`: its pictures alone.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"start": "without_balls"}]}
+    )
+
+    start: GoldStart = "imported"
+
+
+class GoldChoiceDocument(BaseModel):
+    """Groups that become gold by what is known of them.
+
+    `sample`: by the cameras and the ball with which a generated sample was drawn; `version`: by what
+    a frozen version holds, upon which people agreed or somebody decided.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"source": "sample", "start": "bare"},
+                {"source": "version", "version": "v1"},
+            ]
+        },
+    )
+
+    source: Literal["sample", "version"]
+    version: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
+        default=None, description="Name or id of the version."
+    )
+    q: Annotated[str, Field(max_length=MAX_LISTED_LENGTH)] = Field(
+        default="", description="Which groups; default: all."
+    )
+    size: Annotated[int, Field(ge=1, le=MOST)] = Field(
+        default=MOST, description="So many of them at most, the first ones."
+    )
+    start: GoldStart = "imported"
+
+
+class GoldResultDocument(Document, shows=GoldResult):
+    """What one person made of a gold group."""
+
+    submitted: datetime = Field(description="When they submitted it first.")
+    true_verdict: str = Field(title="Known Verdict")
+    right: bool | None = Field(description="Whether they judged as is true; null: not judged.")
+    error: DistanceFromTruth
+    submissions: int = Field(
+        description="How often they submitted it. The first one is measured; there are more where a "
+        "lead returned it."
+    )
+
+
+class PersonResultsDocument(Document, shows=PersonResults):
+    """What somebody made of gold groups, oldest first."""
+
+    results: list[GoldResultDocument]
+    line_px: MedianInterval
+    ball_px: MedianInterval
+    ball_m: MedianInterval
+    right_low: float | None = Field(description="Wilson's interval of the share, 95 %.")
+
+
+class GoldReportDocument(Document):
+    """The gold groups of a dataset, and how far each person is from what is true of them."""
+
+    groups: list[GoldGroup]
+    people: list[PersonResultsDocument]
+
+
+class GuidelinesEdit(BaseModel):
+    """Another version of the guidelines."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"text": "## Balls\n\nDraw tight boxes.", "based_on": 0}]},
+    )
+
+    text: Annotated[str, Field(max_length=MAX_LETTERS)]
+    based_on: Annotated[int, Field(ge=0, le=2**31, description="The version that was changed.")]
+
+
+class NewGuidelinePicture(BaseModel):
+    """A picture that was uploaded."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"upload": "0123456789abcdef0123456789abcdef"}]},
+    )
+
+    upload: Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
+
+
+class GuidelinePictureDocument(Document):
+    """A picture of the guidelines, under the SHA-256 of its bytes."""
+
+    digest: str
+    type: str
+
 
 annotations_router = APIRouter(tags=["independent annotations"], route_class=Route)
 

@@ -37,7 +37,7 @@ from app.features.independent_annotations.queries import (
 from app.features.independent_annotations.submission_queries import RETURNED, submit_copy
 from app.features.people.visibility_queries import READER
 from app.features.queue.queries import read_columns
-from app.finite import Moment
+from app.json_text import Moment
 from app.soccer.actors import person_of
 
 _KINDS = ("work", "take")

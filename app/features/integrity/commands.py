@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from app.plural import plural
 from app.terminal.options import Json, read_settings
 from app.terminal.server import opened_store, require_home
 from app.terminal.terminal import print_json, say
+from app.wording import plural
 
 commands = typer.Typer()
 
@@ -26,7 +26,7 @@ def doctor(
     """Look whether home and database are whole: what the log tells of, and what was computed; 1 if not."""
     from app.db.locks import server_lock
     from app.features.groups.replay import rebuild_tables
-    from app.features.integrity.home import examine_everything
+    from app.features.integrity.checks import examine_everything
 
     settings = read_settings()
     if rebuild:

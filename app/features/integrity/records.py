@@ -47,7 +47,7 @@ from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
 from app.solving.calibrate import view_keys
-from app.solving.facts_codec import facts_from_bytes
+from app.solving.facts import facts_from_bytes
 
 DATASET, DELETED = "dataset", "dataset_deleted"
 

@@ -46,7 +46,7 @@ from app.db.store import Store
 from app.durable import read_private
 from app.errors import DamagedError, InputError
 from app.features.tables import Base
-from app.plural import plural
+from app.wording import plural
 
 _PASSWORD = re.compile(r"://[^:/@]*:[^@]*@|[?&]password=")
 """In the address of a database, as its driver reads it."""

@@ -10,14 +10,13 @@ from typing import Any
 from sqlalchemy import Index, case, delete, false, func, insert, select, update
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.canonical import canonical
-from app.db.dialects.statements import json_member
+from app.db.dialects.dialect import json_member
 from app.db.json_columns import Json, parse
 from app.db.session import Base, Session, now, text_of
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.visibility_queries import EVERYTHING, Visibility, columns_shown
-from app.finite import finite
+from app.json_text import canonical, finite
 from app.soccer.choices import JobState
 
 WAITING: JobState = "waiting"

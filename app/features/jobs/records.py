@@ -10,7 +10,7 @@ from typing import Any
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, StorageError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.jobs.queries import DONE as DONE
 from app.features.jobs.queries import (
     FAILED,

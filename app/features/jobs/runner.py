@@ -1,4 +1,4 @@
-"""The work of one job, in this process or one of its own.
+"""The work of one job, in this process or one of its own, and the sentence with which it ends.
 
 It tells how far it is, how it ended and what it says then.
 """
@@ -6,7 +6,7 @@ It tells how far it is, how it ended and what it says then.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
@@ -18,9 +18,10 @@ from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import JobCancelled, OverloadedError, ReviewError, TooLargeError
 from app.features.datasets.queries import has_more_groups
-from app.features.jobs.endings import ending_sentence
 from app.features.jobs.queries import CANCELLED, DONE, FAILED, Job
+from app.formats.export_formats import missing_for_use
 from app.progress import ReportProgress
+from app.wording import counted, plural
 from app.worker_process import EndReason, WorkerEnded
 
 log = structlog.get_logger("touchline.jobs")
@@ -287,3 +288,175 @@ def left_to_next_server(progress: JobProgress) -> Iterator[None]:
 def _is_small_dataset(store: Store, dataset_id: int) -> bool:
     with store.read() as session:
         return not has_more_groups(session, dataset_id, SMALL)
+
+
+def ending_sentence(kind: str, result: Json) -> str | None:
+    """The sentence of a job that is done; None where its result says nothing that is known here."""
+    tell = _ENDINGS.get(kind)
+    try:
+        return None if tell is None else tell(result)
+    except (AttributeError, KeyError, TypeError):
+        # The work is done, whatever can be said of it.
+        return None
+
+
+def _solving_sentence(result: Json) -> str:
+    pitches = _pitch_estimate_sentence(result)
+    if not result["solved"] and not result["failed"]:
+        return pitches or "Nothing was left to solve."
+    passed, rest = result["passed"], result["solved"] - result["passed"]
+    gates = ", ".join(f"{gate} {count:,}" for gate, count in result.get("failing", {}).items())
+    why = f" (first failing gate: {gates})" if gates else ""
+    return (
+        f"{plural(result['solved'], 'group')} solved: {passed:,} pass, {rest:,} do not{why}; "
+        f"{plural(result['failed'], 'error')}."
+        + (f" {pitches}" if pitches else "")
+        + (f" {advice}" if (advice := result.get("advice")) else "")
+    )
+
+
+def _pitch_estimate_sentence(result: Json) -> str:
+    """What solving found of pitches, "" where it estimated none; results of older servers say nothing."""
+    if not result.get("estimated"):
+        return ""
+    matches = plural(result["estimated"], "match", "matches")
+    proposed = plural(result["proposed"], "match", "matches")
+    found = (
+        f"another size is proposed for {proposed}"
+        if result["proposed"]
+        else "no other size is proposed"
+    )
+    return f"The pitch of {matches} was estimated: {found}."
+
+
+def _import_sentence(result: Json) -> str:
+    counts = {name: result.get(name, 0) for name in ("new", "changed", "unchanged")}
+    would = " (dry run: nothing was changed)" if result.get("dry_run") else ""
+    counted_groups = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    left = len(result.get("skipped", ())) + result.get("more_skipped", 0)
+    more = f"; {plural(left, 'record')} left out" if left else ""
+    return f"{plural(sum(counts.values()), 'group')} read: {counted_groups}{more}{would}."
+
+
+def _export_sentence(result: Json) -> str:
+    counts = result["counts"]
+    written = ", ".join(counted(count, name) for name, count in counts.items())
+    missing = missing_for_use(result.get("format", ""), counts)
+    return f"Written: {written}." + ("" if missing is None else f" {missing}.")
+
+
+def _version_sentence(result: Json) -> str:
+    return f"Version {result['name']} holds {plural(result['counts']['groups'], 'group')}."
+
+
+def _verification_sentence(result: Json) -> str:
+    return str(result["sentence"])
+
+
+def _evaluation_sentence(result: Json) -> str:
+    return f"Evaluation {result['name']} is ready."
+
+
+def _acceptance_sentence(result: Json) -> str:
+    refused = sum(result["refused"].values())
+    more = f"; {plural(refused, 'view')} refused" if refused else ""
+    groups = plural(result["groups"], "group")
+    return f"{plural(result['changed'], 'view')} of {groups} have a ball from predictions{more}."
+
+
+def _practice_sentence(result: Json) -> str:
+    groups = plural(result["groups"], "practice group")
+    return f"{groups} made." if result["made"] else f"The {groups} already exist."
+
+
+def _rig_adjustment_sentence(result: Json) -> str:
+    cameras = plural(len(result["cameras"]), "camera")
+    if result["accepted"] is None:
+        return f"An adjustment of {cameras} is proposed."
+    return f"The adjustment of {cameras} was accepted ({result['accepted']})."
+
+
+def _shared_positions_sentence(result: Json) -> str:
+    shared, matches = result["shared"], plural(result["matches"], "match", "matches")
+    return f"{plural(shared, 'picture')} of {matches} share the position of their camera."
+
+
+def _paint_reading_sentence(result: Json) -> str:
+    return f"The paint of {plural(result['read'], 'picture')} was read."
+
+
+def _line_proposals_sentence(result: Json) -> str:
+    looked = result["proposed"] + result["unsure"] + result["nothing"]
+    return (
+        f"{plural(looked, 'view')} looked at: {result['proposed']:,} proposed, "
+        f"{result['unsure']:,} unsure, {result['nothing']:,} without a proposal."
+    )
+
+
+def _picture_estimates_sentence(result: Json) -> str:
+    items = result["items"]
+    proposed = sum(item["proposed"] is not None for item in items)
+    matches = plural(len(items), "match", "matches")
+    return f"{matches} estimated, {proposed:,} with a proposal."
+
+
+def _recording_index_sentence(result: Json) -> str:
+    shots, frames = plural(result["shots"], "shot"), plural(result["frames"], "frame")
+    return f"{result['name']} has {frames} in {shots}."
+
+
+def _instants_sentence(result: Json) -> str:
+    there = f"; {result['unchanged']:,} were there before" if result["unchanged"] else ""
+    changed, views, outside = (
+        result.get(name, 0) for name in ("changed", "linked_views", "outside")
+    )
+    if changed:
+        there += f"; {plural(changed, 'group')} got views of replays"
+    if views or outside:
+        there += f"; {plural(views, 'view')} of linked replays, {outside:,} outside of them"
+    return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
+
+
+def _ball_search_sentence(result: Json) -> str:
+    there = f"; {result['unchanged']:,} were up to date" if result["unchanged"] else ""
+    count = len(result["without"])
+    without = f"; {count:,} {'has' if count == 1 else 'have'} no track" if count else ""
+    stretches = plural(result["made"], "stretch", "stretches")
+    return f"The ball was tracked over {stretches}{there}{without}."
+
+
+def _camera_tracking_sentence(result: Json) -> str:
+    counts = ", ".join(f"{result[name]:,} {name}" for name in ("tracked", "bridged", "lost"))
+    given = f"; {plural(result['groups'], 'group')} got another camera" if result["groups"] else ""
+    return f"{plural(result['frames'], 'frame')} of {result['name']}: {counts}{given}."
+
+
+def _link_sentence(result: Json) -> str:
+    live, replay = result["rays"]
+    seen = f"{live:,} live rays, {replay:,} of the replay"
+    left = f", {result['left_out']:,} left out" if result["left_out"] else ""
+    told = "The ball tells the times" if result["reason"] is None else result["reason"].rstrip(".")
+    return f"{told} ({seen}{left})."
+
+
+_ENDINGS: Mapping[str, Callable[[Json], str]] = {
+    "solve": _solving_sentence,
+    "import": _import_sentence,
+    "export": _export_sentence,
+    "freeze": _version_sentence,
+    "verify": _verification_sentence,
+    "evaluate": _evaluation_sentence,
+    "bulk": _acceptance_sentence,
+    "practice": _practice_sentence,
+    "rig": _rig_adjustment_sentence,
+    "positions": _shared_positions_sentence,
+    "paint": _paint_reading_sentence,
+    "proposals": _line_proposals_sentence,
+    "pictures": _picture_estimates_sentence,
+    "recording": _recording_index_sentence,
+    "instants": _instants_sentence,
+    "ball": _ball_search_sentence,
+    "track": _camera_tracking_sentence,
+    "link": _link_sentence,
+}
+"""By the kind of the job."""

@@ -24,7 +24,7 @@ from app.db.json_columns import Json
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, OverloadedError, StorageError
-from app.features.audit.audit_events import note_job
+from app.features.audit.service import note_job
 from app.features.jobs.queries import (
     CANCELLED,
     DONE,

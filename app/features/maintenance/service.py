@@ -11,9 +11,9 @@ from app.db.json_columns import parse
 from app.db.session import now, text_of
 from app.db.store import Store
 from app.errors import InputError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.people.queries import read_team_setting, write_team_setting
-from app.finite import Moment, json_text
+from app.json_text import Moment, json_text
 
 _BANNER = "maintenance"
 """Name of the setting."""

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.plural import plural
 from app.terminal.options import Dataset, Json, Size, Workers, current_actor
 from app.terminal.server import opened_store, opened_to_solve
 from app.terminal.terminal import print_json, print_rows, print_values, say
+from app.wording import plural
 
 if TYPE_CHECKING:
     from app.features.match_estimates.pictures import PictureState

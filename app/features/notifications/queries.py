@@ -14,7 +14,7 @@ from app.features.comments.queries import NotificationModel
 from app.features.datasets.tables import DatasetModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.visibility_queries import Visibility, seen_anywhere
-from app.finite import Moment
+from app.json_text import Moment
 
 
 class NotificationKind(StrEnum):

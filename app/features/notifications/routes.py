@@ -11,7 +11,6 @@ from app.features.notifications import service as bell
 from app.features.notifications.queries import Notification
 from app.features.notifications.service import NotificationState
 from app.features.people.session_routes import Me
-from app.finite import MAX_ID
 from app.http.cursor import Before, Cursor, first_below
 from app.http.deps import AppStore
 from app.http.documents import ListDocument, as_document, responds
@@ -19,6 +18,7 @@ from app.http.permissions import Action, may
 from app.http.problem import responses
 from app.http.route import Route
 from app.http.team import AppTeam
+from app.json_text import MAX_ID
 
 router = APIRouter(prefix="/notifications", tags=["comments"], route_class=Route)
 

@@ -11,11 +11,11 @@ from typing import Annotated, Any, get_args
 import typer
 
 from app.features.match_estimates.commands import print_sentences
-from app.plural import plural
 from app.soccer.choices import ProposalOutcome
 from app.terminal.options import Json, Workers, current_actor, parse_size, read_settings
 from app.terminal.server import opened_store
 from app.terminal.terminal import print_json, print_values, say, show_progress
+from app.wording import plural
 
 commands = typer.Typer()
 

@@ -13,14 +13,14 @@ from typing import Any, cast
 from sqlalchemy import ColumnElement, Select, Table, and_, case, delete, func, or_, select
 from sqlalchemy.orm import aliased
 
-from app.canonical import canonical
-from app.db.dialects.statements import insert, items_of, numbers_in
+from app.db.dialects.dialect import insert, items_of, numbers_in
 from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
 from app.features.paint.queries import ProposalModel
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import SolutionModel, is_current, list_undetermined_calibrations
+from app.json_text import canonical
 from app.soccer.annotation import Lines
 from app.soccer.codec import lines_from_json, lines_to_json
 from app.soccer.paint_evidence import PROPOSAL_OUTCOMES

@@ -11,7 +11,7 @@ from sqlalchemy import BindParameter, ForeignKey, Index, Table, bindparam, func,
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.statements import any_of, insert, values_of
+from app.db.dialects.dialect import any_of, insert, values_of
 from app.db.json_columns import as_written, decompress, parse
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Base, Session

@@ -153,7 +153,7 @@ def take(name: Name, dataset: Dataset, json_: Json = False) -> None:
 @commands.command()
 def adopt(name: Name, json_: Json = False) -> None:
     """Show what was done before there were accounts as somebody's; once. The log keeps its names."""
-    from app.features.audit.audit_events import assign_local_work as give
+    from app.features.audit.service import assign_local_work as give
     from app.features.people.service import find_person
 
     with opened_store() as store:

@@ -19,11 +19,16 @@ from typing import Protocol
 import pyotp
 from cryptography.fernet import Fernet
 
-from app.db.ephemeral_state import note_attempt, oldest_attempt, store_pending, take_pending
 from app.db.home import BEGUN, DEVICES, SECOND_FACTOR, installation_key
 from app.db.session import Session, text_of
 from app.db.store import Store
 from app.features.people.links import token_hash
+from app.features.people.login_queries import (
+    note_attempt,
+    oldest_attempt,
+    store_pending,
+    take_pending,
+)
 from app.features.people.queries import (
     find_second_factor,
     person_by_name,

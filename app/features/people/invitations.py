@@ -16,7 +16,7 @@ from app.features.people.links import Link
 from app.features.people.queries import person_by_name
 from app.features.people.roles import Role, checked_name, require_no_token
 from app.features.people.service import Person, insert_invited, invite, renew_link
-from app.finite import Moment, quoted
+from app.json_text import Moment, quoted
 from app.mail import Letter, MailServer, checked_address
 
 MOST = 500

@@ -49,7 +49,7 @@ from app.features.people.second_factor import (
     new_codes,
     require_password,
 )
-from app.finite import Moment
+from app.json_text import Moment
 
 log = structlog.get_logger("touchline.access")
 

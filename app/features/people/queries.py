@@ -24,7 +24,7 @@ from sqlalchemy import (
     update,
 )
 
-from app.db.dialects.statements import pairs_of
+from app.db.dialects.dialect import pairs_of
 from app.db.session import Session, now
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel

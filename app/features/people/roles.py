@@ -15,7 +15,7 @@ from app.features.people.visibility_queries import EVERYTHING as EVERYTHING
 from app.features.people.visibility_queries import READER as READER
 from app.features.people.visibility_queries import Visibility as Visibility
 from app.features.people.visibility_queries import reads_blind as reads_blind
-from app.finite import quoted
+from app.json_text import quoted
 from app.soccer.actors import LOCAL_USER, person_of
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 
 from app.db.store import Store
-from app.features.audit.audit_events import assign_local_work, find_owner_of_local_work
+from app.features.audit.service import assign_local_work, find_owner_of_local_work
 from app.features.people import service as people
 from app.features.people.invitations import (
     Invitation,

@@ -43,7 +43,7 @@ from app.features.people.roles import (
     require_no_token,
 )
 from app.features.people.visibility_queries import COPIES
-from app.finite import Moment
+from app.json_text import Moment
 from app.soccer.actors import person_of
 
 

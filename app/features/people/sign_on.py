@@ -37,7 +37,7 @@ from app.features.people.queries import (
 from app.features.people.roles import checked_name, log_account_event
 from app.features.people.second_factor import require_password
 from app.features.people.sign_on_rules import SignOnRules, identity_label, require_no_identity
-from app.finite import json_text
+from app.json_text import json_text
 
 LASTS = timedelta(minutes=10)
 """So long somebody may take to log in at the provider."""

@@ -24,7 +24,7 @@ from app.features.people.logins import Login, LoginMethod
 from app.features.people.queries import all_people, count_people_who_can_log_in, person_by_id
 from app.features.people.roles import Role, log_account_event, require_no_token
 from app.features.people.second_factor import require_password
-from app.finite import Moment
+from app.json_text import Moment
 
 ALL = "*"
 """In the place of a domain: whoever the provider knows."""

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ForeignKey, delete, func, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.db.dialects.statements import insert_or_replace
+from app.db.dialects.dialect import insert_or_replace
 from app.db.json_columns import parse
 from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Base, Session

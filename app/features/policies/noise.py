@@ -31,9 +31,16 @@ from app.features.policies.service import (
 from app.features.solutions.queries import newest_solution, present_solutions
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
 from app.solving.ball_noise import BallNoise, RayResidual, Sigma
-from app.solving.dataset_noise import DatasetNoise, NoiseGroup, estimate_noise
+from app.solving.dataset_noise import (
+    BallSource,
+    DatasetNoise,
+    NoiseGroup,
+    SourceFactors,
+    SourceNoise,
+    estimate_noise,
+    estimate_sources,
+)
 from app.solving.line_noise import LineEstimate
-from app.solving.source_noise import BallSource, SourceFactors, SourceNoise, estimate_sources
 
 MAX_GROUPS = 600
 """Groups that an estimate looks at, spread over the dataset: more say hardly more."""

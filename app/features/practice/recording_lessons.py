@@ -13,10 +13,10 @@ from app.features.recordings.shots import Shot
 from app.formats.camera_json import camera_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.soccer.frames import ImageSize
 from app.solving.sides import turned_camera
 from app.tracking.track import FrameCamera
+from app.wording import plural
 
 LessonName = Literal["shots", "cameras", "side", "link"]
 State = Literal["open", "almost", "right"]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
 from app.soccer.frames import ImageSize
@@ -23,10 +22,11 @@ from app.terminal.terminal import (
     say,
     show_progress,
 )
+from app.wording import plural
 
 if TYPE_CHECKING:
     from app.evaluation.result import Cell, Table
-    from app.features.predictions.sources import SourcesRequest
+    from app.features.predictions.evaluation_run import SourcesRequest
 
 
 commands = typer.Typer()
@@ -294,9 +294,8 @@ def evaluate(
     """
     if predictions is None and careful is None and cameras is None:
         raise typer.BadParameter("name predictions, --cameras or --careful")
-    from app.features.predictions.evaluation_run import EvaluationRequest
+    from app.features.predictions.evaluation_run import EvaluationRequest, SourcesRequest
     from app.features.predictions.reader import PredictionFiles
-    from app.features.predictions.sources import SourcesRequest
 
     request = SourcesRequest(
         EvaluationRequest(name=name, groups=groups, split=split, boxes=boxes, min_score=min_score),
@@ -322,7 +321,7 @@ def _evaluate_here(
 ) -> tuple[_Values, list[_Values]]:
     """The evaluation and the sets that were made or found for it, as plain values."""
     from app.features.predictions.evaluation import evaluation_values, write_evaluation
-    from app.features.predictions.sources import evaluate_sources
+    from app.features.predictions.evaluation_run import evaluate_sources
 
     with opened_store() as store:
         done = evaluate_sources(store, dataset, request, actor=current_actor(), progress=progress)
@@ -339,12 +338,12 @@ def _evaluate_at(
     progress: ReportProgress,
 ) -> tuple[_Values, list[_Values]]:
     """As ``_evaluate_here``, by a server."""
-    from app.terminal import remote_files
+    from app.terminal import remote
 
     with connect_to_server(server) as client:
-        values, sets = remote_files.evaluate(client, dataset, request, progress)
+        values, sets = remote.evaluate(client, dataset, request, progress)
         if out is not None:
-            remote_files.write_evaluation(client, values, out)
+            remote.write_evaluation(client, values, out)
     return values, sets
 
 

@@ -20,7 +20,6 @@ from app.evaluation.comparison import (
     compare_tables,
     differing_pins,
 )
-from app.evaluation.figure_png import figure_png
 from app.evaluation.result import (
     NUMBERS,
     Evaluation,
@@ -28,10 +27,11 @@ from app.evaluation.result import (
     FrameResult,
     Table,
     figure_csv,
+    figure_png,
     table_csv,
 )
 from app.evaluation.track_scores import TrueTrack, evaluate_tracks
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.digest import digest
 from app.features.predictions import queries as frame_rows
@@ -51,9 +51,9 @@ from app.features.tracks.codec import track_from_json
 from app.features.tracks.service import accepted_tracks
 from app.features.versions.frozen_queries import read_frozen, read_json
 from app.features.versions.service import Version
-from app.finite import json_text
 from app.formats.safe_path import resolve_inside
 from app.formats.tracks_writer import folder_name
+from app.json_text import json_text
 from app.soccer.solution import SOLVER_VERSION
 
 MAX_PAGE = 500

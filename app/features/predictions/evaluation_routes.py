@@ -11,7 +11,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from app.errors import NotFoundError
 from app.evaluation.comparison import FIELDS, Difference, FrameOfTwoRuns
-from app.evaluation.figure_png import figure_png
 from app.evaluation.result import (
     FIGURES,
     NUMBERS,
@@ -21,6 +20,7 @@ from app.evaluation.result import (
     FrameResult,
     Table,
     figure_csv,
+    figure_png,
     table_csv,
 )
 from app.features.jobs.queries import Job
@@ -29,9 +29,8 @@ from app.features.predictions import evaluation as review
 from app.features.predictions.evaluation import RunComparison, read_tables
 from app.features.predictions.evaluation_run import MAX_NAME, EvaluationRequest
 from app.features.predictions.jobs import request_evaluation
-from app.features.versions.schemas import VersionId
+from app.features.versions.routes import VersionId
 from app.features.versions.service import find_version_id
-from app.finite import MAX_ID
 from app.http.cursor import paged, parse_cursor
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.documents import Document, ListDocument, document, no_content, responds
@@ -40,6 +39,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 from app.soccer.choices import BoxKind, LiveRule
 
 SetId = Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]

@@ -17,8 +17,8 @@ from app.features.groups.view_queries import present_ids
 from app.features.versions.membership import read_candidates, require_solved
 from app.features.versions.queries import BATCH, read_rows
 from app.features.versions.service import FrozenGroup, Version, read_frozen_groups
-from app.finite import quoted
 from app.formats.manifest import software_version
+from app.json_text import quoted
 from app.soccer.ball_boxes import ball_boxes, has_ball_3d
 from app.soccer.choices import LiveRule
 from app.soccer.codec import policy_to_json

@@ -9,7 +9,6 @@ from typing import Any
 from sqlalchemy import ColumnElement, and_, delete, func, insert, select
 from sqlalchemy.orm import InstrumentedAttribute
 
-from app.canonical import canonical
 from app.db.json_columns import Json, as_written, pack, parse, unpack
 from app.db.session import Session
 from app.evaluation.prediction_run import PredictedTrack
@@ -26,6 +25,7 @@ from app.features.predictions.tables import (
     PredictionSetModel,
 )
 from app.geometry.camera import Camera
+from app.json_text import canonical
 from app.soccer.codec import camera_from_json, camera_to_json
 
 _BATCH = 5000

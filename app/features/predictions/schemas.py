@@ -26,8 +26,8 @@ from app.features.predictions.accept import (
 )
 from app.features.predictions.queries import PredictedBox, PredictionSet
 from app.features.queue.query import MAX_LENGTH
-from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
+from app.json_text import MAX_ID
 from app.soccer.choices import AnyPredictionFormat
 from app.soccer.frames import MAX_SIDE, ImageSize
 

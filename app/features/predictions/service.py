@@ -12,7 +12,6 @@ from itertools import count
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from app.canonical import canonical
 from app.db.json_columns import Json
 from app.db.session import Session, now
 from app.db.store import Store
@@ -20,7 +19,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.evaluation.frame import Detection, FrameNames, NamedFrame
 from app.evaluation.prediction_files import ReadPredictedCameras
 from app.evaluation.prediction_run import ReadPredictions, list_unknown_frames
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.datasets.service import read_dataset_head, require_name
 from app.features.groups.view_queries import dataset_views
 from app.features.predictions.queries import PredictedBox as PredictedBox
@@ -36,10 +35,10 @@ from app.features.predictions.queries import (
     read_view_boxes,
 )
 from app.features.predictions.reader import PredictionFiles, Read, read_files
-from app.finite import quoted
 from app.formats.file_tree import Limits
 from app.formats.report import Report
 from app.geometry.camera import Camera
+from app.json_text import canonical, quoted
 from app.object_store.path import unseal_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media

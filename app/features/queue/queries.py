@@ -23,7 +23,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.visitors import iterate
 
-from app.db.dialects.statements import numbers_in
+from app.db.dialects.dialect import numbers_in
 from app.db.session import Session
 from app.features.agreement.queries import list_groups_in_states
 from app.features.batches.queries import groups_in_batches

@@ -25,7 +25,7 @@ from app.features.batches.queries import place_column
 from app.features.queue import queries as conditions
 from app.features.queue.fields import BY_NAME, FIELDS, ORDERS
 from app.features.queue.queries import Condition, Order
-from app.finite import MAX_ID
+from app.json_text import MAX_ID
 
 MAX_LENGTH = 1000
 MAX_LISTED_LENGTH = 100_000

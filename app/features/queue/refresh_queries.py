@@ -22,7 +22,7 @@ from sqlalchemy import (
 )
 from sqlalchemy import cast as cast_to
 
-from app.db.dialects.statements import insert_or_replace
+from app.db.dialects.dialect import insert_or_replace
 from app.db.session import Session
 from app.features.datasets.tables import (
     DatasetModel,

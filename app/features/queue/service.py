@@ -20,8 +20,8 @@ from app.features.independent_annotations.queries import count_submitted
 from app.features.queue.fields import STATUSES
 from app.features.queue.queries import Key, Listing, find_place, read_rows
 from app.features.queue.query import NUMBERS, Query, parse_query
-from app.finite import MAX_ID, json_text
 from app.geometry.arrays import FloatArray, IntArray
+from app.json_text import MAX_ID, json_text
 
 
 def encode(query: Query, keys: Sequence[Key]) -> str:

@@ -22,7 +22,6 @@ from app.features.recordings.ball_runs import (
     mend_run,
     remove_run,
 )
-from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
 from app.http.documents import document, no_content, responds
@@ -31,6 +30,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 
 router = APIRouter(
     prefix="/recordings/{recording}/ball-runs", tags=["recordings"], route_class=Route

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from app.canonical import canonical
 from app.db.idempotency import without_response
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.groups.bulk_edits import ViewEdits, edit_views
 from app.features.groups.edit import Edit, SetBalls
 from app.features.groups.queries import read_groups
@@ -31,6 +30,7 @@ from app.features.recordings.queries import (
 )
 from app.features.recordings.service import Recording, get_recording, need_recording
 from app.features.recordings.shots import get_shots
+from app.json_text import canonical
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall

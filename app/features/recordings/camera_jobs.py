@@ -17,7 +17,7 @@ from app.features.recordings.camera_tracking import (
 )
 from app.features.recordings.service import get_recording
 from app.features.solve.jobs import request_solve
-from app.plural import plural
+from app.wording import plural
 
 KIND = "track"
 

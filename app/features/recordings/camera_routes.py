@@ -26,7 +26,6 @@ from app.features.recordings.cameras import (
     pitch_of,
     read_cameras,
 )
-from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, etag_matches
 from app.http.documents import document, responds
@@ -35,6 +34,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)
 

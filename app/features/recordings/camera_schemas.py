@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from app.features.file_tools.track import frame_row
 from app.features.groups.schemas import PitchSize
 from app.features.recordings.cameras import CameraSummary
-from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
+from app.json_text import MAX_ID
 from app.soccer.pitch import Pitch
 from app.tracking.track import FrameCamera
 

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.canonical import canonical, digest_of
 from app.config import Settings
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ConflictError, InputError, StorageError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.datasets.service import get_dataset_head
 from app.features.file_tools.track import count_outcomes, pitch_row
 from app.features.pitches.queries import edited_pitches
@@ -38,6 +37,7 @@ from app.features.recordings.queries import (
     insert_cameras,
 )
 from app.features.recordings.service import Recording, get_recording, need_recording
+from app.json_text import canonical, digest_of
 from app.progress import ReportProgress
 from app.soccer.annotation import Lines
 from app.soccer.pitch import Pitch

@@ -12,12 +12,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from app.canonical import digest_of
 from app.config import Settings
 from app.durable import replace_file
 from app.errors import ConflictError, ImageError, OverloadedError, ReviewError
 from app.features.recordings.index import read_index
 from app.features.recordings.service import Recording
+from app.json_text import digest_of
 from app.media.files import JPEG_QUALITY
 from app.media.frames import refused_picture
 from app.video.frames import Image, RecordingReader

@@ -9,12 +9,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from app.canonical import canonical
 from app.config import Settings
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import ConflictError, ImageError, InputError, NotFoundError, StorageError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.recordings.queries import delete_links, update_recording
 from app.features.recordings.service import (
     Details,
@@ -25,6 +24,7 @@ from app.features.recordings.service import (
     recording_of,
 )
 from app.geometry.arrays import FloatArray
+from app.json_text import canonical
 from app.media.frames import refused_picture
 from app.progress import ReportProgress
 from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds

@@ -13,8 +13,8 @@ from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.errors import TooLargeError
-from app.features.imports.folders import resolve_folder
 from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
+from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, left_to_next_server
 from app.features.jobs.service import Jobs
@@ -30,8 +30,8 @@ from app.features.recordings.service import (
 )
 from app.features.recordings.shots import find_again
 from app.features.solve.jobs import request_solve
-from app.plural import plural
 from app.progress import ReportProgress
+from app.wording import plural
 from app.worker_process import WorkerEnded, WorkerLimits
 
 INDEX, INSTANTS = "recording", "instants"

@@ -22,7 +22,6 @@ from app.features.recordings.link_values import ShotLink, links_csv
 from app.features.recordings.links import add_link, get_link, list_links, remove_link, set_instants
 from app.features.recordings.routes import CSV_FILE
 from app.features.tracks.link_ball import request_ball_link
-from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch
 from app.http.documents import document, no_content, responds
@@ -30,6 +29,7 @@ from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
+from app.json_text import MAX_ID
 
 router = APIRouter(prefix="/recordings/{recording}", tags=["recordings"], route_class=Route)
 

@@ -11,8 +11,8 @@ from app.features.recordings.link_suggestions import LiveSuggestion
 from app.features.recordings.link_values import Instant, LinkedShot, LinkMap
 from app.features.recordings.links import MAX_INSTANTS
 from app.features.recordings.schemas import Frame
-from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
+from app.json_text import MAX_ID
 
 
 class LinkedLive(BaseModel):

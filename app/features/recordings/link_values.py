@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from app.canonical import digest_of
 from app.db.json_columns import parse
 from app.formats.csv_text import csv_line
 from app.geometry.arrays import FloatArray
+from app.json_text import digest_of
 from app.soccer.choices import LinkOutcome, LinkSource
 from app.tracking.time_map import TimeMap
 

@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from app.canonical import canonical
 from app.config import Settings
 from app.db.json_columns import parse
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.groups.state import require_etag
 from app.features.recordings.index import frame_seconds
 from app.features.recordings.link_values import (
@@ -41,8 +40,9 @@ from app.features.recordings.queries import (
 )
 from app.features.recordings.service import need_recording
 from app.geometry.arrays import FloatArray
-from app.plural import plural
+from app.json_text import canonical
 from app.tracking.time_map import map_of_instants
+from app.wording import plural
 
 MAX_INSTANTS = 100
 """Of a link; ten make a map as good as it gets."""

@@ -7,7 +7,6 @@ from typing import Annotated
 from anyio import to_thread
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from app.canonical import digest_of
 from app.features.datasets.service import dataset_id
 from app.features.groups.view_routes import CLIENT_GONE, FRAME, SECONDS, clamp_width
 from app.features.jobs.queries import Job
@@ -35,7 +34,6 @@ from app.features.recordings.service import (
     set_clocks,
 )
 from app.features.recordings.shots import RecordingShots, get_shots, put_shots, shots_csv
-from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DryRun, Id, IfMatch, SeesWhole, etag_matches
 from app.http.documents import as_document, document, no_content, responds
@@ -44,6 +42,7 @@ from app.http.permissions import Action, OwnedKind, Where, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
+from app.json_text import MAX_ID, digest_of
 from app.media.images import JPEG
 
 router = APIRouter(prefix="/recordings", tags=["recordings"], route_class=Route)

@@ -11,8 +11,8 @@ from app.features.imports.schemas import ImportPlace
 from app.features.recordings.instants import MOST_AT_ONCE
 from app.features.recordings.match_clock import MAX_CLOCKS, Half, MatchClock
 from app.features.recordings.shots import MAX_SHOTS, RecordingShots, Shot
-from app.finite import MAX_ID
 from app.http.documents import Document, ListDocument
+from app.json_text import MAX_ID
 from app.soccer.choices import ShotKind, ShotStart
 
 Frame = Annotated[int, Field(ge=0, le=MAX_ID)]

@@ -12,13 +12,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from app.canonical import canonical
 from app.db.idempotency import without_response
 from app.db.json_columns import parse
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset, require_name
 from app.features.recordings.match_clock import MatchClock, require_clocks
@@ -35,6 +34,7 @@ from app.features.recordings.queries import (
     update_recording,
 )
 from app.formats.frame_names import VIDEO_SUFFIXES
+from app.json_text import canonical
 from app.soccer.policy import TOUCHLINE
 
 Details = dict[str, str | int | None]

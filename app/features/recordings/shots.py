@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
-from app.canonical import canonical, digest_of
 from app.config import Settings
 from app.db.json_columns import parse
 from app.db.store import Store
 from app.errors import InputError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.groups.state import require_etag
 from app.features.recordings.index import frame_seconds, in_worker, shots_of
 from app.features.recordings.queries import RecordingRow, update_recording
 from app.features.recordings.service import Details, Recording, need_recording, recording_of
 from app.formats.csv_text import csv_line
-from app.plural import plural
+from app.json_text import canonical, digest_of
 from app.progress import ReportProgress
 from app.soccer.choices import ShotKind, ShotStart
+from app.wording import plural
 
 MAX_SHOTS = 20_000
 

@@ -19,7 +19,7 @@ from app.features.saved_views.queries import (
     find_saved_view,
     insert_saved_view,
 )
-from app.finite import Moment
+from app.json_text import Moment
 from app.soccer.actors import LOCAL_USER, person_of
 
 MAX_VIEWS = 200

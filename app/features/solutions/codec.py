@@ -18,8 +18,8 @@ from typing import Any, TypeVar
 import msgspec
 
 from app.db.json_columns import as_written
-from app.finite import look_through
 from app.geometry.camera import Camera
+from app.json_text import look_through
 from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.frames import ImagePoint, height_above_grass
 from app.soccer.group import Group

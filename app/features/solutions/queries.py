@@ -23,7 +23,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.statements import insert
+from app.db.dialects.dialect import insert
 from app.db.json_columns import as_written, decompress, parse
 from app.db.session import Base, Session
 from app.errors import ConflictError
@@ -31,7 +31,7 @@ from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.queue.tables import QueueModel
 from app.features.solutions import codec as value_codec
 from app.features.solutions.codec import SolutionSummary, summarize
-from app.finite import json_text
+from app.json_text import json_text
 from app.soccer.group import Group
 from app.soccer.solution import SOLVER_VERSION, Calibration, Solution
 
@@ -57,7 +57,7 @@ class SolutionModel(Base):
     """A solution without its calibrations, which ``calibrations`` (JSON list) names.
 
     ``summary`` (JSON) is what the queue shows of it. ``facts`` is what the gates read of the group
-    (``solving.facts_codec``), NULL for a solution from before they were kept.
+    (``solving.facts``), NULL for a solution from before they were kept.
     """
 
     __tablename__ = "solution"

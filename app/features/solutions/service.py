@@ -36,7 +36,6 @@ from app.features.solutions.queries import (
     unsolved_groups,
 )
 from app.features.solutions.stored_queries import KeptSolution, kept_solutions
-from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.group import Group, Station
@@ -44,9 +43,14 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
 from app.solving.calibrate import calibrate_station, calibration_key, view_keys
-from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
-from app.solving.rethreshold import differs_in_smaller_tau, has_unchanged_pairs, rethreshold
-from app.solving.solve import solve_with_facts
+from app.solving.facts import facts_from_bytes, facts_to_bytes
+from app.solving.solve import (
+    differs_in_smaller_tau,
+    has_unchanged_pairs,
+    rethreshold,
+    solve_with_facts,
+)
+from app.wording import plural
 from app.workers.executors import fan_out
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.policies.commands import read_policy_option
-from app.plural import plural
 from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, current_actor
 from app.terminal.server import (
     ServerPlace,
@@ -25,6 +24,7 @@ from app.terminal.terminal import (
     say,
     show_progress,
 )
+from app.wording import plural
 
 if TYPE_CHECKING:
     from app.soccer.policy import Policy

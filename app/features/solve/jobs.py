@@ -29,11 +29,11 @@ from app.features.policies.service import PolicyState, apply_policy
 from app.features.solutions.queries import unsolved_groups
 from app.features.solutions.service import SolveReport, solve_dataset, stale_groups
 from app.features.what_if.service import AT_ONCE, YieldStore
-from app.plural import plural
 from app.progress import ReportProgress
 from app.soccer.actors import LOCAL_USER
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
+from app.wording import plural
 
 
 def solve_fully(

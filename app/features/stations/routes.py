@@ -31,13 +31,13 @@ from app.features.stations.service import (
     submit_station,
     undo_station,
 )
-from app.finite import MAX_ID
 from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch, Services
 from app.http.documents import responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
 from app.http.route import Route
+from app.json_text import MAX_ID
 from app.soccer.choices import CalibrationChoice
 
 router = APIRouter(prefix="/stations", tags=["stations"], route_class=Route)

@@ -11,11 +11,11 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from app.canonical import canonical, digest_of
 from app.db.json_columns import Json, as_written, parse
 from app.features.tracks.stretches import Stretch
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
+from app.json_text import canonical, digest_of
 from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.pitch import Pitch
 from app.tracking.ball_correct import TrackPatch, correct_track, patched

@@ -47,10 +47,10 @@ from app.features.tracks.service import list_tracks, read_track
 from app.formats.report import Report
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.plural import plural
 from app.progress import ReportProgress
 from app.tracking.ball_rays import BallRays, ball_rays
 from app.tracking.link import map_of_ball, or_turned, ray_misses
+from app.wording import plural
 from app.worker_process import WorkerEnded, WorkerLimits
 
 KIND = "link"

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from app.canonical import canonical
 from app.db.json_columns import pack, parse, unpack
 from app.db.session import Session, now
 from app.db.store import Store
@@ -54,9 +53,10 @@ from app.features.tracks.stretches import (
     stored_as,
 )
 from app.formats.export_record import ExportRecord
-from app.plural import plural
+from app.json_text import canonical
 from app.progress import ReportProgress
 from app.tracking.ball_track import BallTrack, ViewJump
+from app.wording import plural
 
 BATCH = 200
 

@@ -23,7 +23,6 @@ from app.features.tracks.schemas import (
     TrackList,
 )
 from app.features.tracks.service import Track
-from app.finite import MAX_ID
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, IfMatch
 from app.http.documents import document, responds
@@ -32,6 +31,7 @@ from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
+from app.json_text import MAX_ID
 
 TAGGED = {"headers": {"ETag": {"description": "Of the track.", "schema": {"type": "string"}}}}
 router = APIRouter(tags=["tracks"], route_class=Route)

@@ -18,10 +18,10 @@ from app.features.tracks.service import (
     TrackedFrames,
     TrackSummary,
 )
-from app.finite import MAX_ID, finite
 from app.formats.tracks_writer import position_sigma
 from app.geometry.arrays import FloatArray
 from app.http.documents import Document, ListDocument
+from app.json_text import MAX_ID, finite
 from app.tracking.ball_correct import near_correction
 from app.tracking.ball_track import BallMode, BallState, Correction, EventKind
 

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
-from app.canonical import canonical
 from app.config import Settings
 from app.db.json_columns import Json, pack, parse, unpack
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.groups.state import require_etag
 from app.features.tracks.codec import (
@@ -45,6 +44,7 @@ from app.features.tracks.run_measurements import followed_observations, followed
 from app.features.tracks.stored import UNJUDGED, corrections_of, stored_track, summary_of
 from app.features.tracks.stored import Track as Track
 from app.features.tracks.stored import TrackSummary as TrackSummary
+from app.json_text import canonical
 from app.soccer.group import checked_note
 from app.soccer.policy import Policy
 from app.tracking.ball_correct import TrackPatch

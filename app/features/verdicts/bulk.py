@@ -38,8 +38,8 @@ from app.features.verdicts.queries import (
     update_batch,
 )
 from app.features.verdicts.service import Verdict, check_verdict
-from app.plural import plural
 from app.soccer.finding import makes_ball_unusable
+from app.wording import plural
 
 CHUNK = 100
 """Groups a transaction: two or three hundredths of a second, for which others wait to write."""

@@ -20,7 +20,7 @@ from app.features.groups.insert_queries import next_id
 from app.features.independent_annotations.submission_queries import judge_copy
 from app.features.people.visibility_queries import COPIES, shown_actor, visible_groups_condition
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
-from app.finite import json_text
+from app.json_text import json_text
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from app.features.verdicts.queries import (
     insert_verdicts,
     next_verdict_id,
 )
-from app.finite import Moment
+from app.json_text import Moment
 from app.soccer.choices import VerdictState
 from app.soccer.group import REASONS, Group, checked_note, require_explanation
 from app.soccer.solution import Solution

@@ -15,8 +15,8 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.versions.queries import annotation_rows
 from app.features.versions.service import Version, read_version
-from app.plural import plural
 from app.soccer.codec import policy_to_json
+from app.wording import plural
 
 NEW, GONE = "not in the dataset", "no longer in the dataset"
 

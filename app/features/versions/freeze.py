@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.canonical import canonical, digest_of
 from app.db.json_columns import Json, pack
 from app.db.log import Entry, append
 from app.db.session import Session, now
@@ -47,8 +46,8 @@ from app.features.versions.service import (
     read_version,
     version_hash,
 )
-from app.finite import quoted
 from app.formats.manifest import software_version
+from app.json_text import canonical, digest_of, quoted
 from app.media.files import media_facts
 from app.progress import ReportProgress
 from app.soccer.codec import policy_to_json

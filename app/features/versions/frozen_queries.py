@@ -10,12 +10,11 @@ import msgspec
 from sqlalchemy import ColumnElement, Table, exists, func, insert, or_, select, tuple_
 from zlib_ng import zlib_ng
 
-from app.canonical import canonical, digest_of
 from app.db.json_columns import Json, decompress, parse
 from app.db.session import Session
 from app.features.solutions.queries import CalibrationModel, read_calibration_bodies
-from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
-from app.finite import look_through
+from app.features.versions.queries import FrozenModel, VersionGroupModel, VersionModel
+from app.json_text import canonical, digest_of, look_through
 from app.soccer.codec import (
     group_without_views_to_json,
     positions_from_json,

@@ -15,10 +15,10 @@ from app.errors import ConflictError
 from app.features.versions.diff import read_changelog
 from app.features.versions.queries import candidate_rows, version_verdicts
 from app.features.versions.service import Version, read_version
-from app.plural import plural
 from app.soccer.choices import VersionRule
 from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy
+from app.wording import plural
 
 RULES: tuple[str, ...] = get_args(VersionRule)
 UNSOLVED = "not solved"

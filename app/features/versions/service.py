@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any
 
-from app.canonical import canonical
 from app.db.json_columns import Json, decompress, parse, parse_as
 from app.db.session import Session
 from app.db.store import Store
@@ -36,7 +35,7 @@ from app.features.versions.queries import (
     read_verifications,
     version_row,
 )
-from app.finite import quoted
+from app.json_text import canonical, quoted
 from app.soccer.codec import policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy, digested_values

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field
 from itertools import islice
 from typing import Any
 
-from app.canonical import canonical, digest_of
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
@@ -34,7 +33,7 @@ from app.features.versions.queries import (
     version_matches,
 )
 from app.features.versions.service import Version, calibration_names, read_version, version_hash
-from app.plural import plural
+from app.json_text import canonical, digest_of
 from app.progress import ReportProgress
 from app.soccer.group import Group
 from app.soccer.policy import Policy
@@ -42,6 +41,7 @@ from app.soccer.solution import SOLVER_VERSION, Calibration
 from app.soccer.split import Splitter
 from app.solving.calibrate import calibrate_station, calibration_key
 from app.solving.solve import solve
+from app.wording import plural
 from app.workers.executors import fan_out
 
 CHUNK = 40

@@ -15,7 +15,6 @@ from typing import Any
 
 from standardwebhooks import Webhook
 
-from app.canonical import canonical
 from app.config import Settings
 from app.db.home import WEBHOOKS, installation_key
 from app.db.json_columns import Json
@@ -23,6 +22,7 @@ from app.db.session import Session
 from app.features.jobs.queries import DONE, FAILED
 from app.features.webhooks import queries as webhook_outbox
 from app.features.webhooks.queries import entries_since, jobs_ended_since
+from app.json_text import canonical
 
 
 class Kind(StrEnum):

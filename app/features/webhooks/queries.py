@@ -10,8 +10,7 @@ from typing import Any, NamedTuple, cast
 
 from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
 
-from app.canonical import canonical
-from app.db.dialects.statements import insert
+from app.db.dialects.dialect import insert
 from app.db.json_columns import Json, parse
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session, now
@@ -19,6 +18,7 @@ from app.features.batches.queries import count_work, find_batch, list_batch_peop
 from app.features.datasets.queries import dataset_name
 from app.features.jobs.queries import JobModel
 from app.features.webhooks.tables import DeliveryModel, WebhookModel
+from app.json_text import canonical
 
 WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
 """States of a delivery."""

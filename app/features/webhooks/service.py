@@ -6,13 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from app.canonical import canonical
 from app.db.json_columns import parse
 from app.db.log import newest_entry
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
-from app.features.audit.audit_events import add_audit_event
+from app.features.audit.service import add_audit_event
 from app.features.datasets.queries import dataset_name
 from app.features.datasets.service import dataset_id
 from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping_message, webhook_secret
@@ -33,7 +32,7 @@ from app.features.webhooks.queries import (
     waiting_of_kind,
 )
 from app.features.webhooks.sender import require_allowed
-from app.finite import Moment
+from app.json_text import Moment, canonical
 
 MOST = 20
 """Webhooks of one dataset."""

@@ -32,8 +32,7 @@ from app.features.what_if.cache import (
     cached_table,
 )
 from app.features.what_if.table import EMPTY, YieldTable, join_tables, make_table
-from app.solving.facts import NOTHING, Facts, group_facts
-from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
+from app.solving.facts import NOTHING, Facts, facts_from_bytes, facts_to_bytes, group_facts
 
 CHUNK = 400
 """Groups that are read at once."""

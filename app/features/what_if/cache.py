@@ -18,8 +18,8 @@ import structlog
 from app.durable import replace_file
 from app.features.what_if.block_results import BlockResults, click_noise
 from app.features.what_if.table import FIGURES, HEADS, YieldTable
-from app.finite import json_text
 from app.geometry.arrays import BoolArray, IntArray
+from app.json_text import json_text
 from app.soccer.policy import Policy
 from app.solving.facts import COLUMNS, NOTHING, Facts
 from app.solving.judgement import Judgement

@@ -34,9 +34,9 @@ from app.features.what_if.cache import (
 )
 from app.features.what_if.table import EMPTY, YieldTable, join_tables
 from app.geometry.arrays import BoolArray
-from app.plural import plural
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
+from app.wording import plural
 
 MAX_BYTES = 512 * 1024 * 1024
 """What all tables together may hold in memory; beyond it the one that was asked for longest ago

@@ -15,8 +15,8 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError, NotFoundError, ReviewError, StorageError
-from app.features.imports.folders import list_folder, resolve_folder
-from app.features.integrity.home import examine_stores
+from app.features.imports.uploads import list_folder, resolve_folder
+from app.features.integrity.checks import examine_stores
 from app.formats.file_tree import Limits
 from app.formats.frames_reader import read_frame_list
 from app.formats.report import Report

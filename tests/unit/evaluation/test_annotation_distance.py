@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.evaluation.agreement_limits import AgreementLimits, find_disagreements, measure_spreads
 from app.evaluation.annotation_distance import (
     compare_annotations,
     compare_balls,
     compare_balls_3d,
     compare_lines,
 )
+from app.evaluation.rater_agreement import AgreementLimits, find_disagreements, measure_spreads
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group

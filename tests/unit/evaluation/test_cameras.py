@@ -8,7 +8,7 @@ import pytest
 from app.evaluation.bootstrap import Resamples
 from app.evaluation.cameras import cameras_table, jac_figure, score_cameras
 from app.evaluation.result import FrameRange
-from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.geometry.camera import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
 from app.soccer.pitch import MARKINGS, Pitch
 from app.solving.score import score_frame

@@ -15,11 +15,10 @@ from app.formats.camera_json import (
     covariance_from_json,
     covariance_to_json,
 )
-from app.formats.cameras_writer import camera_file_text
+from app.formats.cameras import camera_file_text
 from app.geometry.arrays import row_by_row
-from app.geometry.camera import Camera
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.resection import camera_from_parameters, parameters_from_camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.frames import ImageSize
 from tests.cameras import CENTER, SIZE, WIDE_LENSES, looking, wide
 

@@ -7,9 +7,9 @@ import pytest
 
 from app.errors import InputError
 from app.features.exports.service import export_dataset
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
-from app.formats.parquet_reader import read_parquet
+from app.formats.parquet import read_parquet
 from app.formats.report import Report
 from app.soccer.group import Station
 from tests.balls import box_around

@@ -12,17 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.errors import InputError, UnsafePathError
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.export_record import ExportRecord
 from app.formats.report import Report
-from app.formats.sn_calibration import (
-    DEFAULT_SIZE,
-    LineFile,
-    line_frame_path,
-    soccernet_marking_name,
-)
+from app.formats.sn_calibration import DEFAULT_SIZE, LineFile, line_frame_path
 from app.formats.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
 from app.formats.sn_calibration_writer import lines_to_json, write_line_files, write_sn_calibration
+from app.formats.soccernet_v3 import soccernet_marking_name
 from app.geometry.camera import Camera
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from app.errors import DatasetFormatError
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.formats.synloc import camera_from_synloc
-from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.geometry.camera import rotation_from_pan_tilt_roll
 
 # The highest term first, as the files have it.
 POLYNOMIAL = (0.037, -0.181, 0.268, 0.037, -0.408, 0.251, -0.119, 0.769, -7.1e-4)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from app.formats.camera_json import camera_to_json
-from app.formats.issia_3d_reader import open_issia_3d
+from app.formats.issia_3d import open_issia_3d
 from app.formats.issia_reader import IssiaOptions, open_issia
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_sn_calibration

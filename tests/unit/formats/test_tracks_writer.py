@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from app.errors import InputError
-from app.formats.camera_arrays import read_camera_arrays
+from app.formats.camera_matrix import read_camera_arrays
 from app.formats.file_tree import Limits
 from app.formats.tracks_writer import (
     TrackRecord,

@@ -19,8 +19,7 @@ from app.formats.report import Report
 from app.formats.safe_path import is_hidden, read_regular_file
 from app.formats.soccernet_v3 import MatchFrames
 from app.formats.soccernet_v3_reader import read_soccernet_v3
-from app.formats.trees import FolderTree, open_tree, opened_tree
-from app.formats.zip_tree import ZipTree
+from app.formats.trees import FolderTree, ZipTree, open_tree, opened_tree
 from app.media.object_frames import Archives
 
 MakeZip = Callable[..., Path]

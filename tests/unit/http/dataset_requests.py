@@ -19,9 +19,9 @@ from app.features.predictions.reader import PredictionFiles, read_files
 from app.features.predictions.service import add_predictions
 from app.features.recordings.camera_tracking import Tracked, save_cameras
 from app.features.recordings.service import get_recording
-from app.finite import json_text
 from app.formats.frame_names import frame_path_in_split
 from app.http.team import get_team
+from app.json_text import json_text
 from app.sample.scene import TRUTH, truth_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, Station, View

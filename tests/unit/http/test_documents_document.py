@@ -11,8 +11,8 @@ from pydantic import Field, ValidationError
 from app.features.groups.solution_schemas import FailingGate
 from app.features.policies.schemas import PolicyDocument
 from app.features.predictions.evaluation_routes import FrameList
-from app.finite import Day, Moment
 from app.http.documents import Document, json_of
+from app.json_text import Day, Moment
 from app.soccer.policy import PAPER
 from app.soccer.solution import Gate
 

@@ -1,8 +1,246 @@
+"""Request bodies: JSON alone, capped while they arrive."""
+
 from __future__ import annotations
 
+import asyncio
+import json
 import re
+import time
+from collections.abc import Sequence
+from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from starlette.datastructures import Headers
+
+from app.http import requests
+from app.http.requests import (
+    _STRINGS,
+    MAX_CONTAINERS,
+    MAX_DEPTH,
+    MAX_NAME,
+    MAX_NAMES,
+    MAX_VALUES,
+    BodyError,
+    TimedBody,
+    _without_strings,
+    read_body,
+    read_json,
+    require_json_type,
+)
+
+
+def refusal(body: bytes) -> str:
+    with pytest.raises(BodyError) as caught:
+        read_json(body)
+    assert caught.value.status == 400
+    return caught.value.detail
+
+
+class Sender:
+    """Sends parts of a body, each after a pause, seconds."""
+
+    def __init__(self, parts: Sequence[tuple[float, bytes]], *, ends: bool = True):
+        self._parts, self._ends = list(parts), ends
+
+    async def receive(self) -> Any:
+        if not self._parts:
+            await asyncio.Event().wait()
+        pause, part = self._parts.pop(0)
+        await asyncio.sleep(pause)
+        more = bool(self._parts) or not self._ends
+        return {"type": "http.request", "body": part, "more_body": more}
+
+
+class TestTimedBody:
+    def test_one_that_stops_is_not_waited_for(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(requests, "BODY_SECONDS", 0.05)
+        sender = Sender([(0.0, b"[1, ")], ends=False)
+        with pytest.raises(BodyError, match="the rest of the request did not come") as caught:
+            asyncio.run(read_body(Headers(), sender.receive, 100))
+        assert caught.value.status == 408
+        assert caught.value.response().headers["connection"] == "close"
+
+    def test_one_that_comes_drop_by_drop_is_not_waited_for(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(requests, "BODY_SECONDS", 0.1)
+        sender = Sender([(0.03, b" ")] * 100)
+        with pytest.raises(BodyError, match="did not come"):
+            asyncio.run(read_body(Headers(), sender.receive, 1000))
+
+    def test_one_that_comes_steadily_may_take_any_time(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(requests, "BODY_SECONDS", 30.0)
+        monkeypatch.setattr(requests, "BODY_BYTES", 10)
+
+        async def seconds_left() -> list[float]:
+            body = TimedBody(Sender([(0.01, b"0123456789"), (0.01, b"01234")] * 3).receive)
+            left = []
+            for _ in range(6):
+                await body.receive()
+                left.append(body._seconds)
+            return left
+
+        left = asyncio.run(seconds_left())
+        assert left[::2] == [30.0, 30.0, 30.0]
+        assert all(one < 30.0 for one in left[1::2])
+
+    def test_what_the_server_takes_between_two_parts_is_not_counted(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(requests, "BODY_SECONDS", 5.0)
+
+        async def seconds_left() -> float:
+            body = TimedBody(Sender([(0.0, b"0"), (0.0, b"1")]).receive)
+            await body.receive()
+            await asyncio.sleep(0.3)
+            await body.receive()
+            return body._seconds
+
+        assert asyncio.run(seconds_left()) > 4.8
+
+
+class TestWithoutStrings:
+    @settings(deadline=None, derandomize=True)
+    @given(st.text('"[]{},:ab').map(str.encode))
+    def test_the_quick_way_leaves_what_the_pattern_leaves(self, body: bytes) -> None:
+        assert _without_strings(body) == _STRINGS.sub(b"", body)
+
+    def test_a_bracket_behind_an_escaped_quote_is_text(self) -> None:
+        assert _without_strings(rb'{"a\"[": 1}') == b"{: 1}"
+
+
+class TestReadJson:
+    @settings(deadline=None, derandomize=True)
+    @given(
+        st.recursive(
+            st.none()
+            | st.booleans()
+            | st.integers(-(2**70), 2**70)
+            | st.floats(allow_nan=False, allow_infinity=False)
+            | st.text(st.characters(exclude_categories=["Cs"])),
+            lambda inner: (
+                st.lists(inner, max_size=3)
+                | st.dictionaries(st.text('ab"[]{}\\', max_size=4), inner, max_size=3)
+            ),
+            max_leaves=10,
+        )
+    )
+    def test_takes_every_json_value_that_is_flat_enough(self, value: Any) -> None:
+        assert read_json(json.dumps(value).encode()) == value
+
+    @pytest.mark.parametrize("word", [b"NaN", b"Infinity", b"-Infinity"])
+    def test_constants_of_javascript_are_no_numbers(self, word: bytes) -> None:
+        assert "not a number" in refusal(b'{"x": [' + word + b"]}")
+
+    def test_a_number_that_overflows_is_refused(self) -> None:
+        assert "too large" in refusal(b"[1e999]")
+
+    def test_an_integer_of_five_thousand_digits_is_refused(self) -> None:
+        assert "not JSON" in refusal(b"1" * 5000)
+
+    def test_one_level_too_deep_is_refused(self) -> None:
+        read_json(b"[" * MAX_DEPTH + b"]" * MAX_DEPTH)
+        assert "levels" in refusal(b"[" * (MAX_DEPTH + 1) + b"]" * (MAX_DEPTH + 1))
+
+    def test_brackets_inside_of_texts_do_not_count(self) -> None:
+        texts = ["[" * 100, '"' + "{" * 100]
+        assert read_json(json.dumps(texts).encode()) == texts
+
+    def test_two_million_brackets_are_refused_at_once(self) -> None:
+        start = time.process_time()
+        assert "levels" in refusal(b"[" * 2_000_000)
+        assert time.process_time() - start < 0.5
+
+    def test_two_million_quotes_are_refused_at_once(self) -> None:
+        start = time.process_time()
+        refusal(b'\\"' * 1_000_000)
+        refusal(b'"' + b'\\"' * 1_000_000)
+        assert time.process_time() - start < 0.5
+
+    def test_more_lists_and_objects_than_any_request_needs_are_refused(self) -> None:
+        read_json(b"[" + b"{}," * (MAX_CONTAINERS - 2) + b"[]]")
+        assert "lists and objects" in refusal(b"[" + b"{}," * (MAX_CONTAINERS - 1) + b"[]]")
+        read_json(json.dumps(["[]" * MAX_CONTAINERS]).encode())
+
+    def test_more_values_than_any_request_needs_are_refused(self) -> None:
+        read_json(b"[" + b"1," * MAX_VALUES + b"1]")
+        assert "values" in refusal(b"[" + b"1," * (MAX_VALUES + 1) + b"1]")
+        read_json(json.dumps(["," * 2 * MAX_VALUES]).encode())
+
+    def test_more_and_longer_names_than_any_object_needs_are_refused(self) -> None:
+        names = [f"n{number}" for number in range(MAX_NAMES)]
+        read_json(json.dumps([dict.fromkeys(names, 1)] * 2).encode())
+        assert "keys" in refusal(json.dumps(dict.fromkeys([*names, "one more"], 1)).encode())
+        read_json(json.dumps({"x" * MAX_NAME: "y" * 2 * MAX_NAME}).encode())
+        assert "characters" in refusal(json.dumps({"x" * (MAX_NAME + 1): 1}).encode())
+
+    def test_a_large_exponent_is_no_mistake_where_the_number_is_small(self) -> None:
+        assert read_json(b"[1e3, 0.000e400, 1e-999]") == [1000.0, 0.0, 0.0]
+        assert "too large" in refusal(b"[" + b"9" * 400 + b".0]")
+
+    def test_another_encoding_is_refused(self) -> None:
+        assert "UTF-8" in refusal('{"a": "ä"}'.encode("latin-1"))
+        refusal('{"a": 1}'.encode("utf-16"))
+
+    def test_half_of_a_unicode_surrogate_pair_is_refused(self) -> None:
+        read_json(rb'"\ud83d\ude00"')
+        assert "Unicode" in refusal(rb'{"note": "\ud800"}')
+
+    @pytest.mark.parametrize(
+        "body", [b'{"a": 1, "a": 2}', b'[{"b": {"a": 1, "\\u0061": 2}}]', b'{"a": 1, "a": 1}']
+    )
+    def test_a_name_that_stands_twice_in_one_object_is_refused(self, body: bytes) -> None:
+        read_json(b'[{"a": {"a": 1}}, {"a": 2}]')
+        assert refusal(body) == 'the body names "a" more than once'
+
+    def test_the_place_of_a_mistake_is_told(self) -> None:
+        assert refusal(b'{"a": }').endswith("at character 6")
+
+
+class TestRequireJsonType:
+    @pytest.mark.parametrize(
+        "kinds",
+        [
+            [],
+            ["text/plain"],
+            ["application/x-www-form-urlencoded"],
+            ["multipart/form-data; boundary=x"],
+            ["application/json; charset=utf-16"],
+            ["text/plain; application/json"],
+            ["application/json", "text/plain"],
+            [""],
+        ],
+    )
+    def test_everything_else_is_415(self, kinds: list[str]) -> None:
+        with pytest.raises(BodyError) as caught:
+            require_json_type(kinds)
+        assert caught.value.status == 415
+
+
+class TestNullCharacters:
+    """PostgreSQL cannot keep U+0000 in a text; SQLite could, and its home could then not be moved."""
+
+    @pytest.mark.parametrize(
+        ("body", "place"),
+        [
+            (rb'{"text": "a\u0000b"}', "/text"),
+            (rb'{"lines": [{"x": 1}, {"note": "\u0000"}]}', "/lines/1/note"),
+            (rb'"\u0000"', "/"),
+            (rb'{"a": {"\u0000": 1}}', "/a"),
+        ],
+    )
+    def test_a_text_that_holds_one_is_refused_by_its_place(self, body: bytes, place: str) -> None:
+        assert (
+            refusal(body) == f'the text at "{place}" in the body holds U+0000, which is not stored'
+        )
+
+    def test_a_backslash_before_it_makes_it_a_text_about_it(self) -> None:
+        assert read_json(rb'{"text": "\\u0000"}') == {"text": r"\u0000"}
+
 
 API = "/api/v1"
 

@@ -9,10 +9,10 @@ import pytest
 from fastapi import APIRouter, FastAPI, Request
 
 from app.errors import ForbiddenError, NotLoggedInError
-from app.http.bodies import MAX_STRANGERS_BYTES
 from app.http.errors import install_handlers
 from app.http.permissions import Action, OwnedKind, Where, may, open_to_all
 from app.http.request_limits import RequestLimits
+from app.http.requests import MAX_STRANGERS_BYTES
 from app.http.route import Gate, Route, answer_no_route, list_routes, require_permissions
 
 JSON = [(b"content-type", b"application/json")]

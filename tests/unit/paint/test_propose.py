@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.geometry.camera import rotation_from_pan_tilt_roll
 from app.paint.agreement import PaintAgreement
 from app.paint.candidates import Library
 from app.paint.evidence import find_paint, read_picture, to_paint_evidence, trace_visible_markings

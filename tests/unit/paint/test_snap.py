@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.geometry.camera import Camera
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.resection import parameters_from_camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.paint.evidence import Evidence, to_paint_evidence
 from app.paint.snap import CURVED, _has_enough_paint, snap_camera
 from app.paint.tracing import TracedPlaces

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.geometry.camera import Camera
-from app.geometry.rotation import rotation_from_pan_tilt_roll
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.paint.evidence import Evidence, Reading, read_picture, trace_visible_markings
 from app.paint.snap import SnappedCamera, _has_enough_paint, snap_camera
 from app.paint.tracing import PAINTED, TracedPlaces

@@ -8,9 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from app.geometry.camera import Camera
 from app.sample import cameras as observability
-from app.sample.cameras import estimate_certainty
+from app.sample.cameras import COARSE, estimate_certainty, is_inside_image
 from app.sample.scene import Scene
-from app.sample.views import COARSE, is_inside_image
 
 
 def _moved(camera: Camera, step: np.ndarray) -> Camera:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.sample.cameras import PITCH
 from app.sample.faults import (
     BALL_SHIFT_M,
     POINT_SHIFT_PX,
@@ -15,7 +16,6 @@ from app.sample.faults import (
     plant_annotation_fault,
 )
 from app.sample.scene import FAULT_KINDS, PlantedFault, Scene
-from app.sample.views import PITCH
 from app.soccer.annotation import make_lines
 from app.soccer.group import View
 from app.soccer.pitch import MARKINGS, opposite_marking

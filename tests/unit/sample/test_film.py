@@ -8,6 +8,7 @@ import pytest
 from app.geometry.camera import Camera
 from app.paint.evidence import find_paint, read_picture, trace_visible_markings
 from app.paint.grass import field_of_play
+from app.sample.cameras import CENTER, CORNER_RADIUS
 from app.sample.film import (
     Backdrop,
     add_grain,
@@ -17,9 +18,7 @@ from app.sample.film import (
     render_picture,
 )
 from app.sample.fixture import make_fixture
-from app.sample.instant import PEOPLE, Instant
-from app.sample.play import make_play
-from app.sample.views import CENTER, CORNER_RADIUS
+from app.sample.play import PEOPLE, Instant, make_play
 from app.soccer.pitch import Pitch
 
 LOOK = make_fixture(1, 5).look

@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.sample.instant import PEOPLE
 from app.sample.play import (
     BALL_STEP,
     GRAVITY,
+    PEOPLE,
     PEOPLE_STEP,
     RADIUS,
     SPRINT,

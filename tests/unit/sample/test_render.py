@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from app.errors import NotFoundError
+from app.sample.cameras import COARSE, is_inside_image
 from app.sample.render import Image, render
 from app.sample.scene import Scene
-from app.sample.views import COARSE, is_inside_image
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.sample.cameras import MIN_PARALLAX, parallax_angle_at_ball
+from app.sample.cameras import MIN_PARALLAX, PITCH, parallax_angle_at_ball
 from app.sample.order import SEED
 from app.sample.scene import Scene
-from app.sample.scenes import make_match, true_ball_box
+from app.sample.scenes import BOX_EXCESS, loose_box, make_match, true_ball_box, visible_paths
+from app.soccer.frames import Box
+from app.soccer.pitch import CIRCLES, MARKINGS
 from app.soccer.policy import PAPER, TOUCHLINE
 from app.solving.solve import solve
 from tests.scenes import make_scenes
@@ -90,3 +92,109 @@ class TestBallBox:
         expected = PAPER.ball_diameter_m * view.camera.focal_length[0] / depth
         assert box.diameter == pytest.approx(expected, rel=0.06)
         assert box == view.ball_box
+
+
+class TestClickLines:
+    def test_clicks_lie_on_the_projected_markings_but_for_their_noise(
+        self, clean_scenes: list[Scene]
+    ):
+        distances = []
+        for scene in clean_scenes:
+            for view in scene.group.views:
+                camera = scene.truth.view(view.key).camera
+                for marking, points in view.station.lines.items():
+                    curve = camera.project(PITCH.sample(marking, 0.03, 0.03))
+                    curve = curve[np.isfinite(curve[:, 0])]
+                    offset = np.array(points)[:, None] - curve[None]
+                    distances.extend(np.linalg.norm(offset, axis=2).min(axis=1))
+        # A Rayleigh tail of at most 1.1 px a click: one in a million beyond 5.8 px.
+        assert max(distances) < 7.0
+        assert 0.4 < np.median(distances) < 1.3
+
+    def test_clicks_stay_within_the_image_but_for_their_noise(self, clean_scenes: list[Scene]):
+        for scene in clean_scenes:
+            for view in scene.group.views:
+                points = np.array([p for line in view.station.lines.values() for p in line])
+                assert (points > -6).all()
+                assert (points < [1279 + 6, 719 + 6]).all()
+
+    def test_lines_have_two_to_eight_points_and_circles_five_to_twelve(
+        self, clean_scenes: list[Scene]
+    ):
+        for scene in clean_scenes:
+            for view in scene.group.views:
+                for marking, points in view.station.lines.items():
+                    low, high = (5, 12) if marking in CIRCLES else (2, 8)
+                    assert low <= len(points) <= high
+
+    def test_some_markings_are_not_in_order(self, clean_scenes: list[Scene]):
+        turns = 0
+        for scene in clean_scenes:
+            for view in scene.group.views:
+                for marking, points in view.station.lines.items():
+                    if marking in CIRCLES or len(points) < 4:
+                        continue
+                    array = np.array(points)
+                    along = (array - array[0]) @ (array[-1] - array[0])
+                    turns += bool((np.diff(along) < -100).any())
+        assert turns > 5
+
+
+class TestVisiblePaths:
+    def test_a_cut_marking_ends_on_the_border(self, clean_scenes: list[Scene]):
+        camera = clean_scenes[0].truth.views[0].camera
+        paths = visible_paths(camera)
+        seen = np.flatnonzero(paths.lengths > 5)
+        assert len(seen) > 5
+        for number in seen:
+            for share in (0.0, 1.0):
+                x, y = paths.pixels_at(np.array([number]), np.array([share]))[0]
+                ends = camera.project(PITCH.sample(MARKINGS[number], 0.5, 0.5)[[0, -1]])
+                at_end = np.nanmin(np.linalg.norm(ends - (x, y), axis=1), initial=np.inf)
+                at_border = min(x, 1279 - x, y, 719 - y)
+                # The central circle has no end of its own.
+                assert MARKINGS[number] == "Circle central" or min(at_end, abs(at_border)) < 0.1
+
+    def test_half_of_the_length_is_half_of_the_way(self, clean_scenes: list[Scene]):
+        paths = visible_paths(clean_scenes[0].truth.views[0].camera)
+        number = int(np.argmax(paths.lengths * [name not in CIRCLES for name in MARKINGS]))
+        start, middle, end = paths.pixels_at(np.full(3, number), np.array([0.0, 0.5, 1.0]))
+        # Distortion bends the line a little.
+        assert middle == pytest.approx((start + end) / 2, abs=12)
+
+
+class TestLooseBox:
+    def test_boxes_are_ten_to_forty_per_cent_too_large(self):
+        rng = np.random.default_rng(1)
+        tight = Box(300.0, 200.0, 20.0, 20.0)
+        ratios = [loose_box(rng, tight).box.diameter / 20 for _ in range(400)]
+        low, high = BOX_EXCESS
+        assert 1 + low - 0.05 < min(ratios) < 1 + low + 0.05
+        assert 1 + high - 0.1 < max(ratios) < 1 + high + 0.06
+
+    def test_the_size_error_is_like_the_papers(self):
+        rng = np.random.default_rng(2)
+        tight = Box(300.0, 200.0, 12.0, 12.0)
+        errors = [
+            100 * abs(loose_box(rng, tight).box.diameter - 12) / np.hypot(12, 12)
+            for _ in range(400)
+        ]
+        assert 16 < np.mean(errors) < 21
+
+
+class TestPersonBoxes:
+    def test_the_same_person_has_the_same_class_and_id_in_all_views(
+        self, clean_scenes: list[Scene]
+    ):
+        shared = 0
+        for scene in clean_scenes:
+            seen = [
+                {(box["class"], box["ID"]) for box in view.extras.boxes}
+                for view in scene.group.views
+            ]
+            assert all(
+                len(people) == len(v.extras.boxes)
+                for people, v in zip(seen, scene.group.views, strict=True)
+            )
+            shared += len(set.intersection(*seen))
+        assert shared > 5 * len(clean_scenes)

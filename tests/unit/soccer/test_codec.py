@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.canonical import canonical
 from app.db.json_columns import pack, parse, unpack
 from app.errors import InputError
 from app.features.groups.digest import station_digest
 from app.geometry.camera import Camera
+from app.json_text import canonical
 from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize

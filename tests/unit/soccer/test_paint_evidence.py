@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from app.errors import InputError
-from app.finite import json_text
+from app.json_text import json_text
 from app.soccer.paint_evidence import (
     PaintEvidence,
     PaintPoint,

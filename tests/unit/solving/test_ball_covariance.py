@@ -24,8 +24,7 @@ from app.solving.ball_covariance import (
     major_axis_sigma,
     pixel_covariance,
 )
-from app.solving.facts import group_facts, join_facts
-from app.solving.facts_codec import facts_from_bytes, facts_to_bytes
+from app.solving.facts import facts_from_bytes, facts_to_bytes, group_facts, join_facts
 from app.solving.judgement import judge_groups
 from app.solving.observations import principal_point
 from app.solving.picture_camera import picture_of, warp_of

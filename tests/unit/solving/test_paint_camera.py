@@ -8,11 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from app.geometry.camera import Camera
+from app.features.groups.solution_schemas import camera_sigma
+from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.geometry.polyline import clip_polyline
-from app.geometry.rotation import rotation_from_pan_tilt_roll
 from app.soccer.annotation import make_lines
-from app.soccer.camera_sigma import camera_sigma
 from app.soccer.finding import Fix
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View

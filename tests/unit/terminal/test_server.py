@@ -34,14 +34,14 @@ from app.features.predictions.service import list_predictions
 from app.features.solutions.service import solve_dataset
 from app.features.solve.jobs import solve_fully
 from app.features.versions.service import list_versions
-from app.finite import json_text
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.http.server import listen, make_server
 from app.http.team import Team
+from app.json_text import json_text
 from app.log import log_to_stderr
 from app.main import create_app
 from app.soccer.policy import PAPER
-from app.terminal.remote_files import write_evaluation
+from app.terminal.remote import write_evaluation
 from app.terminal.server import ABLE, ServerPlace, _command_error, connect_to_server, read_token
 from app.terminal.terminal import INTERRUPTED
 from tests.scenes import make_scenes

@@ -17,7 +17,7 @@ from PIL import Image
 from app.formats.export_record import ExportRecord, frame_name
 from app.formats.manifest import Manifest, write_manifest
 from app.formats.output import output_tree, write_zip
-from app.formats.parquet_writer import write_parquet
+from app.formats.parquet import write_parquet
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from tests.scenes import make_scenes

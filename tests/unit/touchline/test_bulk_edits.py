@@ -9,7 +9,7 @@ import pytest
 
 from app.features.groups import bulk_edits as server
 from app.features.groups.edit_codec import REQUEST_POINTS
-from app.http import bodies
+from app.http import requests
 from touchline import bulk_edits
 from touchline.bulk_edits import requests_of
 from touchline.client import Client
@@ -33,9 +33,9 @@ class TestRequestsOf:
     def test_its_limits_are_the_servers(self) -> None:
         assert bulk_edits.MAX_ITEMS == server.MAX_ITEMS
         assert bulk_edits.MAX_POINTS == REQUEST_POINTS
-        assert bulk_edits.MAX_BRACKETS < bodies.MAX_CONTAINERS
-        assert bulk_edits.MAX_COMMAS < bodies.MAX_VALUES
-        assert bulk_edits.MAX_BYTES < bodies.MAX_JSON_BYTES
+        assert bulk_edits.MAX_BRACKETS < requests.MAX_CONTAINERS
+        assert bulk_edits.MAX_COMMAS < requests.MAX_VALUES
+        assert bulk_edits.MAX_BYTES < requests.MAX_JSON_BYTES
 
     def test_every_item_is_sent_once_and_none_of_a_group_apart(self) -> None:
         items = [item(number, etag=f'"{number % 150}"') for number in range(450)]
@@ -61,8 +61,8 @@ class TestRequestsOf:
         for chunk in chunks:
             text = dumps({"if_match": "*", "items": [one for _, one in chunk]})
             if "group" not in more:
-                assert bodies.read_json(text.encode()) == loads(text)
-                assert len(text) < bodies.MAX_JSON_BYTES
+                assert requests.read_json(text.encode()) == loads(text)
+                assert len(text) < requests.MAX_JSON_BYTES
 
 
 class TestEditViews:

@@ -6,7 +6,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError, ForbiddenError, NotFoundError
-from app.evaluation.agreement_limits import AgreementLimits
+from app.evaluation.rater_agreement import AgreementLimits
 from app.features.agreement import service as weigh
 from app.features.agreement.adjudicate import (
     adopt_into_group,
@@ -27,7 +27,7 @@ from app.features.independent_annotations.service import (
     get_annotation,
     list_annotations,
 )
-from app.features.integrity.database import examine_database
+from app.features.integrity.checks import examine_database
 from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.queue.service import list_groups

@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from app.db.dialects.dialect import dialect_of
 from app.db.store import Store
-from app.features.audit.audit_events import assign_local_work
+from app.features.audit.service import assign_local_work
 from app.features.comments import service as comments
 from app.features.comments.service import examine_threads
 from app.features.datasets.service import delete_dataset

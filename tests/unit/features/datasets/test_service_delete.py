@@ -16,8 +16,7 @@ from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
-from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
+from app.features.imports.ingest import UnassignedFrame, ingest, ingest_unassigned
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, Logins, read_roles
 from app.features.people.roles import DatasetRoles, Role, Scope

@@ -22,11 +22,11 @@ from app.features.groups.submit import load
 from app.features.imports.cameras import ingest_cameras
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
 from app.formats.export_formats import FORMATS, TRACKS, options_used_by
 from app.formats.gamestate_reader import read_gamestate
-from app.formats.parquet_reader import read_parquet
+from app.formats.parquet import read_parquet
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_sn_calibration
 from app.soccer.annotation import BallAnnotation, make_lines

@@ -18,7 +18,7 @@ from app.features.groups.submit import load
 from app.features.predictions.frames import live_truth, version_truth
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.service import find_version
-from app.formats.parquet_writer import import_pyarrow
+from app.formats.parquet import import_pyarrow
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.ball_boxes import ball_boxes, ball_fit, has_ball_3d
 from app.soccer.frames import Box, ImagePoint

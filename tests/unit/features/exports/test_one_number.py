@@ -18,7 +18,7 @@ from app.features.groups.schemas import GroupDocument
 from app.features.groups.submit import load
 from app.features.imports.ingest import ingest
 from app.features.policies.service import change_policy
-from app.features.queue.schemas import GroupRow
+from app.features.queue.routes import GroupRow
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.soccer.policy import PAPER, TOUCHLINE, Policy

@@ -10,7 +10,7 @@ import pytest
 from app.errors import DatasetFormatError
 from app.features.file_tools.calibrate import calibrate_files
 from app.features.file_tools.matches import choose_picture, estimate_picture_of_files, read_picture
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_writer import write_line_files

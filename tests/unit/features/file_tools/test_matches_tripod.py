@@ -11,8 +11,7 @@ import pytest
 
 from app.errors import InputError
 from app.features.file_tools.matches import DrawnFrame, share_tripods
-from app.formats.cameras_reader import read_cameras
-from app.formats.cameras_writer import camera_file_name, camera_file_text
+from app.formats.cameras import camera_file_name, camera_file_text, read_cameras
 from app.formats.report import Report
 from app.geometry.arrays import row_by_row
 from app.geometry.resection import LOG_FOCAL, PAN, camera_from_parameters, parameters_from_camera

@@ -13,7 +13,7 @@ import pytest
 from app.config import Settings
 from app.errors import InputError
 from app.features.file_tools.paint import UniqueNames, agree_files, snap_files
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.formats.sn_calibration import LineFile
 from app.formats.sn_calibration_reader import read_line_files

@@ -12,7 +12,7 @@ import pytest
 from app.errors import InputError
 from app.features.file_tools import track
 from app.features.file_tools.track import count_outcomes, frame_row, pitch_row, track_files
-from app.formats.cameras_reader import read_cameras
+from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch

@@ -14,8 +14,7 @@ from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
-from app.features.imports.ingest import ingest
-from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned
+from app.features.imports.ingest import UnassignedFrame, ingest, ingest_unassigned
 from app.features.match_estimates.queries import Factor
 from app.features.policies.service import change_policy
 from app.features.stations.service import load_station, submit_station, undo_station

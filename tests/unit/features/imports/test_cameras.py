@@ -19,7 +19,7 @@ from app.features.imports.sources import Source, import_source
 from app.features.solutions.service import solve_dataset, stale_groups
 from app.features.stations.service import load_station, submit_station
 from app.formats.camera_json import covariance_to_json
-from app.formats.cameras_writer import camera_file_text
+from app.formats.cameras import camera_file_text
 from app.geometry.arrays import row_by_row
 from app.soccer.frames import ImageSize
 from tests.cameras import FULL_HD

@@ -28,9 +28,13 @@ from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.edits_export import GROUPS, STATIONS
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import (
+    UnassignedFrame,
+    ingest,
+    ingest_unassigned,
+    unassigned_frames,
+)
 from app.features.imports.merge import merge_edits
-from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned, unassigned_frames
 from app.features.pitches.service import change_pitches, read_pitches
 from app.features.policies.service import change_policy
 from app.features.solutions.service import solve_dataset

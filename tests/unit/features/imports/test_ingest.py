@@ -13,10 +13,16 @@ from app.features.groups.history import read_history, undo
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
-from app.features.imports.ingest import ensure_dataset, ingest
+from app.features.imports.ingest import (
+    UnassignedFrame,
+    ensure_dataset,
+    ingest,
+    ingest_unassigned,
+    unassigned_frames,
+)
 from app.features.stations.service import load_station, submit_station
 from app.formats.report import Report
-from app.soccer.annotation import BallAnnotation, make_lines
+from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, Media
 from tests.unit.features.independent_annotations.begun import begin_take
@@ -411,3 +417,34 @@ class TestMissingGroups:
 
     def test_the_first_import_misses_nothing(self, store, make_group) -> None:
         assert again(store, make_group(7)).missing == 0
+
+
+def frames(count: int, x: float = 1.5) -> list[UnassignedFrame]:
+    box = {"class": "Person", "ID": "3", "points": {"x1": x, "y1": 2}}
+    return [UnassignedFrame("cam1", str(number), Extras(boxes=(box,))) for number in range(count)]
+
+
+def kept(store) -> list[UnassignedFrame]:
+    """The spare frames of the only dataset."""
+    with store.read() as session:
+        return list(unassigned_frames(session, 1))
+
+
+class TestIngestSpare:
+    def test_frames_come_back(self, store) -> None:
+        report = ingest_unassigned(store, "demo", frames(3), source="x", actor="ann")
+        assert report.new == 3
+        assert kept(store) == frames(3)
+
+    def test_again_it_changes_nothing_and_follows_changes(self, store) -> None:
+        ingest_unassigned(store, "demo", frames(3), source="x", actor="ann")
+        same = ingest_unassigned(store, "demo", frames(3), source="x", actor="ann")
+        assert (same.new, same.changed, same.unchanged) == (0, 0, 3)
+        moved = ingest_unassigned(store, "demo", frames(3, 9.0)[:1], source="x", actor="ann")
+        assert moved.changed == 1
+        assert kept(store) == [frames(1, 9.0)[0], *frames(3)[1:]]
+
+    def test_many_come_in_batches(self, store, monkeypatch) -> None:
+        monkeypatch.setattr("app.features.imports.ingest.BATCH", 4)
+        ingest_unassigned(store, "demo", frames(10), source="x", actor="ann")
+        assert len(kept(store)) == 10

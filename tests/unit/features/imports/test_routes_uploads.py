@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from app.features.imports import routes
-from app.features.imports.upload_parts import PartWriter
+from app.features.imports.uploads import PartWriter
 
 API = "/api/v1/uploads"
 BYTES = {"Content-Type": "application/octet-stream"}

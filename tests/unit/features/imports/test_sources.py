@@ -19,9 +19,13 @@ from app.features.datasets.tables import GroupModel
 from app.features.exports.service import export_dataset
 from app.features.groups.edit import SetBall
 from app.features.groups.submit import load, submit
-from app.features.imports.ingest import ingest
+from app.features.imports.ingest import (
+    UnassignedFrame,
+    ingest,
+    ingest_unassigned,
+    unassigned_frames,
+)
 from app.features.imports.sources import FORMATS, USERS, Source, import_source
-from app.features.imports.unassigned import UnassignedFrame, ingest_unassigned, unassigned_frames
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.formats import issia

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from app.errors import ConflictError, InputError, NotFoundError
+from app.evaluation.annotation_distance import polyline_distance
 from app.features.groups.edit import SetBall, SetLines
 from app.features.groups.history import read_history
 from app.features.groups.submit import load, submit
 from app.features.independent_annotations.adopt import return_annotation
-from app.features.independent_annotations.errors import polyline_distance
 from app.features.independent_annotations.gold import (
     mark_group,
     median_interval,

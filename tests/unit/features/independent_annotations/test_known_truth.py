@@ -34,7 +34,7 @@ from app.features.people.visibility_queries import EVERYTHING
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
-from app.finite import json_text
+from app.json_text import json_text
 from app.sample.scene import TRUTH, truth_to_json
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, ImagePoint

@@ -30,7 +30,7 @@ from app.features.independent_annotations.service import (
     list_annotations,
     submit_annotation,
 )
-from app.features.integrity.database import examine_database
+from app.features.integrity.checks import examine_database
 from app.features.people.logins import read_roles
 from app.features.people.roles import Role
 from app.features.people.service import give_role, invite

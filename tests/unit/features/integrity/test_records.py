@@ -9,11 +9,11 @@ from app.db.check import Check
 from app.db.log import Entry
 from app.db.session import Session
 from app.db.store import Store
-from app.features.audit.audit_events import assign_local_work
+from app.features.audit.service import assign_local_work
 from app.features.datasets import service as delete
 from app.features.datasets.service import dataset_id, delete_dataset
 from app.features.imports.ingest import ensure_dataset
-from app.features.integrity.database import examine_database
+from app.features.integrity.checks import examine_database
 from app.features.people.roles import Role
 from app.features.people.service import change_person, find_person, give_role, invite
 from app.soccer.policy import PAPER

@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from app.db.check import Check
 from app.db.store import Store
-from app.features.integrity.database import examine_database
+from app.features.integrity.checks import examine_database
 
 pytestmark = pytest.mark.file_of_sqlite("PostgreSQL has never kept U+0000")
 

@@ -15,7 +15,7 @@ from app.db.check import Check
 from app.db.home import make_home
 from app.db.migrate import KNOWN_REVISIONS, migrate
 from app.db.store import Store
-from app.features.integrity.home import examine_everything
+from app.features.integrity.checks import examine_everything
 from app.soccer.solution import SOLVER_VERSION
 from tests.torture.populated import carry_back, people_work
 from tests.torture.upgrades import make_old

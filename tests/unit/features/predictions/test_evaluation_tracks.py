@@ -11,11 +11,15 @@ from app.db.store import Store
 from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.features.predictions.evaluation import get_figure, run_tables
-from app.features.predictions.evaluation_run import EvaluationRequest, check_evaluation
+from app.features.predictions.evaluation_run import (
+    EvaluationRequest,
+    SourcesRequest,
+    check_evaluation,
+    evaluate_sources,
+)
 from app.features.predictions.queries import PredictionSet
 from app.features.predictions.reader import PredictionFiles
 from app.features.predictions.service import add_predictions, get_predictions
-from app.features.predictions.sources import SourcesRequest, evaluate_sources
 from app.features.tracks.service import TrackChange, change_track, get_track
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from tests.flights import add_flight

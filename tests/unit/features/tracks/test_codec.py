@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.canonical import canonical
 from app.errors import DamagedError
 from app.features.tracks.codec import (
     TRACK_VERSION,
@@ -24,6 +23,7 @@ from app.features.tracks.codec import (
 )
 from app.features.tracks.stretches import gather_stretches
 from app.formats.export_record import ExportRecord
+from app.json_text import canonical
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
 from app.solving.solve import solve

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
-from app.canonical import canonical
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
@@ -18,6 +17,7 @@ from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, read_frozen, read_json
 from app.features.versions.service import Version
 from app.features.versions.verify import verify
+from app.json_text import canonical
 from app.tracking.ball_track import Correction
 from tests.databases import said_for_sqlite
 from tests.flights import FIRST

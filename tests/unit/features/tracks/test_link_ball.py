@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.canonical import canonical
 from app.db.idempotency import without_response
 from app.db.json_columns import pack
 from app.db.session import now
@@ -25,6 +24,7 @@ from app.features.tracks.link_ball import _of_groups, ball_places
 from app.features.tracks.queries import insert_track
 from app.features.tracks.stored import TrackSummary, track_stamp
 from app.geometry.arrays import FloatArray
+from app.json_text import canonical
 from app.soccer.pitch import Pitch
 from app.solving.sides import turned_camera
 from app.tracking.ball_track import BallMeasurements, BallTrack

@@ -18,9 +18,8 @@ from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.features.versions.freeze import FreezeRequest, freeze_dataset, plan_freeze
 from app.features.versions.membership import version_manifest
-from app.features.versions.queries import read_rows
+from app.features.versions.queries import FrozenModel, VersionGroupModel, VersionModel, read_rows
 from app.features.versions.service import list_versions, read_frozen_groups
-from app.features.versions.tables import FrozenModel, VersionGroupModel, VersionModel
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Media

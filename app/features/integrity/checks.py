@@ -1,0 +1,452 @@
+"""Checks of a home: its database against the log; settings, permissions, room, clock, leftovers, object stores; and all
+together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import shutil
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from itertools import islice
+
+import cv2
+import pysqlite3.dbapi2
+
+from app.config import Settings
+from app.db.check import Check, compare_records, compare_with_log
+from app.db.dialects.dialect import dialect_in
+from app.db.dialects.sqlite import MIN_SQLITE
+from app.db.home import find_leftovers, make_home, open_to_others
+from app.db.log import entries_after, entries_of_kinds, last_time, newest_entry
+from app.db.recovery.anchor import read_anchor
+from app.db.session import Session, text_of
+from app.db.store import Store
+from app.errors import ConflictError, InputError, ReviewError, StorageError
+from app.features.comments.service import examine_threads
+from app.features.datasets.queries import unread_uploads, unused_calibrations, unused_frames
+from app.features.datasets.service import list_datasets
+from app.features.groups.digest import group_inputs_hash, station_digest, view_digest
+from app.features.groups.projection_queries import all_groups, all_stations
+from app.features.groups.replay import replay_log
+from app.features.groups.state_snapshot import StateSnapshot, read_state_snapshot
+from app.features.guidelines.queries import GUIDELINE, all_guidelines
+from app.features.integrity.records import (
+    DELETED,
+    examine_computed,
+    examine_people,
+    examine_versions,
+)
+from app.features.integrity.transfer import find_null_characters, list_null_characters
+from app.features.people.provider import Provider
+from app.features.people.sign_on_rules import linked_admins, read_rules
+from app.features.queue.refresh_queries import differing_rows
+from app.features.solutions.service import stale_groups
+from app.features.what_if.service import examine_yields
+from app.mail import read_mail_server
+from app.object_store.store import ChangedObjectError, ObjectStore, open_store
+from app.soccer.codec import paint_to_json
+from app.wording import plural
+
+
+def examine_guidelines(session: Session, restore: str) -> Check:
+    """Compare every version of every dataset's guidelines with the digest in the log.
+
+    Args:
+        session: A read session on a log whose chain is whole.
+        restore: What to do where a text is not what was written.
+    """
+    logged = _logged_guidelines(session)
+    present = {
+        (row.dataset_id, row.number): hashlib.sha256(row.text.encode()).hexdigest()
+        for row in all_guidelines(session)
+    }
+    return compare_with_log("guidelines", logged, present, restore, _guideline_name)
+
+
+def _guideline_name(key: tuple[int, int]) -> str:
+    dataset, number = key
+    return f"version {number} of dataset {dataset}"
+
+
+def _logged_guidelines(session: Session) -> dict[tuple[int, int], str]:
+    digests: dict[tuple[int, int], str] = {}
+    for entry in entries_of_kinds(session, [GUIDELINE, DELETED]):
+        assert entry.dataset_id is not None
+        if entry.kind == DELETED:
+            digests = {key: digest for key, digest in digests.items() if key[0] != entry.dataset_id}
+        else:
+            digests[entry.dataset_id, entry.body["number"]] = entry.body["digest"]
+    return digests
+
+
+REBUILD = "Run touchline doctor --rebuild: it writes these tables anew from the log."
+REBUILT = {
+    "groups": "groups",
+    "stations": "cameras",
+    "unassigned": "unassigned frames",
+    "noticed": "findings of imports",
+}
+"""Parts of the state snapshot that ``rebuild`` writes, with the words for them."""
+KEPT = {
+    "datasets": "datasets",
+    "verdicts": "groups' verdicts",
+    "dismissals": "dismissed findings",
+}
+"""Parts that it leaves as they are."""
+
+
+def examine_database(store: Store) -> list[Check]:
+    """Look at the file, the log's hash chain, the tables and everything that was computed.
+
+    Nothing is changed. The tables are compared with what follows from the log alone, unless the
+    log is broken: then nothing follows from it.
+    """
+    with store.read() as session:
+        restore = dialect_in(session).restoring
+        checks = [_check_file(session, restore)]
+        entries = newest_entry(session)
+        try:
+            logged = replay_log(session)
+        except StorageError as error:
+            checks.append(Check("log", False, error.message, error.hint or restore))
+        else:
+            checks.append(Check("log", True, f"{entries:,} entries, each as it was written"))
+            checks.append(_check_texts(session))
+            checks += _check_tables_against_log(session, logged, restore)
+            checks += [*examine_people(session, restore), examine_guidelines(session, restore)]
+        computed = examine_computed(session, restore)
+        is_whole = all(check.ok for check in computed)
+        checks += [*computed, _check_queue(session, REBUILD if is_whole else restore)]
+    return [*checks, *_check_solutions(store)]
+
+
+def _check_file(session: Session, restore: str) -> Check:
+    """The database's own look at its pages and indexes, and at references to rows that are gone."""
+    dialect = dialect_in(session)
+    faults, lost = dialect.file_faults(session), dialect.count_lost_references(session)
+    if faults:
+        return Check("file", False, f"SQLite finds it damaged: {'; '.join(faults)}", restore)
+    if lost:
+        return Check("file", False, f"{lost} rows refer to rows that are gone", restore)
+    return Check("file", True, dialect.no_fault)
+
+
+def _check_texts(session: Session) -> Check:
+    """Texts from before U+0000 was refused: no fault here, and nothing that PostgreSQL can keep."""
+    found = find_null_characters(session)
+    if not found:
+        return Check("texts", True, "SQLite and PostgreSQL can keep each")
+    sentence = (
+        f"{len(found):,} with U+0000, which PostgreSQL cannot keep: {list_null_characters(found)}"
+    )
+    return Check("texts", True, sentence, "touchline transfer --replace-null writes U+FFFD there.")
+
+
+def _check_tables_against_log(session: Session, logged: StateSnapshot, restore: str) -> list[Check]:
+    try:
+        present = read_state_snapshot(session)
+    except StorageError as error:
+        return [Check("tables", False, error.message, REBUILD)]
+    checks = _check_tables(logged, present, restore)
+    # Of a row that is not what was said, the digest says nothing.
+    return [*checks, _check_digests(session)] if all(check.ok for check in checks) else checks
+
+
+def _check_tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list[Check]:
+    return [
+        compare_with_log(words, getattr(logged, name), getattr(present, name), mend)
+        for names, mend in ((REBUILT, REBUILD), (KEPT, restore))
+        for name, words in names.items()
+    ]
+
+
+def _check_digests(session: Session) -> Check:
+    """Whether cameras, views and groups have the digests by which solutions and edits know them."""
+    count, apart = 0, list[str]()
+    for station in all_stations(session):
+        count += 1
+        if station.digest != station_digest(station.station):
+            apart.append(f"camera {station.id}")
+    for group in all_groups(session):
+        count += 1
+        views = {view.key: view_digest(view) for view in group.group.views}
+        hashed = group_inputs_hash(group.group, paint_to_json(group.group.paint))
+        present = {key: digest for key, (digest, _) in group.view_digests.items()}
+        if (present, group.inputs_hash) != (views, hashed):
+            apart.append(f"group {group.id}")
+    whole = f"of {count:,} groups and cameras, each matching its annotations"
+    return compare_records("digests", whole, apart, "not of what was said", REBUILD)
+
+
+def _check_queue(session: Session, mend: str) -> Check:
+    """Whether the row of each group follows from what was said of it and computed for it."""
+    try:
+        count, apart = differing_rows(session)
+    except StorageError as error:
+        return Check("queue", False, error.message, mend)
+    whole = f"{count:,} rows, as groups, verdicts and solutions say"
+    wrong = "not as groups, verdicts and solutions say"
+    return compare_records("queue", whole, [str(number) for number in apart], wrong, mend)
+
+
+def _check_solutions(store: Store) -> list[Check]:
+    """Groups that wait to be solved are no fault: the next ``solve`` finds them."""
+    checks = []
+    for item in list_datasets(store):
+        waiting = len(stale_groups(store, item.id))
+        mend = f'touchline solve --dataset "{item.name}"' if waiting else None
+        sentence = f"{waiting:,} of {item.groups:,} groups wait to be solved"
+        checks.append(Check(f"solutions of {item.name}", True, sentence, mend))
+    return checks
+
+
+KEYS = "Correct TOUCHLINE_STORES or the file of keys: docs/operations.md says what a store needs."
+CONDITIONS = "Update the store, or use another one: docs/operations.md says which."
+_UNCONDITIONAL = (
+    "ignores If-Match and returns changed content: a changed frame would be shown as the imported "
+    "one"
+)
+_PROBE = ".touchline-check"
+_NO_CONTENT = '"touchline-asks-for-no-content"'
+"""What no store calls any content."""
+
+
+def examine_stores(settings: Settings) -> list[Check]:
+    """Ask every configured store for what the service needs of it."""
+    return [_check_store(settings, name) for name in sorted(settings.stores)]
+
+
+def _check_store(settings: Settings, name: str) -> Check:
+    title, done = f"store {name}", list[str]()
+    try:
+        store = open_store(settings, name)
+        found = next(islice(store.below(""), 1), None)
+        done.append("lists")
+        if found is not None and found.size:
+            store.read(found.key, 0, 1, found.etag)
+            done.append("reads")
+            if not _refuses_other_content(store, found.key):
+                return Check(title, False, _UNCONDITIONAL, CONDITIONS)
+        if store.settings.exports:
+            _write_probe(store)
+            done.append("writes")
+    except ReviewError as error:
+        can = f"; it {' and '.join(done)}" if done else ""
+        return Check(title, False, f"{error.message}{can}", KEYS)
+    empty = "" if found is not None else ", and nothing is in it"
+    return Check(title, True, f"{', '.join(done)}{empty}")
+
+
+def _refuses_other_content(store: ObjectStore, key: str) -> bool:
+    """Whether an object is not given out as the content that it is not."""
+    try:
+        store.read(key, 0, 1, _NO_CONTENT)
+    except ChangedObjectError:
+        return True
+    return False
+
+
+def _write_probe(store: ObjectStore) -> None:
+    key = f"{_PROBE}-{secrets.token_hex(4)}"
+    store.put(key, b"Touchline writes and deletes this to see that it can.\n")
+    store.delete(key)
+
+
+ROOM_BYTES = 2**30
+"""Room on the disk below which the next import may not fit."""
+_PREFIX = "TOUCHLINE_"
+_FORMATS = (".jpg", ".png", ".webp")
+
+
+def examine_home(settings: Settings) -> list[Check]:
+    """What can be said of a home without its database."""
+    examined = (
+        _check_settings,
+        _check_permissions,
+        _check_free_space,
+        _check_anchor,
+        _check_sign_on,
+        _check_mail,
+    )
+    return [
+        *(examine(settings) for examine in examined),
+        _check_library_versions(),
+        *examine_stores(settings),
+    ]
+
+
+def examine_surroundings(store: Store) -> list[Check]:
+    """What lies around the tables of a database that can be opened."""
+    settings, admins = store.settings, _check_linked_admins(store)
+    with store.read() as session:
+        return [
+            *([admins] if admins else []),
+            _check_clock(session),
+            _check_leftovers(settings),
+            _check_calibrations(session),
+            _check_uploads(session, settings),
+            _check_recordings(session, settings),
+        ]
+
+
+def _check_settings(settings: Settings) -> Check:
+    known = {_PREFIX + name.upper() for name in Settings.model_fields}
+    unknown = sorted(name for name in os.environ if name.startswith(_PREFIX) and name not in known)
+    gone = [str(folder) for folder in settings.import_folders if not folder.is_dir()]
+    if unknown:
+        sentence = f"{', '.join(unknown)} is not a setting and is ignored"
+        return Check("settings", False, sentence, "app/config.py lists all; correct or unset it.")
+    if gone:
+        sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is not a folder"
+        return Check("settings", False, sentence, "Make the folder, or take it out.")
+    return Check("settings", True, f"home {settings.home}")
+
+
+def _check_sign_on(settings: Settings) -> Check:
+    """Whether single sign-on is set up whole, and its provider answers."""
+    name, mend = "single sign-on", "Look at the settings TOUCHLINE_SSO_...; docs/teams.md has them."
+    try:
+        # Whether it is a team that is served, serve is told on its own command line.
+        rules = read_rules(settings.model_copy(update={"team": True}))
+        if rules is None:
+            return Check(name, True, "not set up")
+        return Check(name, True, Provider(rules).examine())
+    except (InputError, ConflictError) as error:
+        return Check(
+            name, False, error.message, error.hint if isinstance(error, InputError) else mend
+        )
+
+
+def _check_mail(settings: Settings) -> Check:
+    """Whether the mail server takes us; it is sent nothing."""
+    try:
+        server = read_mail_server(settings)
+        if server is None:
+            return Check("mail", True, "not set up")
+        found = server.examine()
+    except InputError as error:
+        return Check("mail", False, error.message, error.hint)
+    if settings.url is None:
+        return Check("mail", False, f"{found}; letters need TOUCHLINE_URL", "Set TOUCHLINE_URL.")
+    return Check("mail", True, found)
+
+
+def _check_linked_admins(store: Store) -> Check | None:
+    """Whether an admin can come in where there is no other way; None: there is one."""
+    try:
+        rules = read_rules(store.settings.model_copy(update={"team": True}))
+    except InputError:
+        return None
+    if rules is None or not rules.only:
+        return None
+    count = linked_admins(store, rules)
+    sentence = f"{count} admins are linked with {rules.label}, by which alone people log in"
+    mend = (
+        None if count else "touchline users reset NAME prints a link with which an admin is linked."
+    )
+    return Check("admins", count > 0, sentence, mend)
+
+
+def _check_permissions(settings: Settings) -> Check:
+    found = open_to_others(settings)
+    if found:
+        sentence = f"other users can read {plural(len(found), 'file or folder', 'files and folders')}: {found[0]}"
+        more = " and others" if found[1:] else ""
+        mend = f"Start touchline serve, or run chmod -R go= {settings.home}"
+        return Check("permissions", False, sentence + more, mend)
+    return Check("permissions", True, "the home is its owner's alone")
+
+
+def _check_free_space(settings: Settings) -> Check:
+    free = shutil.disk_usage(settings.home).free
+    # A migration copies the database twice: once as it is, once packed.
+    database = settings.database_file
+    needed = max(ROOM_BYTES, 2 * (database.stat().st_size if database.exists() else 0))
+    sentence = f"{free / 1e9:,.1f} GB are free"
+    if free < needed:
+        mend = f"Free some space: at least {needed / 1e9:,.1f} GB."
+        return Check("room", False, sentence, mend)
+    return Check("room", True, sentence)
+
+
+def _check_library_versions() -> Check:
+    sqlite = pysqlite3.dbapi2.sqlite_version
+    lacking = [ending for ending in _FORMATS if not cv2.haveImageWriter(ending)]
+    sentence = f"SQLite {sqlite}, OpenCV {cv2.__version__}"
+    if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
+        mend = "Install the packages of requirements.lock: this SQLite can corrupt its file."
+        return Check("versions", False, sentence, mend)
+    if lacking:
+        sentence += f", which knows no {', '.join(lacking)}"
+        return Check("versions", False, sentence, "Install the packages of requirements.lock.")
+    return Check("versions", True, sentence)
+
+
+def _check_anchor(settings: Settings) -> Check:
+    try:
+        anchor = read_anchor(settings.database_file)
+    except StorageError as error:
+        return Check("anchor", False, error.message, error.hint)
+    if anchor is None:
+        return Check("anchor", True, "none yet: it is made when the database is opened")
+    sentence = f"installation {anchor.installation[:8]}, {anchor.entries:,} entries or more"
+    return Check("anchor", True, sentence)
+
+
+def _check_clock(session: Session) -> Check:
+    now = datetime.now(UTC)
+    # Two machines that edit in turn may differ by a little.
+    count, latest = entries_after(session, text_of(now + timedelta(minutes=5)))
+    if count == 0:
+        return Check("clock", True, "not behind the log")
+    sentence = f"{plural(count, 'entry of the log is', 'entries of the log are')} later than the clock, which says {text_of(now)}; the latest is of {latest}"
+    last = last_time(session)
+    if last is not None and datetime.fromisoformat(last) > now + timedelta(minutes=5):
+        return Check("clock", False, sentence, "Set the clock of this machine.")
+    # Written while the clock was ahead: entries are in order all the same, and nothing can change them.
+    return Check("clock", True, f"{sentence}; the newest is not: the clock was set right since")
+
+
+def _check_leftovers(settings: Settings) -> Check:
+    found = [str(path.relative_to(settings.home)) for path in find_leftovers(settings)]
+    if found:
+        sentence = f"{len(found):,} half-written files are left: {found[0]}"
+        return Check(
+            "leftovers", True, sentence, "The server deletes them when it has nothing to do."
+        )
+    return Check("leftovers", True, "none")
+
+
+def _check_calibrations(session: Session) -> Check:
+    count = len(unused_calibrations(session))
+    mend = "The server deletes them when it has nothing to do." if count else None
+    return Check("unused calibrations", True, f"{count:,} that no solution rests on", mend)
+
+
+def _check_uploads(session: Session, settings: Settings) -> Check:
+    found = unread_uploads(session, settings)
+    sentence = f"{len(found):,} kept for frames that no dataset reads"
+    mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
+    return Check("uploads", True, sentence, mend)
+
+
+def _check_recordings(session: Session, settings: Settings) -> Check:
+    found = unused_frames(session, settings)
+    sentence = f"{len(found):,} indices and folders of frames that nothing uses"
+    mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None
+    return Check("recordings", True, sentence, mend)
+
+
+def examine_everything(settings: Settings) -> list[Check]:
+    """Look at everything; where the database cannot be opened, say why, and what lies around it."""
+    make_home(settings)
+    checks = [*examine_home(settings), examine_yields(settings)]
+    try:
+        with closing(Store.open(settings)) as store:
+            checks += [*examine_surroundings(store), *examine_database(store)]
+            return [*checks, examine_threads(store), *examine_versions(store)]
+    except StorageError as error:
+        return [*checks, Check("database", False, error.message, error.hint)]

@@ -1,0 +1,265 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.errors import InputError, UnsafePathError
+from app.formats.camera_json import camera_to_json
+from app.formats.cameras import camera_file_text, read_cameras, write_camera_files
+from app.formats.export_record import ExportRecord
+from app.formats.report import Report
+from app.formats.sn_calibration_writer import write_sn_calibration
+from app.geometry.arrays import row_by_row
+from app.geometry.camera import Camera
+from app.soccer.frames import ImageSize
+from app.soccer.group import Group
+from tests.cameras import SIZE, looking, write_cameras
+
+
+class TestReadCameras:
+    def test_a_folder_of_camera_files_is_keyed_by_stem(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        write_cameras(tmp_path, {"00002": camera, "00005": camera})
+        (tmp_path / "00002.json").write_text("{}")
+        assert read_cameras(tmp_path, report) == {"00002": camera, "00005": camera}
+        assert (report.read, report.imported, report.problems) == (2, 2, [])
+
+    def test_files_in_match_folders_keep_their_match(
+        self, tmp_path: Path, camera: Camera, report: Report, match: str
+    ) -> None:
+        write_cameras(tmp_path / "..", {f"{tmp_path.name}/{match}/7_1": camera})
+        assert list(read_cameras(tmp_path, report)) == [f"{match}/7_1"]
+
+    def test_equal_stems_in_two_folders_keep_their_folders(
+        self, make_zip: Callable[..., Path], camera: Camera, report: Report
+    ) -> None:
+        text = camera_file_text(camera)
+        path = make_zip({"a/camera_1.json": text, "b/camera_1.json": text})
+        assert list(read_cameras(path, report)) == ["a/1", "b/1"]
+
+    def test_a_bad_camera_is_reported_and_the_rest_imported(
+        self, make_zip: Callable[..., Path], camera: Camera, report: Report
+    ) -> None:
+        bad = camera_file_text(camera).replace("2100.5", "NaN")
+        path = make_zip({"camera_1.json": bad, "camera_2.json": camera_file_text(camera)})
+        assert list(read_cameras(path, report)) == ["2"]
+        assert (report.read, report.imported) == (2, 1)
+        assert "camera_1.json, x_focal_length: is nan, not a finite number" in str(
+            report.problems[0]
+        )
+
+    def test_how_well_a_camera_is_known_is_read_with_it(
+        self, make_zip: Callable[..., Path], report: Report
+    ) -> None:
+        known = row_by_row(np.eye(8) * 1e-4)
+        camera = looking((0.0, 60.0, -15.0), (0.0, 0.0, 0.0), 1500.0)
+        text = camera_file_text(camera, known, SIZE)
+        value = json.loads(text)
+        broken = json.dumps({**value, "covariance": [[1.0]]})
+        path = make_zip(
+            {
+                "camera_1.json": text,
+                "camera_2.json": camera_file_text(camera),
+                "camera_3.json": broken,
+            }
+        )
+        covariances: dict[str, Any] = {}
+        assert list(read_cameras(path, report, covariances=covariances)) == ["1", "2"]
+        assert covariances == {"1": value["covariance"]}
+        assert "camera_3.json, covariance: has 1 numbers" in str(report.problems[0])
+
+    @pytest.mark.parametrize("wrapped", [False, True])
+    @pytest.mark.parametrize("encoded", ["plain", "json", "python"])
+    def test_several_cameras_in_one_file(
+        self, tmp_path: Path, camera: Camera, report: Report, wrapped: bool, encoded: str
+    ) -> None:
+        value: Any = {"cam1": camera_to_json(camera), "cam2": camera_to_json(camera)}
+        value = {"_note": "ours", "cameras": value} if wrapped else value
+        inner = {"plain": lambda v: v, "json": json.dumps, "python": repr}[encoded](value)
+        path = tmp_path / "issia_calibration.json"
+        path.write_text(json.dumps(inner))
+        assert read_cameras(path, report) == {"cam1": camera, "cam2": camera}
+        assert report.problems == []
+
+    def test_one_bad_camera_of_several_is_named(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        value = {"cam1": camera_to_json(camera), "cam2": 5, "_note": "x"}
+        path = tmp_path / "issia_calibration.json"
+        path.write_text(json.dumps(value))
+        assert list(read_cameras(path, report)) == ["cam1"]
+        assert report.problems[0].record == "cam2"
+
+    @pytest.mark.parametrize("name", ["file_name", "image_ids", "image", "frame"])
+    def test_objects_of_json_lines_and_lists_are_called_like_their_image(
+        self, tmp_path: Path, camera: Camera, report: Report, name: str
+    ) -> None:
+        items = [camera_to_json(camera) | {name: f"{stem}.jpg"} for stem in ("north", "south")]
+        lines, listed = tmp_path / "per_sample_output.json", tmp_path / "cameras.json"
+        lines.write_text("\n".join(map(json.dumps, items)))
+        listed.write_text(json.dumps(items))
+        assert read_cameras(lines, report) == {"north": camera, "south": camera}
+        assert read_cameras(listed, report) == {"north": camera, "south": camera}
+        assert report.problems == []
+
+    def test_a_line_that_cannot_be_read_is_named_and_the_others_are_read(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        good = json.dumps(camera_to_json(camera) | {"image": "a.jpg"})
+        (tmp_path / "cameras.jsonl").write_text(f"{good}\n{good[:-20]}\n")
+        assert list(read_cameras(tmp_path, report)) == ["a"]
+        assert report.problems[0].record == "line 2"
+
+    def test_names_of_images_are_keys(self, tmp_path: Path, camera: Camera, report: Report) -> None:
+        value = camera_to_json(camera)
+        names = ["north.jpg", "images/south.png", "C:\\frames\\east.jpg", "/data/west.jpg"]
+        (tmp_path / "predictions.json").write_text(json.dumps(dict.fromkeys(names, value)))
+        assert list(read_cameras(tmp_path, report)) == ["north", "south", "east", "west"]
+
+    def test_the_wrapper_of_pnlcalib_is_taken_off(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        value = {"cam_params": camera_to_json(camera), "rep_err": 0.5, "mode": "full"}
+        (tmp_path / "camera_00002.json").write_text(json.dumps(value))
+        (tmp_path / "all.json").write_text(json.dumps({"00003.jpg": value, "00004.jpg": None}))
+        assert read_cameras(tmp_path / "camera_00002.json", report) == {"00002": camera}
+        assert read_cameras(tmp_path / "all.json", report) == {"00003": camera}
+        assert [problem.record for problem in report.problems] == ["00004.jpg"]
+
+    def test_the_principal_point_of_tvcalib_is_measured_from_the_corner(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        value = camera_to_json(camera) | {"image_ids": "a.jpg", "aov_radian": 0.6}
+        (tmp_path / "per_sample_output.json").write_text(json.dumps(value))
+        x, y = read_cameras(tmp_path, report)["a"].principal_point
+        assert (x + 0.5, y + 0.5) == camera.principal_point
+
+    def test_one_number_that_is_none_costs_its_own_camera_alone(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        value = {"cam1": camera_to_json(camera), "cam2": camera_to_json(camera)}
+        text = json.dumps(value).replace("2100.5", "Infinity", 1)
+        (tmp_path / "issia_calibration.json").write_text(text)
+        assert read_cameras(tmp_path, report) == {"cam2": camera}
+        assert "cam1, x_focal_length: is inf, not a finite number" in str(report.problems[0])
+
+    def test_a_folder_without_camera_files_says_what_it_holds(
+        self, tmp_path: Path, report: Report
+    ) -> None:
+        (tmp_path / "a.homographies").write_text("1 0 0\n")
+        assert read_cameras(tmp_path, report) == {}
+        assert "holds no camera files (.json, .jsonl, .npz, .yml), but .homographies" in str(
+            report.problems[0]
+        )
+
+    @pytest.mark.parametrize(
+        "stated",
+        [
+            {"width": 1280, "height": 720},
+            {"image_width": 1280.0, "image_height": "720"},
+            {"image_size": [1280, 720]},
+        ],
+    )
+    def test_a_size_that_a_file_states_is_handed_on(
+        self, tmp_path: Path, camera: Camera, report: Report, stated: dict[str, Any]
+    ) -> None:
+        (tmp_path / "camera_1.json").write_text(json.dumps(camera_to_json(camera) | stated))
+        (tmp_path / "camera_2.json").write_text(json.dumps(camera_to_json(camera) | {"width": 5}))
+        sizes: dict[str, ImageSize] = {}
+        assert list(read_cameras(tmp_path, report, sizes=sizes)) == ["1", "2"]
+        assert sizes == {"1": ImageSize(1280, 720)}
+
+    def test_a_second_camera_of_a_name_is_named(
+        self, tmp_path: Path, camera: Camera, report: Report
+    ) -> None:
+        items = [camera_to_json(camera) | {"image": "a.jpg"}] * 2
+        (tmp_path / "cameras.json").write_text(json.dumps(items))
+        assert list(read_cameras(tmp_path, report)) == ["a"]
+        assert "is a second camera" in str(report.problems[0])
+
+    @pytest.mark.parametrize(
+        ("value", "what"),
+        [
+            ({"homography": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "homography"),
+            ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], "homography"),
+            ({"kp": {"1": {"x": 0.5}}, "lines": {}}, "keypoints"),
+            ({"images": [], "annotations": []}, "COCO document"),
+            ({"Side line top": [{"x": 0.1, "y": 0.2}]}, "field lines"),
+            ([{"image_id": 1, "bbox": [1, 2, 3, 4]}], "COCO results"),
+            ({"a": 1}, 'object with "a"; a camera is'),
+        ],
+    )
+    def test_a_file_that_holds_no_camera_says_what_it_is(
+        self, tmp_path: Path, report: Report, value: Any, what: str
+    ) -> None:
+        (tmp_path / "x.json").write_text(json.dumps(value))
+        assert read_cameras(tmp_path, report) == {}
+        assert len(report.problems) == 1
+        assert what in str(report.problems[0])
+
+
+Solved = Callable[..., ExportRecord]
+Make = Callable[..., Group]
+
+
+class TestWriteCameraFiles:
+    def test_one_file_a_calibrated_view_in_the_folder_of_its_match(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str, camera: Camera,
+        report: Report,
+    ) -> None:  # fmt: skip
+        counts = write_camera_files(tmp_path, [solved(soccer_group(replays=3))])
+        assert counts == {"groups": 1, "cameras": 3}
+        assert (tmp_path / match / "camera_7_1.json").is_file()
+        assert read_cameras(tmp_path, report) == {
+            f"{match}/{stem}": camera for stem in ("7", "7_1", "7_2")
+        }
+
+    def test_what_is_known_of_a_computed_camera_stands_in_its_file(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str
+    ) -> None:
+        record = solved(soccer_group(replays=1))
+        assert record.solution is not None
+        first, second = record.solution.views
+        spread = row_by_row(np.eye(8) * 1e-4)
+        known = replace(first, calibration=replace(first.calibration, covariance=spread))
+        record = replace(record, solution=replace(record.solution, views=(known, second)))
+        (tmp_path / "lines").mkdir()
+        write_camera_files(tmp_path / "cameras", [record])
+        write_sn_calibration(tmp_path / "lines", [record])
+        for root in ("cameras", "lines"):
+            files = [*(tmp_path / root).rglob("camera_*.json")]
+            told = [json.loads(path.read_text()).get("covariance") for path in files]
+            (found,) = (value for value in told if value is not None)
+            assert np.diag(found)[:3].tolist() == [1e-4] * 3
+            assert len(told) == 2
+
+    def test_a_static_camera_is_written_once(
+        self, tmp_path: Path, solved: Solved, issia_group: Make
+    ) -> None:
+        records = [solved(issia_group(frame)) for frame in (1, 2, 3)]
+        assert write_camera_files(tmp_path, records) == {"groups": 3, "cameras": 2}
+        names = sorted(path.name for path in (tmp_path / "issia").iterdir())
+        assert names == ["camera_cam3.json", "camera_cam4.json"]
+
+    def test_two_frames_of_one_name_are_refused_even_where_their_cameras_are_equal(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        view = soccer_group(replays=0).views[0]
+        for keys in (("a/7.png", "a/7.jpg"), ("a/B", "a/b")):
+            groups = [Group(key, (replace(view, key=key),)) for key in keys]
+            with pytest.raises(InputError, match=f"two frames .*{keys[0]} and {keys[1]}"):
+                write_camera_files(tmp_path, map(solved, groups))
+
+    def test_a_match_that_leaves_the_folder_is_refused(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        group = replace(soccer_group(), match="../..")
+        with pytest.raises(UnsafePathError):
+            write_camera_files(tmp_path, [solved(group)])
