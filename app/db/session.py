@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Row = TypeVar("Row")
 
 
-class PendingResponse(Protocol):
+class KeyedResponse(Protocol):
     """The response to a request that is being carried out."""
 
     @property
@@ -27,7 +27,7 @@ class PendingResponse(Protocol):
         """Store the response that an outcome makes, in the transaction of its work."""
 
 
-pending_response: ContextVar[PendingResponse | None] = ContextVar("pending_response", default=None)
+pending_response: ContextVar[KeyedResponse | None] = ContextVar("pending_response", default=None)
 """The response to the request that this thread carries out; None in jobs and commands."""
 
 

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 from app.config import Settings
 from app.db.store import Store
 from app.features.agreement.service import after_submission
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.independent_annotations.service import begin_annotation
 from app.features.people import links
@@ -75,6 +75,6 @@ def annotate(store: Store, group: int, person: str, moved: float) -> str | None:
     view = next(view for view in state.group.views if view.ball and view.ball.box)
     if moved and view.ball and view.ball.box:
         ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-        state = submit(store, copy, SetBall(view.key, ball), if_match=state.etag, actor=person)
+        state = submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
     return after_submission(store, copy)

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import InputError
 from app.evaluation.frame import Detection, iou
 from app.features.datasets.tables import ViewModel
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.sources import Source, import_source
 from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
@@ -143,7 +143,7 @@ class TestDetect:
     def test_a_person_accepts_one_and_it_is_solved(self, store, detected) -> None:
         state = _states(store)[0]
         view = state.group.views[0].key
-        cleared = submit(store, state.id, SetBall(view, None), if_match=state.etag, actor="ann")
+        cleared = submit(store, state.id, set_ball(view, None), if_match=state.etag, actor="ann")
         assert cleared.solution.ball is None or len(cleared.solution.ball.views) < len(
             state.group.views
         )
@@ -153,7 +153,7 @@ class TestDetect:
         assert after.group.view(view).ball.predicted_by == "tiny"
         assert after.solution is not None
         undone = submit(
-            store, state.id, SetBall(view, state.group.view(view).ball), if_match=after.etag,
+            store, state.id, set_ball(view, state.group.view(view).ball), if_match=after.etag,
             actor="ann",
         )  # fmt: skip
         assert undone.group == state.group

@@ -23,7 +23,7 @@ WRITER = """
 import sys
 from pathlib import Path
 from app.config import Settings
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -42,7 +42,7 @@ state = load(store, 1)
 view = state.stored.group.views[0].key
 for number in range(int(sys.argv[2])):
     ball = BallAnnotation(box=Box(100.0 + number, 200.0, 12.0, 12.0))
-    state = submit(store, 1, SetBall(view, ball), if_match=state.etag, actor="ann")
+    state = submit(store, 1, set_ball(view, ball), if_match=state.etag, actor="ann")
     acknowledge()
     writer = UploadWriter(settings, f"{number}.csv", by="ann")
     writer.write(b"x,y,w,h\\n" * 200)

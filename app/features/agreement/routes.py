@@ -23,8 +23,8 @@ from app.features.agreement.summary import (
     agreement_csv,
     summarize_agreement,
 )
-from app.features.groups.routes import ETAG, group_answer
-from app.features.groups.schemas import GroupDocument
+from app.features.groups.routes import ETAG
+from app.features.groups.schemas import GroupDocument, group_response
 from app.features.groups.state import GroupState
 from app.features.independent_annotations.routes import AnnotationReturn
 from app.features.independent_annotations.service import DisclosedAnnotation
@@ -308,7 +308,7 @@ def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
     responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
     return adjudicate.decide_case(

@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from sqlalchemy import Double, ForeignKey, Index, Table, delete, insert, select
+from sqlalchemy import (
+    BindParameter,
+    Double,
+    ForeignKey,
+    Index,
+    Table,
+    bindparam,
+    delete,
+    insert,
+    literal,
+    null,
+    select,
+    union_all,
+)
+from sqlalchemy import cast as cast_to
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.json_columns import as_written, parse
 from app.db.log import Entry, append
 from app.db.session import Base, Session
-from app.features.datasets.tables import GroupModel, ImportFindingModel
+from app.features.datasets.tables import GroupModel, ImportFindingModel, ViewModel
 from app.features.groups.insert_queries import next_id
 from app.features.people.visibility_queries import shown_actor
 from app.json_text import canonical
@@ -62,7 +77,7 @@ def findings_from_rows(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
     """What was noticed about a group as it is now.
 
     Args:
-        rows: Of the group, as ``features.queue.refresh_queries.read_import_findings`` has them.
+        rows: Of the group, as ``read_import_findings`` has them.
         inputs_hash: Of the group now; what was said of another state of it is left out.
     """
     return [_finding_from_row(row) for row in rows if row.of_inputs in (None, inputs_hash)]
@@ -284,7 +299,7 @@ NOTHING_DISMISSED = GroupDismissals()
 def current_dismissals(rows: Iterable[Any]) -> dict[int, GroupDismissals]:
     """What people dismissed, by group id; groups in which nobody ever did are left out.
 
-    ``rows`` are those of the table, the oldest first (``features.queue.refresh_queries.read_import_findings`` reads them).
+    ``rows`` are those of the table, the oldest first (``read_import_findings`` reads them).
     """
     found: dict[int, GroupDismissals] = {}
     for row in rows:
@@ -354,3 +369,61 @@ def dismissed_kinds(
     opened = dict.fromkeys(finding.kind for finding, dismissal in pairs if dismissal is None)
     closed = dict.fromkeys(finding.kind for finding, dismissal in pairs if dismissal is not None)
     return list(opened), list(closed)
+
+
+_DISMISSED = 2
+"""Where rows of ``_NOTICED`` are dismissals."""
+_NOTICE = ImportFindingModel.__table__
+_VIEW = ViewModel.__table__
+_IDS: BindParameter[Any] = bindparam("ids", expanding=True)
+_CHECKED = DismissalModel.__table__
+_UNKNOWN = [
+    _NOTICE.c.number if column.name == "number" else cast_to(null(), column.type).label(column.name)
+    for column in SHOWN
+]
+_SAID_OF = [_NOTICE.c.place, _NOTICE.c.of_inputs]
+_NOTICED = union_all(
+    select(
+        _NOTICE.c.group_id.label("group"),
+        _NOTICE.c.kind,
+        _NOTICE.c.sentence,
+        _NOTICE.c.view,
+        literal(0).label("source"),
+        _NOTICE.c.id,
+        *_UNKNOWN,
+        *_SAID_OF,
+    ).where(_NOTICE.c.group_id.in_(_IDS)),
+    select(
+        *(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, literal(1)),
+        *(_NOTICE.c.id, *_UNKNOWN, *_SAID_OF),
+    )
+    .join_from(_VIEW, _NOTICE, _NOTICE.c.station_id == _VIEW.c.station_id)
+    .where(_VIEW.c.group_id.in_(_IDS)),
+    select(
+        *(_CHECKED.c.group_id, _CHECKED.c.kind, _CHECKED.c.sentence, _CHECKED.c.view, literal(2)),
+        *(_CHECKED.c.id, *SHOWN, *(cast_to(null(), column.type) for column in _SAID_OF)),
+    ).where(_CHECKED.c.group_id.in_(_IDS)),
+).order_by("source", "id")
+"""A group's own come before those of its static cameras; then what people have dismissed."""
+
+
+def read_import_findings(
+    session: Session, ids: Sequence[int]
+) -> tuple[dict[int, list[Any]], dict[int, GroupDismissals]]:
+    """What imports noticed about groups and about the shared stations of their views, and which
+    findings people have dismissed, in one statement.
+
+    Returns:
+        Rows for ``findings_from_rows``, and what was dismissed, by group id.
+    """
+    rows = session.execute(_NOTICED, {"ids": list(ids)}).all()
+    found: dict[int, list[Any]] = defaultdict(list)
+    for row in rows:
+        if row.source != _DISMISSED:
+            found[row.group].append(row)
+    return found, current_dismissals(row for row in rows if row.source == _DISMISSED)
+
+
+def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
+    """The first part of ``read_import_findings``."""
+    return read_import_findings(session, ids)[0]

@@ -10,7 +10,7 @@ from app.db.session import now
 from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import dataset_id
-from app.features.findings.queries import insert_dismissal
+from app.features.findings.queries import insert_dismissal, read_import_findings
 from app.features.groups.state import GroupState, read_states, require_content, require_unchanged
 from app.features.groups.submit import read_solved, require_open
 from app.features.queue.queries import (
@@ -22,7 +22,7 @@ from app.features.queue.queries import (
     contains_text,
     has_list_item,
 )
-from app.features.queue.refresh_queries import read_import_findings, refresh_queue
+from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import is_solved
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group, checked_note

@@ -20,7 +20,7 @@ from app.features.groups.bulk_edits import (
     edit_views,
     plan_edits,
 )
-from app.features.groups.edit import Edit, SetBall, SetLines
+from app.features.groups.edit import Edit, SetLines, set_ball
 from app.features.groups.schemas import BallEdit, LineEdits, Marking, points_by_marking
 from app.features.solutions.service import solve_encoded
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
@@ -86,7 +86,7 @@ class ViewEditItem(BaseModel):
         if self.lines:
             edits.append(SetLines(key, points_by_marking(self.lines), tuple(self.proposed)))
         if "ball" in self.model_fields_set:
-            edits.append(SetBall(key, None if self.ball is None else self.ball.ball()))
+            edits.append(set_ball(key, None if self.ball is None else self.ball.ball()))
         return edits
 
 

@@ -231,25 +231,9 @@ class SetBalls:
         return SetBalls(self.view, view.balls, view.noise)
 
 
-@dataclass(frozen=True)
-class SetBall:
+def set_ball(view: str, ball: BallAnnotation | None) -> SetBalls:
     """Say which one ball a view shows; None: no ball is annotated."""
-
-    view: str
-    ball: BallAnnotation | None
-    noise: float = 1.0
-    """As of ``SetBalls``."""
-
-    def apply(self, group: Group) -> Group:
-        """The group with this ball in the view."""
-        return self._as_set_balls().apply(group)
-
-    def inverse(self, group: Group) -> SetBalls:
-        """The balls as they were."""
-        return self._as_set_balls().inverse(group)
-
-    def _as_set_balls(self) -> SetBalls:
-        return SetBalls(self.view, () if self.ball is None else (self.ball,), self.noise)
+    return SetBalls(view, () if ball is None else (ball,))
 
 
 @dataclass(frozen=True)

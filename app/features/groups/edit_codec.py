@@ -12,7 +12,6 @@ from app.features.groups.edit import (
     Edit,
     IncludeView,
     LineChanges,
-    SetBall,
     SetBalls,
     SetCalibrationSource,
     SetLines,
@@ -58,8 +57,6 @@ def edit_to_json(edit: Edit | StationEdit) -> Json:
         case SetBalls(view, balls, noise):
             fields = {"balls": [*map(ball_to_json, balls)], **_noise_to_json(noise)}
             return {"edit": "set_balls", "view": view, **fields}
-        case SetBall(view, ball, noise):
-            return edit_to_json(SetBalls(view, () if ball is None else (ball,), noise))
         case IncludeView(view, included, reason, note):
             why = {} if reason is None else {"reason": reason, "note": note}
             return {"edit": "include_view", "view": view, "included": included, **why}

@@ -9,7 +9,7 @@ from app.db.json_columns import Json
 from app.db.log import Entry, append, read_entries_of, single_edits
 from app.db.session import Session, now
 from app.features.datasets.queries import group_ids
-from app.features.groups.edit import CompositeEdit, Edit, SetBall, SetBalls, SetNoise, need_view
+from app.features.groups.edit import CompositeEdit, Edit, SetBalls, SetNoise, need_view
 from app.features.groups.edit_codec import edit_and_inverse_to_json
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import next_revision, save_revision
@@ -115,10 +115,9 @@ def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -
     if isinstance(edit, CompositeEdit):
         own = (add_noise_of_actor(factors, group, one, actor) for one in edit.edits)
         return CompositeEdit(tuple(own))
-    if not isinstance(edit, SetBall | SetBalls):
+    if not isinstance(edit, SetBalls) or not edit.balls:
         return edit
-    balls = edit.balls if isinstance(edit, SetBalls) else (edit.ball,)
-    if any(ball is None or ball.predicted_by for ball in balls):
+    if any(ball.predicted_by for ball in edit.balls):
         return edit
     view = need_view(group, edit.view)
     return (
@@ -130,7 +129,7 @@ def add_noise_of_actor(factors: Factors, group: Group, edit: Edit, actor: str) -
 
 def keep_view_noise(group: Group, edit: Edit) -> Edit:
     """The edit with the noise that its view has: nobody is known to make it yet."""
-    if not isinstance(edit, SetBall | SetBalls):
+    if not isinstance(edit, SetBalls):
         return edit
     return replace(edit, noise=need_view(group, edit.view).noise)
 

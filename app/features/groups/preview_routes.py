@@ -21,7 +21,7 @@ from starlette.concurrency import run_in_threadpool
 from app.config import Settings
 from app.db.store import Store
 from app.errors import InputError, OverloadedError
-from app.features.groups.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
+from app.features.groups.edit import Edit, IncludeView, SetLines, SetPicture, set_ball
 from app.features.groups.schemas import BallEdit, LineEdits, PictureEdit, points_by_marking
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, preview
@@ -166,7 +166,7 @@ def _view_edits(key: str, change: ViewPreview) -> list[Edit]:
     if change.lines:
         edits.append(SetLines(key, points_by_marking(change.lines)))
     if "ball" in change.model_fields_set:
-        edits.append(SetBall(key, None if change.ball is None else change.ball.ball()))
+        edits.append(set_ball(key, None if change.ball is None else change.ball.ball()))
     if change.included is not None:
         edits.append(IncludeView(key, change.included))
     if "picture" in change.model_fields_set:

@@ -18,6 +18,7 @@ from app.features.groups.schemas import (
     GroupDocument,
     LineDocuments,
     PitchSize,
+    group_response,
     image_address,
     lines_document,
 )
@@ -39,7 +40,7 @@ from app.http.deps import (
     QueryText,
     etag_matches,
 )
-from app.http.documents import Document, document, responds
+from app.http.documents import Document, responds
 from app.http.errors import current_state
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import Responses, responses
@@ -123,12 +124,6 @@ class StepDocument(Document):
         )
 
 
-def group_answer(state: GroupState) -> Response:
-    """The document of a group, its ETag in the header."""
-    headers = {"ETag": state.etag, "Cache-Control": "private, no-cache"}
-    return document(GroupDocument.of(state), headers=headers)
-
-
 def load_document(store: Store, group_id: int) -> GroupDocument:
     """The document of a group as it is now."""
     return GroupDocument.of(submit.load_solved(store, group_id))
@@ -210,7 +205,7 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
         etag = submit.current_etag(store, group)
         if etag_matches(request, etag):
             return Response(status_code=304, headers={"ETag": etag})
-    return group_answer(submit.load_solved(store, group))
+    return group_response(submit.load_solved(store, group))
 
 
 @router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
@@ -275,7 +270,7 @@ async def preview_group(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
     store = services.store
@@ -290,7 +285,7 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""
     store = services.store

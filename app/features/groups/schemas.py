@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
+from fastapi import Response
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -21,7 +22,7 @@ from app.errors import UnknownMarkingError
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.policies.schemas import PolicyDocument
-from app.http.documents import Document, IdentityCache, ListDocument
+from app.http.documents import Document, IdentityCache, ListDocument, document
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
@@ -376,6 +377,12 @@ class GroupDocument(Document):
             if state.solution is None
             else SolutionDocument.of(state.solution, group, state.dismissed),
         )
+
+
+def group_response(state: GroupState) -> Response:
+    """The document of a group, its ETag in the header."""
+    headers = {"ETag": state.etag, "Cache-Control": "private, no-cache"}
+    return document(GroupDocument.of(state), headers=headers)
 
 
 def view_labels(group: Group) -> list[str]:

@@ -10,16 +10,21 @@ from typing import Any
 from app.db.session import Session
 from app.errors import NotFoundError, StaleRevisionError
 from app.features.datasets.queries import policy_from_row
-from app.features.findings.queries import NOTHING_DISMISSED, GroupDismissals, findings_from_rows
+from app.features.findings.queries import (
+    NOTHING_DISMISSED,
+    GroupDismissals,
+    findings_from_rows,
+    import_findings,
+    read_import_findings,
+)
 from app.features.groups.digest import digest
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import find_etag_row, read_etag_rows
 from app.features.groups.undo_stacks import UndoStacks, read_stacks
 from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
-from app.features.queue.refresh_queries import import_findings, is_fixed, read_import_findings
 from app.features.solutions.queries import SolutionKey, read_solutions
-from app.features.verdicts.queries import StoredVerdict, read_last_verdicts
+from app.features.verdicts.queries import StoredVerdict, is_fixed, read_last_verdicts
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group
 from app.soccer.policy import Policy

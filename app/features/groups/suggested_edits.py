@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from app.features.groups.edit import Edit, IncludeView, SetBall, SetLines, SetPicture
+from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, SetPicture, set_ball
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, lines_without
 from app.soccer.finding import Finding, Fix, PlacedFinding
@@ -127,13 +127,13 @@ def condition_sentence(group: Group, fix: Fix, moved_px: float = 0.0) -> str:
     return _button_text(_ACTIONS[fix.action].sentence, fix, letter=letter, px=moved_px)
 
 
-def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBall:
+def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBalls:
     """The edit that puts a view's ball somewhere else, as large as it is."""
     if ball.box is None:
-        return SetBall(view, replace(ball, point=point))
+        return set_ball(view, replace(ball, point=point))
     box = ball.box
     moved = replace(box, x=point.x - box.width / 2, y=point.y - box.height / 2)
-    return SetBall(view, replace(ball, box=moved))
+    return set_ball(view, replace(ball, box=moved))
 
 
 def _beside_track_offers(group: Group, finding: PlacedFinding) -> tuple[Offer, ...]:
@@ -154,7 +154,7 @@ def _fitted_box_offers(group: Group, finding: Finding) -> tuple[Offer, ...]:
     if view is None or ball is None or ball.box is None or not finding.number:
         return ()
     box = Box.square(ball.box.center, ball.box.diameter / finding.number)
-    return (Offer("Fit the box", SetBall(view.key, replace(ball, box=box))),)
+    return (Offer("Fit the box", set_ball(view.key, replace(ball, box=box))),)
 
 
 def _button_text(text: str, fix: Fix, **more: str | float) -> str:
@@ -180,7 +180,7 @@ def _include_view_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit 
 
 def _pick_ball_edit(view: View, fix: Fix, _point: ImagePoint | None) -> Edit | None:
     there = fix.index is not None and fix.index < len(view.balls)
-    return SetBall(view.key, view.balls[fix.index or 0]) if there else None
+    return set_ball(view.key, view.balls[fix.index or 0]) if there else None
 
 
 def _move_ball_edit(view: View, _fix: Fix, point: ImagePoint | None) -> Edit | None:

@@ -15,12 +15,12 @@ from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.features.groups.edit import (
     Edit,
     IncludeView,
-    SetBall,
     SetCalibrationSource,
     SetLines,
     SetPicture,
+    set_ball,
 )
-from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document_of_view
+from app.features.groups.routes import CHANGED, CONFLICTS, load_document_of_view
 from app.features.groups.schemas import (
     BallEdit,
     GroupDocument,
@@ -28,6 +28,7 @@ from app.features.groups.schemas import (
     NeighbourList,
     ViewEdit,
     frames_away,
+    group_response,
 )
 from app.features.groups.state import GroupState
 from app.features.groups.submit import FoundView, find_view, submit_view
@@ -74,7 +75,7 @@ FRAME: Responses = {
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_answer)
+@responds(group_response)
 def patch_lines(
     view: Id,
     lines: LinesEdit,
@@ -101,7 +102,7 @@ def patch_lines(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_answer)
+@responds(group_response)
 def patch_ball(
     view: Id,
     ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
@@ -111,7 +112,7 @@ def patch_ball(
 ) -> GroupState:
     """Say where the ball is in this view, that it is out of view, or that there is none."""
     value = None if ball is None else ball.ball()
-    return _submit_view_edit(services, view, lambda key: SetBall(key, value), if_match, actor)
+    return _submit_view_edit(services, view, lambda key: set_ball(key, value), if_match, actor)
 
 
 @router.patch(
@@ -121,7 +122,7 @@ def patch_ball(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_answer)
+@responds(group_response)
 def patch_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:

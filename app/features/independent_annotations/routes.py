@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.evaluation.annotation_distance import DistanceFromTruth
 from app.features.agreement.adjudicate import adopt_into_group
 from app.features.agreement.service import after_submission
-from app.features.groups.routes import ETAG, group_answer
-from app.features.groups.schemas import GroupDocument
+from app.features.groups.routes import ETAG
+from app.features.groups.schemas import GroupDocument, group_response
 from app.features.groups.state import GroupState
 from app.features.guidelines.service import MAX_LETTERS
 from app.features.independent_annotations import gold, service
@@ -275,7 +275,7 @@ def hand_back(
     responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
     """Take an annotation and its verdict over into the group that it is of; the answer is that group.
 

@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.prediction_run import box_problem
 from app.features.datasets.service import read_dataset_head
-from app.features.groups.edit import SetBall, need_view
+from app.features.groups.edit import SetBalls, need_view, set_ball
 from app.features.groups.state import GroupState, content_tag_from_etag, require_unchanged
 from app.features.groups.submit import load, submit
 from app.features.groups.view_queries import (
@@ -218,18 +218,18 @@ def accept_box(
             require_unchanged(session, view.group_id, if_match, f"group {view.group_id}")
             raise InputError(f"the prediction {problem}")
         name = read_set(session, box.set_id).name
-    edit = SetBall(view.key, accepted_ball(box, name))
+    edit = set_ball(view.key, accepted_ball(box, name))
     if not replace:
         _require_free(load(store, view.group_id), edit, if_match)
     return submit(store, view.group_id, edit, if_match=if_match, actor=actor)
 
 
-def _require_free(state: GroupState, edit: SetBall, if_match: str) -> None:
+def _require_free(state: GroupState, edit: SetBalls, if_match: str) -> None:
     """Refuse where the person saw a ball; of a state that they did not see ``submit`` judges."""
     balls = need_view(state.group, edit.view).balls
     if (
         not balls
-        or balls == (edit.ball,)
+        or balls == edit.balls
         or content_tag_from_etag(state.etag) != content_tag_from_etag(if_match)
     ):
         return
@@ -297,7 +297,7 @@ def _accept_edit(
         if report is not None:
             session.respond(report)
 
-    edit = SetBall(item.view, accepted_ball(item.box, name))
+    edit = set_ball(item.view, accepted_ball(item.box, name))
     for _ in range(TRIES):
         try:
             state = load(store, item.group_id)

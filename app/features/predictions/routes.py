@@ -7,8 +7,8 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.config import Settings
-from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document_of_view
-from app.features.groups.schemas import GroupDocument
+from app.features.groups.routes import CHANGED, CONFLICTS, load_document_of_view
+from app.features.groups.schemas import GroupDocument, group_response
 from app.features.groups.state import GroupState
 from app.features.groups.submit import find_view
 from app.features.jobs.queries import Job
@@ -193,7 +193,7 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
-@responds(group_answer)
+@responds(group_response)
 def accept_prediction(
     view: Id,
     prediction: Id,

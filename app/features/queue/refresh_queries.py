@@ -8,36 +8,28 @@ from dataclasses import fields
 from typing import Any, cast
 
 from sqlalchemy import (
-    BindParameter,
     Table,
     and_,
     bindparam,
     func,
-    literal,
-    null,
     or_,
     select,
-    union_all,
     update,
 )
-from sqlalchemy import cast as cast_to
 
 from app.db.dialects.dialect import insert_or_replace
 from app.db.session import Session
 from app.features.datasets.tables import (
     DatasetModel,
     GroupModel,
-    ImportFindingModel,
     StationModel,
     ViewModel,
 )
 from app.features.findings.queries import (
-    SHOWN,
-    DismissalModel,
     GroupDismissals,
-    current_dismissals,
     dismissed_kinds,
     findings_from_rows,
+    read_import_findings,
 )
 from app.features.groups.queries import StoredGroup
 from app.features.people.visibility_queries import shown_actor
@@ -50,48 +42,14 @@ from app.features.solutions.queries import (
     read_solutions,
     read_summary,
 )
-from app.features.verdicts.queries import StoredVerdict
+from app.features.verdicts.queries import StoredVerdict, is_fixed
 from app.features.verdicts.tables import VerdictModel
 from app.soccer.finding import Finding
 
 _BATCH = 1000
-_DISMISSED = 2
-"""Where rows of ``_NOTICED`` are dismissals."""
 _QUEUE = cast(Table, QueueModel.__table__)
 _REPLACE = insert_or_replace(_QUEUE)
 _ROW = update(_QUEUE).where(_QUEUE.c.group_id == bindparam("row"))
-_NOTICE = ImportFindingModel.__table__
-_VIEW = ViewModel.__table__
-_IDS: BindParameter[Any] = bindparam("ids", expanding=True)
-_CHECKED = DismissalModel.__table__
-_UNKNOWN = [
-    _NOTICE.c.number if column.name == "number" else cast_to(null(), column.type).label(column.name)
-    for column in SHOWN
-]
-_SAID_OF = [_NOTICE.c.place, _NOTICE.c.of_inputs]
-_NOTICED = union_all(
-    select(
-        _NOTICE.c.group_id.label("group"),
-        _NOTICE.c.kind,
-        _NOTICE.c.sentence,
-        _NOTICE.c.view,
-        literal(0).label("source"),
-        _NOTICE.c.id,
-        *_UNKNOWN,
-        *_SAID_OF,
-    ).where(_NOTICE.c.group_id.in_(_IDS)),
-    select(
-        *(_VIEW.c.group_id, _NOTICE.c.kind, _NOTICE.c.sentence, _VIEW.c.key, literal(1)),
-        *(_NOTICE.c.id, *_UNKNOWN, *_SAID_OF),
-    )
-    .join_from(_VIEW, _NOTICE, _NOTICE.c.station_id == _VIEW.c.station_id)
-    .where(_VIEW.c.group_id.in_(_IDS)),
-    select(
-        *(_CHECKED.c.group_id, _CHECKED.c.kind, _CHECKED.c.sentence, _CHECKED.c.view, literal(2)),
-        *(_CHECKED.c.id, *SHOWN, *(cast_to(null(), column.type) for column in _SAID_OF)),
-    ).where(_CHECKED.c.group_id.in_(_IDS)),
-).order_by("source", "id")
-"""A group's own come before those of its static cameras; then what people have dismissed."""
 _NUMBERS = [
     item.name for item in fields(SolutionSummary) if item.name not in ("passes", "findings")
 ]
@@ -278,28 +236,6 @@ def _newest_verdicts_by_group(session: Session, ids: Sequence[int]) -> dict[int,
     return {row.group_id: row for row in rows}
 
 
-def read_import_findings(
-    session: Session, ids: Sequence[int]
-) -> tuple[dict[int, list[Any]], dict[int, GroupDismissals]]:
-    """What imports noticed about groups and about the shared stations of their views, and which
-    findings people have dismissed, in one statement.
-
-    Returns:
-        Rows for ``findings_from_rows``, and what was dismissed, by group id.
-    """
-    rows = session.execute(_NOTICED, {"ids": list(ids)}).all()
-    found: dict[int, list[Any]] = defaultdict(list)
-    for row in rows:
-        if row.source != _DISMISSED:
-            found[row.group].append(row)
-    return found, current_dismissals(row for row in rows if row.source == _DISMISSED)
-
-
-def import_findings(session: Session, ids: Sequence[int]) -> dict[int, list[Any]]:
-    """The first part of ``read_import_findings``."""
-    return read_import_findings(session, ids)[0]
-
-
 def _group_columns(head: Any, views: Sequence[Any]) -> dict[str, Any]:
     main = views[0].id if views and views[0].media_path is not None else None
     names = ("dataset_id", "number", "key", "label", "match", "split", "changed")
@@ -326,21 +262,6 @@ def edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
         .distinct()
     )
     return set(session.scalars(statement))
-
-
-def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
-    """Whether a group was mended: edited, accepted as such, and not failing as it is now.
-
-    What was edited when the verdict was given may have been undone since; a group that was
-    accepted against a gate, or rejected, was not mended.
-
-    Args:
-        verdict: With ``state``, ``override`` and ``fixed`` as they were given.
-        edited: Whether the group differs from what its dataset brought, now.
-        passes: What the gates say now; None while that is not known.
-    """
-    accepted = verdict.state == "accepted" and verdict.override is None
-    return bool(verdict.fixed and accepted and edited and passes is not False)
 
 
 def _verdict_columns(

@@ -12,13 +12,14 @@ from pydantic import BaseModel, Field
 from app.db.idempotency import without_response
 from app.errors import NotFoundError
 from app.features.groups.edit import SetStationCalibration, SetStationLines
-from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document
+from app.features.groups.routes import CHANGED, CONFLICTS, load_document
 from app.features.groups.schemas import (
     DatasetName,
     GroupDocument,
     LineDocuments,
     LinesEdit,
     StationEdit,
+    group_response,
     lines_document,
 )
 from app.features.groups.state import GroupState
@@ -121,7 +122,7 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def patch_lines(
     station: Id,
     lines: LinesEdit,
@@ -146,7 +147,7 @@ def patch_lines(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def patch_station(
     station: Id,
     change: StationEdit,
@@ -167,7 +168,7 @@ def patch_station(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def undo(
     station: Id,
     services: AppServices,
@@ -186,7 +187,7 @@ def undo(
     responses=STATION_CHANGED,
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def redo(
     station: Id,
     services: AppServices,

@@ -281,3 +281,18 @@ def split_spans(spans: Spans, most: int) -> list[tuple[int, int]]:
         for first, last in spans
         for start in range(first, last + 1, most)
     ]
+
+
+def is_fixed(verdict: Any, edited: bool, passes: bool | None) -> bool:
+    """Whether a group was mended: edited, accepted as such, and not failing as it is now.
+
+    What was edited when the verdict was given may have been undone since; a group that was
+    accepted against a gate, or rejected, was not mended.
+
+    Args:
+        verdict: With ``state``, ``override`` and ``fixed`` as they were given.
+        edited: Whether the group differs from what its dataset brought, now.
+        passes: What the gates say now; None while that is not known.
+    """
+    accepted = verdict.state == "accepted" and verdict.override is None
+    return bool(verdict.fixed and accepted and edited and passes is not False)

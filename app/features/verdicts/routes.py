@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StrictBool
 from app.features.agreement.service import after_submission
 from app.features.datasets.service import dataset_id
 from app.features.findings.service import FindingName, set_dismissal
-from app.features.groups.routes import CHANGED, CONFLICTS, group_answer, load_document
-from app.features.groups.schemas import GroupDocument
+from app.features.groups.routes import CHANGED, CONFLICTS, load_document
+from app.features.groups.schemas import GroupDocument, group_response
 from app.features.groups.state import GroupState
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.features.verdicts import bulk, bulk_undo
@@ -163,7 +163,7 @@ class BatchList(ListDocument[BatchDocument]):
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def put_verdict(
     group: Id,
     verdict: VerdictEdit,
@@ -190,7 +190,7 @@ def put_verdict(
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-@responds(group_answer)
+@responds(group_response)
 def put_dismissal(
     group: Id, body: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:

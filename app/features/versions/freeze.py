@@ -17,9 +17,8 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
 from app.features.datasets.service import DatasetHead, licence_text, read_dataset_head, require_name
-from app.features.findings.queries import GroupDismissals, findings_from_rows
+from app.features.findings.queries import GroupDismissals, findings_from_rows, read_import_findings
 from app.features.groups.queries import read_groups
-from app.features.queue.refresh_queries import read_import_findings
 from app.features.solutions.queries import (
     present_bodies,
     read_calibration_bodies,

@@ -12,7 +12,7 @@ from app.features.agreement.service import after_submission
 from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.progress import my_work
 from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import person_by_name
@@ -41,7 +41,7 @@ def annotate(store: Store, leases: Leases, batch: Batch, person: str, moved: flo
     view = next(view for view in state.group.views if view.ball is not None)
     assert view.ball is not None and view.ball.box is not None
     ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-    state = submit(store, copy, SetBall(view.key, ball), if_match=state.etag, actor=person)
+    state = submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
     set_verdict(store, copy, "accepted", None, "seen", if_match=state.etag, actor=person)
     return copy
 

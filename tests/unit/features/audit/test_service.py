@@ -20,7 +20,7 @@ from app.features.audit.service import (
 )
 from app.features.batches.service import NewBatch, change_batch, make_batch, remove_batch
 from app.features.comments.service import begin_thread
-from app.features.groups.edit import IncludeView, SetBall, SetLines
+from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.history import read_history, redo, undo
 from app.features.groups.replay import _STEPS, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
@@ -134,7 +134,7 @@ class TestAudit:
     ) -> None:
         state = load(store, said)
         one, two = (view.key for view in state.group.views[:2])
-        edits = [SetLines(one, {"Middle line": None}), SetBall(two, None)]
+        edits = [SetLines(one, {"Middle line": None}), set_ball(two, None)]
         state = submit_all(store, said, edits, if_match=state.etag, actor="anna")
         undo(store, said, if_match=state.etag, actor="anna")
         told = f"lines of view {one}: Middle line; balls of view {two}"
@@ -149,7 +149,7 @@ class TestAudit:
         key = state.group.views[0].key
         edits = (
             SetLines(key, {"Middle line": None}),
-            SetBall(key, None),
+            set_ball(key, None),
             IncludeView(key, False),
             IncludeView(key, True),
         )

@@ -19,7 +19,7 @@ from app.features.exports.service import (
     possible_formats,
     require_possible,
 )
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
@@ -114,7 +114,7 @@ class TestExport:
         judge(store, three[0], "accepted")
         state = judge(store, three[1], "accepted")
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit(store, three[1], SetBall("8.png", ball), if_match=state.etag, actor="ben")
+        submit(store, three[1], set_ball("8.png", ball), if_match=state.etag, actor="ben")
         report = export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert {row["main_action"] for row in table(report.out)} == {"7"}
         assert report.left_out == {"stale": 1}
@@ -131,7 +131,7 @@ class TestExport:
     ) -> None:
         if state == "stale":
             etag = judge(store, three[0], "accepted").etag
-            submit(store, three[0], SetBall("7.png", None), if_match=etag, actor="ben")
+            submit(store, three[0], set_ball("7.png", None), if_match=etag, actor="ben")
         with pytest.raises(InputError) as caught:
             export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out")
         assert caught.value.hint is None
@@ -162,7 +162,7 @@ class TestExport:
         judge(store, three[0], "accepted")
         etag = judge(store, three[1], "accepted").etag
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
-        submit(store, three[1], SetBall("8.png", ball), if_match=etag, actor="ben")
+        submit(store, three[1], set_ball("8.png", ball), if_match=etag, actor="ben")
         export_dataset(store, "demo", "soccernet-v3d", tmp_path / "out", everything=True)
         verdicts = {row["main_action"]: row["verdict"] for row in table(tmp_path / "out")}
         assert verdicts == {"7": "accepted", "8": "accepted (stale)", "9": "unreviewed"}

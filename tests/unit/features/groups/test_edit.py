@@ -8,7 +8,6 @@ import pytest
 from app.errors import InputError, NotFoundError, UnknownMarkingError
 from app.features.groups.edit import (
     IncludeView,
-    SetBall,
     SetBalls,
     SetCalibrationSource,
     SetLines,
@@ -16,6 +15,7 @@ from app.features.groups.edit import (
     SetStationCalibration,
     SetStationCamera,
     SetStationLines,
+    set_ball,
 )
 from app.features.groups.edit_codec import edit_from_json, edit_to_json, station_edit_from_json
 from app.soccer.annotation import BallAnnotation
@@ -29,8 +29,8 @@ EDITS = [
     SetLines("7.png", {"Middle line": HERE, "Side line top": None, "Side line left": HERE}),
     SetLines("7.png", {" Middle line ": ()}),
     SetLines("7.png", {"Circle left": None, "Side line top": HERE}, (), ("Circle left",)),
-    SetBall("7.png", BALL),
-    SetBall("7.png", None),
+    set_ball("7.png", BALL),
+    set_ball("7.png", None),
     SetBalls("7.png", (BALL, BallAnnotation(point=ImagePoint(1.0, 2.0)))),
     IncludeView("7_1.png", False),
     IncludeView("7_1.png", False, "not_same_instant"),
@@ -112,7 +112,7 @@ class TestApply:
 
     def test_a_ball_takes_the_place_of_all_others(self, make_group) -> None:
         two = SetBalls("7.png", (BALL, BALL)).apply(make_group())
-        assert SetBall("7.png", BALL).apply(two).view("7.png").balls == (BALL,)
+        assert set_ball("7.png", BALL).apply(two).view("7.png").balls == (BALL,)
 
     @pytest.mark.parametrize("edit", EDITS)
     def test_the_group_that_it_is_applied_to_stays(self, edit, make_group) -> None:
@@ -131,22 +131,22 @@ class TestApply:
                 "valid pixel",
             ),
             (SetLines("7.png", {"Middle line": HERE * 501}), InputError, "1000 points"),
-            (SetBall("7.png", BallAnnotation()), InputError, "box or a point"),
-            (SetBall("7.png", BallAnnotation(box=Box(1, 2, 0, 3))), InputError, "above zero"),
-            (SetBall("7.png", BallAnnotation(box=Box(1e9, 2, 3, 3))), InputError, "valid pixel"),
+            (set_ball("7.png", BallAnnotation()), InputError, "box or a point"),
+            (set_ball("7.png", BallAnnotation(box=Box(1, 2, 0, 3))), InputError, "above zero"),
+            (set_ball("7.png", BallAnnotation(box=Box(1e9, 2, 3, 3))), InputError, "valid pixel"),
             (
-                SetBall("7.png", BallAnnotation(box=Box(1, math.inf, 3, 3))),
+                set_ball("7.png", BallAnnotation(box=Box(1, math.inf, 3, 3))),
                 InputError,
                 "valid pixel",
             ),
-            (SetBall("7.png", BallAnnotation(box=Box(1, 2, 1e9, 3))), InputError, "valid pixel"),
+            (set_ball("7.png", BallAnnotation(box=Box(1, 2, 1e9, 3))), InputError, "valid pixel"),
             (
-                SetBall("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
+                set_ball("7.png", BallAnnotation(point=ImagePoint(1e9, 0))),
                 InputError,
                 "valid pixel",
             ),
             (
-                SetBall("7.png", BallAnnotation(box=Box(1, 2, 3, 4), point=ImagePoint(1, 2))),
+                set_ball("7.png", BallAnnotation(box=Box(1, 2, 3, 4), point=ImagePoint(1, 2))),
                 InputError,
                 "not both",
             ),
@@ -161,7 +161,7 @@ class TestApply:
 
     def test_a_ball_out_of_view_needs_no_box(self, make_group) -> None:
         ball = BallAnnotation(out_of_view=True)
-        assert SetBall("7.png", ball).apply(make_group()).view("7.png").ball is None
+        assert set_ball("7.png", ball).apply(make_group()).view("7.png").ball is None
 
 
 class TestInverse:

@@ -9,7 +9,7 @@ import pytest
 from app.db.log import read_log
 from app.db.store import Store
 from app.features.groups import group_edits
-from app.features.groups.edit import CompositeEdit, SetBall, SetBalls
+from app.features.groups.edit import CompositeEdit, SetBalls, set_ball
 from app.features.groups.group_edits import (
     add_noise_of_actor,
     apply_noise_factors,
@@ -51,7 +51,7 @@ def place(store: Store, group: int, actor: str, ball: BallAnnotation = BALL) -> 
     """Place the ball of the last view; returns the view's key."""
     state = load(store, group)
     key = state.group.views[-1].key
-    submit(store, group, SetBall(key, ball), if_match=state.etag, actor=actor)
+    submit(store, group, set_ball(key, ball), if_match=state.etag, actor=actor)
     return key
 
 
@@ -158,7 +158,7 @@ class TestWithNoise:
         self, make_static
     ) -> None:
         group = make_static(10)
-        one, two = SetBall("cam2", BALL), SetBalls("cam1", (BALL,))
+        one, two = set_ball("cam2", BALL), SetBalls("cam1", (BALL,))
         assert add_noise_of_actor(FACTORS, group, one, "ann") == replace(one, noise=4.0)
         assert add_noise_of_actor(
             FACTORS, group, CompositeEdit((one, two)), "ann"
@@ -171,9 +171,9 @@ class TestWithNoise:
     def test_an_edit_that_places_none_and_a_dataset_without_noise_stay_as_they_are(
         self, make_static
     ) -> None:
-        group, none = make_static(10), SetBall("cam2", None)
+        group, none = make_static(10), set_ball("cam2", None)
         assert add_noise_of_actor(FACTORS, group, none, "ann") is none
-        placed = SetBall("cam2", BALL, 2.0)
+        placed = SetBalls("cam2", (BALL,), 2.0)
         assert add_noise_of_actor((), group, placed, "ann") is placed
 
     def test_who_places_a_ball_later_brings_theirs_and_undo_takes_it_along(
@@ -201,7 +201,7 @@ class TestWithNoise:
     def test_a_preview_keeps_what_the_view_has(self, store: Store, static: int) -> None:
         give(store, *FACTORS)
         key = next(iter(noise(store, static)))
-        group, _ = preview(store, static, lambda _group: [SetBall(key, BALL)])
+        group, _ = preview(store, static, lambda _group: [set_ball(key, BALL)])
         assert group.noise[key] == 2.0
 
 
@@ -218,7 +218,7 @@ class TestReadPlaced:
     ) -> None:
         state = load(store, static)
         keys = [view.key for view in state.group.views[:2]]
-        edits = [SetBall(key, BALL) for key in keys]
+        edits = [set_ball(key, BALL) for key in keys]
         submit_all(store, static, edits, if_match=state.etag, actor="ann")
         with store.read() as session:
             assert read_last_ball_actors(session, [static]) == {static: dict.fromkeys(keys, "ann")}

@@ -6,7 +6,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import NotFoundError
-from app.features.groups.edit import SetBall, SetLines, SetStationLines
+from app.features.groups.edit import SetLines, SetStationLines, set_ball
 from app.features.groups.history import EntryChanges, read_entry_changes, read_history, undo
 from app.features.groups.submit import load, submit
 from app.features.stations.service import load_station, submit_station
@@ -25,7 +25,7 @@ class TestReadStep:
     def test_each_edit_tells_its_view_before_and_after_whatever_came_later(
         self, store: Store, state
     ) -> None:
-        edited = submit(store, state.id, SetBall("7.png", BALL), if_match=state.etag, actor="ann")
+        edited = submit(store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ann")
         edited = submit(
             store,
             state.id,

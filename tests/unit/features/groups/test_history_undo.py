@@ -6,7 +6,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError
-from app.features.groups.edit import Edit, IncludeView, SetBall, SetBalls, SetLines
+from app.features.groups.edit import Edit, IncludeView, SetBalls, SetLines, set_ball
 from app.features.groups.history import read_history, redo, undo
 from app.features.groups.state import GroupState
 from app.features.groups.submit import submit
@@ -23,7 +23,7 @@ def edited(store: Store, state: GroupState, edit: Edit) -> GroupState:
 class TestUndo:
     def test_steps_back_and_forth_across_views(self, store, state) -> None:
         edits = [
-            SetBall("7.png", BALL),
+            set_ball("7.png", BALL),
             SetLines("7_1.png", {"Middle line": None}),
             IncludeView("7_1.png", False),
             # More steps, there and back, than are read of a history at first.
@@ -46,17 +46,17 @@ class TestUndo:
         assert not now.can_redo
 
     def test_a_fresh_edit_clears_redo(self, store, state) -> None:
-        after = edited(store, state, SetBall("7.png", BALL))
+        after = edited(store, state, set_ball("7.png", BALL))
         back = undo(store, state.id, if_match=after.etag, actor="ann")
         assert back.can_redo
-        fresh = edited(store, back, SetBall("7.png", None))
+        fresh = edited(store, back, set_ball("7.png", None))
         assert fresh.can_undo
         assert not fresh.can_redo
         with pytest.raises(ConflictError, match="nothing to redo"):
             redo(store, state.id, if_match=fresh.etag, actor="ann")
 
     def test_survives_a_restart(self, store, state) -> None:
-        after = edited(store, state, SetBall("7.png", BALL))
+        after = edited(store, state, set_ball("7.png", BALL))
         with closing(Store.open(store.settings)) as other:
             back = undo(other, state.id, if_match=after.etag, actor="ben")
         assert back.group == state.group
@@ -67,7 +67,7 @@ class TestUndo:
             undo(store, state.id, if_match=state.etag, actor="ann")
 
     def test_is_logged_as_an_edit_of_its_own(self, store, state) -> None:
-        after = edited(store, state, SetBall("7.png", BALL))
+        after = edited(store, state, set_ball("7.png", BALL))
         undo(store, state.id, if_match=after.etag, actor="ben")
         entries = read_history(store, state.id)
         assert [(item.kind, item.actor) for item in entries] == [
@@ -80,6 +80,6 @@ class TestUndo:
 
     def test_several_balls_come_back(self, store, state) -> None:
         two = edited(store, state, SetBalls("7.png", (BALL, BALL)))
-        picked = edited(store, two, SetBall("7.png", BALL))
+        picked = edited(store, two, set_ball("7.png", BALL))
         back = undo(store, state.id, if_match=picked.etag, actor="ann")
         assert back.group.view("7.png").balls == (BALL, BALL)

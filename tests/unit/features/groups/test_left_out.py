@@ -9,7 +9,7 @@ import pytest
 from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.features.groups.digest import group_inputs_hash, source_hash
-from app.features.groups.edit import IncludeView, SetBall, SetLines
+from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.history import redo, undo
 from app.features.groups.replay import rebuild_tables, replay_log
@@ -205,7 +205,7 @@ class TestFixed:
     def test_a_group_that_an_edit_makes_fail_is_no_longer_fixed(self, store, state) -> None:
         change(store, LEAVE)
         self.judge(store, "accepted")
-        change(store, SetBall("7.png", None))
+        change(store, set_ball("7.png", None))
         assert self.fixed(store) == (False, False)
 
 

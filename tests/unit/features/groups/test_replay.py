@@ -7,7 +7,7 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.groups.edit import IncludeView, SetBall, SetLines, SetStationLines
+from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set_ball
 from app.features.groups.group_edits import apply_noise_factors
 from app.features.groups.history import redo, undo
 from app.features.groups.replay import rebuild_tables, replay_log
@@ -33,7 +33,7 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
     state = load(store, ids[0])
     ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
     for edit in (
-        SetBall("7.png", ball),
+        set_ball("7.png", ball),
         SetLines("7_1.png", {"Middle line": None}),
         IncludeView("7_1.png", False),
     ):
@@ -55,7 +55,7 @@ def busy(store: Store, fill, make_group, make_static, opposite: Camera) -> Store
         )
     state = load(store, ids[2])
     submit(
-        store, ids[2], SetBall(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"
+        store, ids[2], set_ball(state.group.views[-1].key, ball), if_match=state.etag, actor="ann"
     )
     _import_changed(store, make_group, make_static)
     ingest_cameras(

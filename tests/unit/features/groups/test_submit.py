@@ -17,7 +17,7 @@ from app.errors import (
     StorageError,
 )
 from app.features.groups import state as state_module
-from app.features.groups.edit import IncludeView, SetBall, SetBalls, SetLines, SetPicture
+from app.features.groups.edit import IncludeView, SetBalls, SetLines, SetPicture, set_ball
 from app.features.groups.history import read_history, undo
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, preview, solve_and_keep, submit
@@ -68,7 +68,7 @@ class TestLoad:
 
 class TestSubmit:
     def test_answers_with_the_group_as_it_is_then_solved(self, store, state) -> None:
-        after = change(store, state, SetBall("7.png", BALL))
+        after = change(store, state, set_ball("7.png", BALL))
         assert after.group.view("7.png").balls == (BALL,)
         assert after.revision == state.revision + 1
         assert after.etag != state.etag
@@ -85,14 +85,14 @@ class TestSubmit:
                 text(f"CREATE TRIGGER spoils BEFORE {step} BEGIN SELECT RAISE(ABORT, 'full'); END")
             )
         with pytest.raises(StorageError, match="could not carry out"):
-            change(store, state, SetBall("7.png", BALL))
+            change(store, state, set_ball("7.png", BALL))
         assert load(store, state.id) == state
         assert {name: count(store, name) for name in before} == before
 
     def test_an_older_state_is_refused_with_both_etags(self, store, state) -> None:
-        after = change(store, state, SetBall("7.png", BALL))
+        after = change(store, state, set_ball("7.png", BALL))
         with pytest.raises(StaleRevisionError) as caught:
-            change(store, state, SetBall("7.png", None))
+            change(store, state, set_ball("7.png", None))
         assert caught.value.base_etag == state.etag
         assert caught.value.current_etag == after.etag
         assert load(store, state.id) == after
@@ -103,7 +103,7 @@ class TestSubmit:
             return solve_encoded(group, policy, calibrations)
 
         with pytest.raises(StaleRevisionError):
-            change(store, state, SetBall("7.png", BALL), solve=slow)
+            change(store, state, set_ball("7.png", BALL), solve=slow)
         after = load(store, state.id)
         assert after.group.view("7.png") == state.group.view("7.png")
         assert not after.group.view("7_1.png").included
@@ -114,7 +114,7 @@ class TestSubmit:
                 change_policy(store, state.dataset_id, STRICT, if_match=None, actor="ann")
             return solve_encoded(group, policy, calibrations)
 
-        after = change(store, state, SetBall("7.png", BALL), solve=slow)
+        after = change(store, state, set_ball("7.png", BALL), solve=slow)
         assert after.policy == STRICT
         assert after.solution == solve(after.group, STRICT)
         assert load(store, state.id) == after
@@ -126,7 +126,7 @@ class TestSubmit:
         def work(number: int) -> None:
             ball = BallAnnotation(box=Box(number, 300.0, 14.0, 14.0))
             try:
-                results.append(change(store, state, SetBall("7.png", ball)))
+                results.append(change(store, state, set_ball("7.png", ball)))
             except StaleRevisionError as error:
                 results.append(error)
 
@@ -142,15 +142,15 @@ class TestSubmit:
         assert len(read_history(store, state.id)) == 2
 
     def test_two_views_of_one_group_at_once_are_a_conflict_too(self, store, state) -> None:
-        change(store, state, SetBall("7.png", BALL))
+        change(store, state, set_ball("7.png", BALL))
         with pytest.raises(StaleRevisionError):
-            change(store, state, SetBall("7_1.png", BALL))
+            change(store, state, set_ball("7_1.png", BALL))
 
     def test_a_solution_that_arrives_is_no_conflict(self, store, fill, make_group) -> None:
         unsolved = load(store, fill(make_group(), solved=False)[0])
         with_solution = solve_and_keep(store, unsolved.id)
         assert with_solution.etag != unsolved.etag
-        after = change(store, unsolved, SetBall("7.png", BALL))
+        after = change(store, unsolved, set_ball("7.png", BALL))
         assert after.group.view("7.png").balls == (BALL,)
 
     def test_what_changes_nothing_makes_no_revision(self, store, state) -> None:
@@ -163,7 +163,7 @@ class TestSubmit:
         with pytest.raises(SharedStationError) as caught:
             change(store, state, SetLines("cam1", {"Middle line": HERE}))
         assert caught.value.station == state.station_ids["cam1"]
-        after = change(store, state, SetBall("cam1", None))
+        after = change(store, state, set_ball("cam1", None))
         assert after.group.view("cam1").balls == ()
 
     def test_the_picture_of_a_shared_station_is_as_it_was_taken(
@@ -181,11 +181,11 @@ class TestSubmit:
             raise AssertionError("calibrated again")
 
         monkeypatch.setattr("app.solving.solve.calibrate_view", refuse)
-        after = change(store, state, SetBall("7.png", BALL))
+        after = change(store, state, set_ball("7.png", BALL))
         undo(store, state.id, if_match=after.etag, actor="ann")
 
     def test_the_queue_is_in_step(self, store, state) -> None:
-        after = change(store, state, SetBall("7.png", None))
+        after = change(store, state, set_ball("7.png", None))
         (row,) = list_groups(store, state.dataset_id).items
         assert row.passes is False
         assert row.gate == after.solution.first_failing.name == "ball"
@@ -194,7 +194,7 @@ class TestSubmit:
 
 class TestPreview:
     def test_is_what_a_save_would_give_and_saves_nothing(self, store, state) -> None:
-        edits = [SetBall("7.png", BALL), SetLines("7_1.png", {"Middle line": None})]
+        edits = [set_ball("7.png", BALL), SetLines("7_1.png", {"Middle line": None})]
         _, solution = preview(store, state.id, lambda _: edits)
         assert load(store, state.id) == state
         after = state
@@ -227,7 +227,7 @@ class TestCost:
             return plain(*arguments)
 
         monkeypatch.setattr(solutions, "with_calibrations", counted)
-        edit = SetBall("7.png", None)
+        edit = set_ball("7.png", None)
         done = submit(store, state.id, edit, if_match=state.etag, actor="ann")
         assert decoded == []
         read = load(store, state.id)
@@ -241,7 +241,7 @@ class TestCost:
     @pytest.mark.parametrize(
         ("edit", "statements"),
         [
-            (SetBall("7.png", BALL), 13),
+            (set_ball("7.png", BALL), 13),
             (SetLines("7.png", {"Middle line": None}), 14),
             (IncludeView("8.png", False), 13),
         ],
@@ -258,7 +258,7 @@ class TestCost:
     def test_an_undo_reads_one_entry_more(
         self, store: Store, state: GroupState, counted: Counted
     ) -> None:
-        after = change(store, state, SetBall("7.png", BALL))
+        after = change(store, state, set_ball("7.png", BALL))
         with counted(store) as cost:
             undo(store, state.id, if_match=after.etag, actor="ann")
         assert (cost.reads, cost.writes, cost.commits) == (1, 1, 1)
@@ -268,7 +268,7 @@ class TestCost:
         self, store: Store, state: GroupState, counted: Counted
     ) -> None:
         with counted(store) as cost:
-            preview(store, state.id, lambda _: [SetBall("7.png", BALL)])
+            preview(store, state.id, lambda _: [set_ball("7.png", BALL)])
         assert (cost.reads, cost.writes) == (1, 0)
         assert cost.statements <= 2
 
@@ -291,5 +291,5 @@ class TestCost:
 
         monkeypatch.setattr(Store, "write", write)
         monkeypatch.setattr(state_module, "read_groups", read_groups)
-        submit(store, state.id, SetBall("7.png", None), if_match=state.etag, actor="ann")
+        submit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
         assert seen == [False]

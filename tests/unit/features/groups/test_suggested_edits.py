@@ -106,7 +106,7 @@ class TestOffers:
         several = GROUP.with_view(replace(first, balls=(hidden, *first.balls, other)))
         found = offers_of_fix(several, Fix("pick_ball", "a"))
         assert [offer.label for offer in found] == ["Keep ball 2", "Keep ball 3"]
-        assert [offer.edit.ball for offer in found] == [*first.balls, other]
+        assert [offer.edit.balls[0] for offer in found] == [*first.balls, other]
         assert edit_of_fix(several, Fix("pick_ball", "a")) is None
 
     def test_where_one_ball_is_left_there_is_none_to_pick(self):
@@ -139,7 +139,7 @@ class TestOffersOfFinding:
         large = replace(first.ball, point=None, box=Box(10.0, 20.0, 34.0, 30.0))
         found = Finding("ball_size", "", "a", number=4.0)
         (offer,) = offers_of_finding(GROUP.with_view(replace(first, balls=(large,))), found)
-        assert (offer.label, offer.edit.ball.box) == ("Fit the box", Box(23.0, 31.0, 8.0, 8.0))
+        assert (offer.label, offer.edit.balls[0].box) == ("Fit the box", Box(23.0, 31.0, 8.0, 8.0))
 
     def test_a_ball_without_a_box_has_none_to_fit(self):
         first = GROUP.views[0]

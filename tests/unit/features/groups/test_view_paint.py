@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.errors import OverloadedError
-from app.features.groups.edit import SetBall, SetLines
+from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.history import read_history, redo, undo
 from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
@@ -75,7 +75,7 @@ class TestFollow:
 
     def test_an_edit_of_a_ball_looks_at_no_picture(self, painted, paint, looked):
         view = load(painted, 1).group.views[0]
-        change(painted, paint, SetBall(view.key, None))
+        change(painted, paint, set_ball(view.key, None))
         assert looked == []
         assert [entry.kind for entry in read_history(painted, 1)][-1] == "edit"
 
@@ -137,7 +137,7 @@ class TestFollow:
         after = change(painted, paint, gone)
         assert after.solution.views[0].calibration.camera is None
         monkeypatch.setattr(Frames, "ask_to", lambda *_: pytest.fail("a picture was asked for"))
-        change(painted, paint, SetBall(view.key, None))
+        change(painted, paint, set_ball(view.key, None))
 
     def test_a_view_that_gets_its_first_lines_is_read_with_the_others(
         self, painted, paint, monkeypatch

@@ -14,9 +14,9 @@ from sqlalchemy import select
 from app.config import Settings
 from app.db.store import Store
 from app.errors import JobCancelled
+from app.features.findings.queries import import_findings
 from app.features.imports.picture_check import NAMED, PictureCheck
 from app.features.imports.sources import Source, import_source
-from app.features.queue.refresh_queries import import_findings
 from app.features.queue.tables import QueueModel
 from app.formats.report import Report
 from app.media import video as video_index

@@ -16,7 +16,7 @@ from app.features.audit.service import read_audit
 from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.progress import my_work
 from app.features.batches.service import NewBatch, change_batch, make_batch
-from app.features.groups.edit import SetBall, SetLines
+from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.independent_annotations.gold import TruthSource, read_report, start_with
@@ -86,7 +86,7 @@ def drawn_as_it_is(store: Store, copy: int, scene, aside: float) -> None:
         d = truth.ball_diameter_px
         box = Box(x + aside - d / 2, y - d / 2, d, d)
         etag = load(store, copy).etag
-        submit(store, copy, SetBall(mine.key, BallAnnotation(box=box)), if_match=etag, actor="ann")
+        submit(store, copy, set_ball(mine.key, BallAnnotation(box=box)), if_match=etag, actor="ann")
 
 
 class TestSample:
@@ -157,7 +157,7 @@ class TestVersion:
         key = load(store, 2).group.views[0].key
         ball = BallAnnotation(box=Box(10.0, 10.0, 14.0, 14.0))
         frozen = load(store, 2)
-        submit(store, 2, SetBall(key, ball), if_match=frozen.etag, actor="cy")
+        submit(store, 2, set_ball(key, ball), if_match=frozen.etag, actor="cy")
         choice = GoldChoice(TruthSource.VERSION, version="v1")
         assert mark_known(store, "demo", choice, actor="lea").groups == (2,)
         take = begin_for_batch(store, 2, "dee", kind=GOLD, nameless=True)

@@ -14,7 +14,7 @@ import pytest
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.groups import pictures as paint_reading
-from app.features.groups.edit import SetBall, SetLines
+from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.history import read_history, undo
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables, replay_log
@@ -222,7 +222,7 @@ class TestReadPaint:
 
     def test_an_edit_of_a_ball_leaves_cameras_and_paint(self, painted, here, looked):
         at = load(painted, 1)
-        edit = SetBall(at.group.views[0].key, BallAnnotation(point=ImagePoint(600.0, 400.0)))
+        edit = set_ball(at.group.views[0].key, BallAnnotation(point=ImagePoint(600.0, 400.0)))
         after = submit(painted, 1, edit, if_match=at.etag, actor="ann")
         assert [view.calibration for view in after.solution.views] == calibrations(painted)
         assert after.group.paint == at.group.paint

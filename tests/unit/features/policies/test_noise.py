@@ -11,7 +11,7 @@ import pytest
 from app.db.log import Entry, append
 from app.db.store import Store
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.state import GroupState, read_states
 from app.features.groups.submit import submit
@@ -73,7 +73,7 @@ def placings(states: Sequence[GroupState]) -> Iterator[Entry]:
     """Ann placed every ball; then Bea those of every other group once more, and Cleo the others."""
     for state in states:
         for view in state.group.views:
-            body = {"edit": edit_to_json(SetBall(view.key, view.balls[0]))}
+            body = {"edit": edit_to_json(set_ball(view.key, view.balls[0]))}
             for actor in ("ann", "bea" if state.id % 2 else "cleo"):
                 yield Entry("edit", actor, "2026-01-01T00:00:00Z", body, 1, state.id)
 
@@ -300,7 +300,7 @@ class TestFollowing:
         before = read_policy(store, "demo")
         state = read_states_of(store)[0]
         ball = BallAnnotation(point=ImagePoint(5.0, 5.0))
-        submit(store, state.id, SetBall("a", ball), if_match=state.etag, actor="ben")
+        submit(store, state.id, set_ball("a", ball), if_match=state.etag, actor="ben")
         assert not stale_groups(store, "demo")
         assert read_policy(store, "demo") == before
 

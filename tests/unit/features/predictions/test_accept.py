@@ -6,7 +6,7 @@ import pytest
 
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.evaluation.frame import Detection
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history, undo
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import read_state_snapshot
@@ -28,7 +28,7 @@ def cleared(store, fill, make_group):
     """Two groups; nobody annotated a ball in the main view of the first."""
     ids = fill(make_group(7), make_group(8))
     state = load(store, ids[0])
-    return submit(store, ids[0], SetBall("7.png", None), if_match=state.etag, actor="ann")
+    return submit(store, ids[0], set_ball("7.png", None), if_match=state.etag, actor="ann")
 
 
 @pytest.fixture
@@ -135,7 +135,7 @@ class TestAccept:
 
         accept_predicted_balls(store, "demo", AcceptRequest(predictions.id), actor="bob")
         state = load(store, cleared.id)
-        edit = SetBall("7.png", BallAnnotation(box=Box(601, 300, 14, 14)))
+        edit = set_ball("7.png", BallAnnotation(box=Box(601, 300, 14, 14)))
         after = submit(store, cleared.id, edit, if_match=state.etag, actor="bob")
         assert after.group.view("7.png").ball.predicted_by == ""
 

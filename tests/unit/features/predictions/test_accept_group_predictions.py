@@ -5,7 +5,7 @@ import json
 import pytest
 
 from app.errors import NotFoundError
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.history import redo, undo
 from app.features.groups.submit import load, submit, submit_all
 from app.features.predictions.accept import AcceptedBall, accept_box, group_predictions
@@ -92,7 +92,7 @@ class TestAcceptedBall:
         state = accept_first(store, ids[0], "bob")
         ball = state.group.views[0].ball
         state = undo(store, ids[0], if_match=state.etag, actor="bob")
-        edits = [SetBall("7.png", ball), SetBall(state.group.views[1].key, None)]
+        edits = [set_ball("7.png", ball), set_ball(state.group.views[1].key, None)]
         submit_all(store, ids[0], edits, if_match=state.etag, actor="eve")
         (found,) = group_predictions(store, ids[0]).accepted
         assert found.actor == "eve"
@@ -107,14 +107,14 @@ class TestAcceptedBall:
     def test_a_ball_that_a_person_moved_is_none(self, store, ids, add) -> None:
         add("yolo", ("7.png", 10, 0.75))
         state = accept_first(store, ids[0], "bob")
-        moved = SetBall("7.png", BallAnnotation(box=Box(11, 300, 14, 14)))
+        moved = set_ball("7.png", BallAnnotation(box=Box(11, 300, 14, 14)))
         submit(store, ids[0], moved, if_match=state.etag, actor="bob")
         assert group_predictions(store, ids[0]).accepted == ()
 
     def test_an_imported_prediction_names_nobody(self, store, fill, make_group) -> None:
         group = make_group(7)
         ball = BallAnnotation(box=Box(10, 300, 14, 14), predicted_by="elsewhere")
-        (group_id,) = fill(SetBall("7.png", ball).apply(group))
+        (group_id,) = fill(set_ball("7.png", ball).apply(group))
         assert group_predictions(store, group_id).accepted == (
             AcceptedBall(
                 load(store, group_id).view_ids["7.png"], "7.png", "elsewhere", None, None, None

@@ -7,7 +7,7 @@ from sqlalchemy import func, select
 
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
 from app.features.predictions.evaluation import (
@@ -91,7 +91,7 @@ class TestRunEvaluation:
         assert first.pins["predictions"]["source"] == "a.json"
         assert first.pins["predictions"]["unknown"] == 0
         assert first.pins["policy_hash"] == states[0].policy.hash
-        edit = SetBall("7.png", None)
+        edit = set_ball("7.png", None)
         submit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
         assert (
             run_evaluation(store, "demo", request, actor="ann").pins["state"] != first.pins["state"]
@@ -101,7 +101,7 @@ class TestRunEvaluation:
         version = freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         request = EvaluationRequest(predictions=exact.id, version=version.id)
         first = run_evaluation(store, "demo", request, actor="ann")
-        edit = SetBall("7.png", None)
+        edit = set_ball("7.png", None)
         submit(store, states[0].id, edit, if_match=states[0].etag, actor="ann")
         again = run_evaluation(store, "demo", request, actor="ann")
         assert (again.pins, again.tables) == (first.pins, first.tables)

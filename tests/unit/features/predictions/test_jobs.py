@@ -6,7 +6,7 @@ import pytest
 
 from app.db.session import now
 from app.errors import NotFoundError
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.jobs.queries import NewJob, insert_job
 from app.features.jobs.service import Jobs
@@ -87,7 +87,7 @@ class TestResume:
 class TestRequestAccept:
     def test_counts_what_changed(self, store, state, jobs, predictions) -> None:
         jobs.start()
-        submit(store, state.id, SetBall("7.png", None), if_match=state.etag, actor="ann")
+        submit(store, state.id, set_ball("7.png", None), if_match=state.etag, actor="ann")
         request = AcceptRequest(predictions.id, query="")
         job = jobs.wait(request_accept(jobs, store, "demo", request, actor="bob").id, 60)
         assert job.state == "done", job.problem

@@ -7,7 +7,7 @@ from multiprocessing import get_context
 import pytest
 from sqlalchemy import text
 
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.queue.service import list_groups
 from app.features.solutions import service as module
@@ -51,7 +51,7 @@ class TestSolveDataset:
     def test_only_what_changed_is_solved_again(self, store, ids) -> None:
         solve_dataset(store, "demo")
         state = load(store, ids[2])
-        submit(store, ids[2], SetBall("cam1", None), if_match=state.etag, actor="ann")
+        submit(store, ids[2], set_ball("cam1", None), if_match=state.etag, actor="ann")
         assert stale_groups(store, "demo") == []
 
     def test_an_executor_makes_the_same(self, store, ids, small_chunks) -> None:
@@ -109,7 +109,7 @@ class TestSolveDataset:
         def change(group, policy, calibrations):
             if group.key == "12":
                 state = load(store, ids[2])
-                edit = SetBall("cam1", None)
+                edit = set_ball("cam1", None)
                 if state.revision == 1:
                     submit(store, ids[2], edit, if_match=state.etag, actor="ann")
             return solve_encoded(group, policy, calibrations)

@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.features.datasets.service import dataset_id
 from app.features.datasets.tables import ImportFindingModel
 from app.features.findings.service import FindingName, finding_values, set_dismissal
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.history import undo
 from app.features.groups.submit import load, submit
 from app.features.groups.suggested_edits import offers_of_finding
@@ -145,7 +145,7 @@ class TestFindings:
         judge(store, "rejected")
         state = load(store, beside)
         ball = state.group.views[0].ball
-        away = SetBall(state.group.views[0].key, type(ball)(point=ImagePoint(5.0, 5.0)))
+        away = set_ball(state.group.views[0].key, type(ball)(point=ImagePoint(5.0, 5.0)))
         submit(store, beside, away, if_match=state.etag, actor="ann")
         judge(store, "none")
         assert told(store) == []

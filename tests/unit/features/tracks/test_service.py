@@ -10,7 +10,7 @@ from app.db.log import read_log
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, StaleRevisionError
 from app.features.datasets.tables import GroupModel
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.solutions.service import solve_dataset
@@ -51,7 +51,7 @@ def move(store: Store, group: int, by: float) -> None:
     state = load(store, group)
     view = state.group.views[0]
     ball = replace(view.ball, point=ImagePoint(view.ball.point.x + by, view.ball.point.y))
-    submit(store, group, SetBall(view.key, ball), if_match=state.etag, actor="ann")
+    submit(store, group, set_ball(view.key, ball), if_match=state.etag, actor="ann")
     solve_dataset(store, "demo")
 
 

@@ -13,7 +13,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.tables import GroupModel
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
 from app.features.groups.state import VerdictState
 from app.features.groups.state_snapshot import read_state_snapshot
@@ -157,7 +157,7 @@ class TestGiveVerdicts:
 
     def test_gives_the_same_state_as_single_verdicts(self, store, ids) -> None:
         submit(
-            store, ids[1], SetBall("8_1.png", None), if_match=load(store, ids[1]).etag, actor="ann"
+            store, ids[1], set_ball("8_1.png", None), if_match=load(store, ids[1]).etag, actor="ann"
         )
         give_verdicts(store, 1, "", "accepted", note="seen", actor="ben")
         alone = []
@@ -230,7 +230,7 @@ class TestGiveVerdicts:
     def test_a_verdict_that_is_out_of_date_is_given_again(self, store, ids) -> None:
         give_verdicts(store, 1, "", "deferred", actor="ben")
         etag = load(store, ids[0]).etag
-        submit(store, ids[0], SetBall("7.png", None), if_match=etag, actor="ann")
+        submit(store, ids[0], set_ball("7.png", None), if_match=etag, actor="ann")
         assert (summarize_groups(store, 1).stale, summarize_groups(store, 1, "stale:no").stale) == (
             1,
             0,

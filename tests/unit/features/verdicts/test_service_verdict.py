@@ -8,7 +8,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import InputError, StaleRevisionError
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history, undo
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load, submit
@@ -97,7 +97,7 @@ class TestSetVerdict:
     def test_becomes_stale_by_an_edit_and_fresh_by_its_undo(self, store, state) -> None:
         accepted = judge(store, state, "accepted")
         edited = submit(
-            store, state.id, SetBall("7.png", BALL), if_match=accepted.etag, actor="ben"
+            store, state.id, set_ball("7.png", BALL), if_match=accepted.etag, actor="ben"
         )
         assert (edited.verdict.state, edited.verdict.stale) == ("accepted", True)
         back = undo(store, state.id, if_match=edited.etag, actor="ben")
@@ -121,7 +121,7 @@ class TestSetVerdict:
         assert row.reviewer is None
 
     def test_a_verdict_on_a_group_that_somebody_changed_is_refused(self, store, state) -> None:
-        submit(store, state.id, SetBall("7.png", BALL), if_match=state.etag, actor="ben")
+        submit(store, state.id, set_ball("7.png", BALL), if_match=state.etag, actor="ben")
         with pytest.raises(StaleRevisionError):
             judge(store, state, "accepted", note="note")
 

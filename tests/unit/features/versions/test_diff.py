@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from app.errors import InputError
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset, ingest
 from app.features.solutions.service import solve_dataset
@@ -38,7 +38,7 @@ def two(store, once, fill, make_group):
         state = load(store, ids[1])
         box = state.group.view("7.png").ball.box
         ball = BallAnnotation(box=Box(box.x + 0.5, box.y, box.width, box.height))
-        submit(store, ids[1], SetBall("7.png", ball), if_match=state.etag, actor="ben")
+        submit(store, ids[1], set_ball("7.png", ball), if_match=state.etag, actor="ben")
         judge(store, ids[1], "accepted")
         judge(store, ids[2], "rejected", "sides_confused")
         judge(store, ids[3], "accepted")
@@ -129,7 +129,7 @@ def judged_and_moved(store, fill, make_group):
         state = load(store, group)
         box = state.group.view(key).ball.box
         ball = BallAnnotation(box=Box(box.x + pixels, box.y, box.width, box.height))
-        submit(store, group, SetBall(key, ball), if_match=state.etag, actor="ben")
+        submit(store, group, set_ball(key, ball), if_match=state.etag, actor="ben")
     judge(store, ids[2], "accepted")
     return first, frozen(store, "v2", groups="passing")
 

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import text
 
 from app.errors import NotFoundError
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
@@ -66,7 +66,7 @@ class TestVerify:
 
     def test_it_holds_after_the_group_was_edited(self, store, version) -> None:
         state = load(store, 1)
-        submit(store, 1, SetBall("7.png", None), if_match=state.etag, actor="ben")
+        submit(store, 1, set_ball("7.png", None), if_match=state.etag, actor="ben")
         assert verify(store, version.id).ok
 
     def test_one_bit_is_a_difference_with_its_place(self, store, version, monkeypatch) -> None:

@@ -13,7 +13,7 @@ from app.features.agreement.adjudicate import decide_case, get_case, return_for_
 from app.features.agreement.service import after_submission, compare_submitted
 from app.features.batches.leases import BatchMember, Leases
 from app.features.batches.service import NewBatch, change_batch, make_batch
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
 from app.features.people.roles import Role
 from app.features.people.service import invite
@@ -76,7 +76,7 @@ def annotate(store: Store, batch: int, person: str, moved: float) -> int:
     view = next(view for view in state.group.views if view.ball is not None)
     assert view.ball is not None and view.ball.box is not None
     ball = replace(view.ball, box=replace(view.ball.box, x=view.ball.box.x + moved))
-    submit(store, copy, SetBall(view.key, ball), if_match=state.etag, actor=person)
+    submit(store, copy, set_ball(view.key, ball), if_match=state.etag, actor=person)
     judge(store, copy, "accepted", person)
     return copy
 

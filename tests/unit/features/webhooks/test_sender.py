@@ -13,7 +13,7 @@ from app.db.home import WEBHOOKS
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
-from app.features.groups.edit import SetBall
+from app.features.groups.edit import set_ball
 from app.features.groups.history import undo
 from app.features.groups.submit import submit
 from app.features.jobs.queries import NewJob, insert_job, update_job
@@ -86,7 +86,7 @@ class TestTelling:
         after = submit(
             allowed,
             state.id,
-            SetBall(state.group.views[0].key, BALL),
+            set_ball(state.group.views[0].key, BALL),
             if_match=state.etag,
             actor="ann",
         )

@@ -14,7 +14,7 @@ import pytest
 
 from app.db.store import Store
 from app.errors import ConflictError, OverloadedError
-from app.features.groups.edit import IncludeView, SetBall
+from app.features.groups.edit import IncludeView, set_ball
 from app.features.groups.history import undo
 from app.features.groups.submit import load, submit
 from app.features.policies.service import change_policy
@@ -71,7 +71,7 @@ class TestInStep:
         def edit() -> None:
             group = rng.choice(ids)
             name = f"{numbers[group]}{rng.choice(['', '_1'])}.png"
-            change = rng.choice([SetBall(name, None), IncludeView(name, rng.random() < 0.5)])
+            change = rng.choice([set_ball(name, None), IncludeView(name, rng.random() < 0.5)])
             submit(store, group, change, if_match=load(store, group).etag, actor="ann")
 
         def take_back() -> None:
@@ -103,7 +103,7 @@ class TestInStep:
         (group, *_) = fill(make_group(7), make_group(8))
         yields = YieldStore(store)
         etag = load(store, group).etag
-        etag = submit(store, group, SetBall("7.png", None), if_match=etag, actor="ann").etag
+        etag = submit(store, group, set_ball("7.png", None), if_match=etag, actor="ann").etag
         assert get_yield(yields, 1).passing == 1
         undo(store, group, if_match=etag, actor="ann")
         assert get_yield(yields, 1) == anew()
@@ -124,7 +124,7 @@ class TestInStep:
         (group, *_) = fill(*(make_group(number) for number in range(7, 12)))
         yields = YieldStore(store)
         yields.snapshot(1).blocks[0].block.__dict__["groups"] = 2
-        submit(store, group, SetBall("7.png", None), if_match=load(store, group).etag, actor="ann")
+        submit(store, group, set_ball("7.png", None), if_match=load(store, group).etag, actor="ann")
         assert get_yield(yields, 1) == anew()
 
 
@@ -178,7 +178,7 @@ class TestAfterARestart:
         yields = YieldStore(store)
         get_yield(yields, 1)
         for group, number in zip(ids, range(7, 13), strict=True):
-            change = SetBall(f"{number}.png", None)
+            change = set_ball(f"{number}.png", None)
             submit(store, group, change, if_match=load(store, group).etag, actor="ann")
             get_yield(yields, 1)
         blocks = {path.stem for path in folder(store).glob("*.facts")}

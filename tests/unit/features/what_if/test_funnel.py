@@ -11,7 +11,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.datasets.service import get_dataset
-from app.features.groups.edit import IncludeView, SetBall
+from app.features.groups.edit import IncludeView, set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset, ingest
 from app.features.policies.service import change_policy
@@ -340,7 +340,7 @@ class TestYieldStore:
         yields = YieldStore(store)
         assert get_yield(yields, 1).passing == 3
         state = load(store, ids[1])
-        state = submit(store, ids[1], SetBall("8.png", None), if_match=state.etag, actor="ann")
+        state = submit(store, ids[1], set_ball("8.png", None), if_match=state.etag, actor="ann")
         found = get_yield(yields, 1)
         assert [step.gate for step in found.funnel if step.dropped] == ["ball"]
         submit(
