@@ -59,6 +59,7 @@ from app.main import create_app
 from app.tracking.ball_run import BallClick
 from tests.drawn_balls import place, write_film
 from tests.flights import add_flight
+from tests.openapi import openapi_of
 from tests.tracked_frames import frame
 from tests.waiting import SECONDS
 
@@ -438,16 +439,16 @@ class TestOperations:
 class TestDocument:
     def test_every_operation_is_named_tagged_and_told(self, application: FastAPI) -> None:
         names = set()
-        for path, operations in application.openapi()["paths"].items():
+        for path, operations in openapi_of(application)["paths"].items():
             for method, operation in operations.items():
                 assert re.fullmatch(r"[a-z][A-Za-z]+", operation["operationId"]), (path, method)
                 assert operation["tags"], path
                 assert operation["description"], path
                 names.add(operation["operationId"])
-        assert len(names) == sum(map(len, application.openapi()["paths"].values()))
+        assert len(names) == sum(map(len, openapi_of(application)["paths"].values()))
 
     def test_every_refusal_is_a_problem(self, application: FastAPI) -> None:
-        for path, operations in application.openapi()["paths"].items():
+        for path, operations in openapi_of(application)["paths"].items():
             for operation in operations.values():
                 for status, answer in operation["responses"].items():
                     if int(status) >= 400:
@@ -456,7 +457,7 @@ class TestDocument:
     def test_a_change_names_its_precondition_and_its_answer_the_new_state(
         self, application: FastAPI
     ) -> None:
-        for path, operations in application.openapi()["paths"].items():
+        for path, operations in openapi_of(application)["paths"].items():
             for operation in operations.values():
                 names = {parameter["name"] for parameter in operation.get("parameters", [])}
                 if "If-Match" in names:
@@ -465,6 +466,6 @@ class TestDocument:
                     assert "ETag" in (answers.get("200") or answers["202"])["headers"], path
 
     def test_no_schema_of_the_framework_is_left(self, application: FastAPI) -> None:
-        schemas = application.openapi()["components"]["schemas"]
+        schemas = openapi_of(application)["components"]["schemas"]
         assert "Problem" in schemas
         assert not [name for name in schemas if "HTTPValidation" in name or "__" in name]

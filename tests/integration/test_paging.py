@@ -37,6 +37,7 @@ from app.features.webhooks.messages import Kind
 from app.features.webhooks.service import make_webhook, send_ping
 from app.http.server import listen, make_server
 from app.main import create_app
+from tests.openapi import openapi_of
 from tests.scenes import make_scenes
 from tests.tracked_frames import frame
 from tests.videos import write_video
@@ -169,7 +170,7 @@ def lists(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[
 
 class TestEveryList:
     def test_takes_a_limit_and_a_cursor_and_answers_the_next_one(self, application: Any) -> None:
-        found = list(lists(application.openapi()))
+        found = list(lists(openapi_of(application)))
         assert len(found) >= 45
         for path, operation, schema in found:
             queries = {one["name"]: one for one in operation["parameters"] if one["in"] == "query"}
@@ -184,7 +185,7 @@ class TestEveryList:
         self, application: Any, client: touchline.Client
     ) -> None:
         several = set()
-        for path, operation, _ in lists(application.openapi()):
+        for path, operation, _ in lists(openapi_of(application)):
             target = re.sub(r"{(\w+)}", lambda name: ADDRESS[name[1]], path)
             asked = {one["name"] for one in operation["parameters"] if one["in"] == "query"}
             query = {"dataset": "small"} if "dataset" in asked else {}

@@ -11,6 +11,7 @@ import pytest
 from app.features.jobs.queries import NewJob, insert_job, update_job
 from app.features.people.ownership import OwnedKind
 from app.features.people.roles import Action, Role
+from tests.openapi import openapi_of
 from tests.security.apart import (
     API,
     MINE,
@@ -251,7 +252,7 @@ class TestPermissions:
         assert looked > 100
 
     def test_what_it_names_are_parameters_that_the_route_has(self, apart: Apart) -> None:
-        document = apart.app.openapi()["paths"]
+        document = openapi_of(apart.app)["paths"]
         for route, permission in PERMISSIONS.items():
             method, path = route.split(" ")
             if path not in document:

@@ -14,6 +14,7 @@ from app.features.people.roles import Action, Role
 from app.features.people.visibility_queries import COPIES
 from app.features.solutions.service import solve_dataset
 from app.http.permissions import QUERIES
+from tests.openapi import openapi_of
 from tests.scenes import make_scenes
 from tests.security.apart import API, PERMISSIONS, Apart, opened
 from tests.security.table import rows
@@ -170,7 +171,7 @@ def with_query(team: Apart, asked: tuple[str, str, str, tuple[str, ...]], query:
 
 class TestQueries:
     def test_every_place_that_takes_one_applies_the_rule_of_who_asks(self, team: Apart) -> None:
-        places = list(queries_in(team.app.openapi()))
+        places = list(queries_in(openapi_of(team.app)))
         assert len({path for _, path, _, _ in places}) > 10
         assert {place for _, _, place, _ in places} == {"query", "body"}
         for asked in places:

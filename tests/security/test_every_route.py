@@ -26,6 +26,7 @@ from app.db.store import Store
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.main import create_app
 from tests.databases import content
+from tests.openapi import openapi_of
 from tests.scenes import make_scenes
 from tests.security.asking import JSON, Answer, assert_guarded
 from tests.security.conftest import API, FORMULA, Guarded
@@ -127,7 +128,7 @@ class TestTable:
 
     def test_it_agrees_with_the_document(self, app: Any) -> None:
         """A kind that leaves out what a route has is no reason to leave the attacks out."""
-        document = app.openapi()["paths"]
+        document = openapi_of(app)["paths"]
         for row in rows():
             assert ("paths" in row.classes) == bool(row.parameters), row
             operation = document.get(row.path, {}).get(row.method.lower())

@@ -19,6 +19,7 @@ from app.http import idempotency
 from app.http.deps import Services
 from app.http.documents import no_content, responds
 from tests.databases import content
+from tests.openapi import openapi_of
 from tests.unit.http import dataset_requests, group_requests
 from tests.unit.http.group_requests import API, Made, Request, ball, store_of, verdict
 
@@ -161,7 +162,7 @@ class TestTable:
     def test_every_operation_that_takes_a_key_is_in_one_of_the_tables(self, app) -> None:
         keyed = [
             operation["operationId"]
-            for operations in app.openapi()["paths"].values()
+            for operations in openapi_of(app)["paths"].values()
             for operation in operations.values()
             if "Idempotency-Key" in [item["name"] for item in operation["parameters"]]
         ]

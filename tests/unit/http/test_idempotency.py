@@ -24,6 +24,7 @@ from app.features.verdicts.service import set_verdict
 from app.http.idempotency import Idempotency, RequestDigest
 from app.http.request_limits import WRITE
 from app.http.server import Server, listen
+from tests.openapi import openapi_of
 from tests.waiting import SECONDS
 
 API = "/api/v1"
@@ -140,7 +141,7 @@ class TestKey:
         assert answer.json()["detail"].startswith("Idempotency-Key must be")
 
     def test_every_route_that_changes_something_takes_a_key(self, app) -> None:
-        for path, operations in app.openapi()["paths"].items():
+        for path, operations in openapi_of(app)["paths"].items():
             for method, operation in operations.items():
                 names = [item["name"] for item in operation["parameters"]]
                 # What shows a secret once, or ends one, keeps no answer.

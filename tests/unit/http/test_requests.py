@@ -29,6 +29,7 @@ from app.http.requests import (
     read_json,
     require_json_type,
 )
+from tests.openapi import openapi_of
 
 
 def refusal(body: bytes) -> str:
@@ -289,7 +290,7 @@ class TestParameters:
         assert answer.json()["detail"] == "/zzz: there is no such parameter"
 
     def test_none_is_a_list(self, app) -> None:
-        for path, operations in app.openapi()["paths"].items():
+        for path, operations in openapi_of(app)["paths"].items():
             for operation in operations.values():
                 for one in operation.get("parameters", []):
                     kinds = one["schema"].get("anyOf", [one["schema"]])
@@ -306,7 +307,7 @@ class TestNumbers:
 
     def test_so_is_a_number_of_every_query(self, api, app) -> None:
         found = 0
-        for path, operations in app.openapi()["paths"].items():
+        for path, operations in openapi_of(app)["paths"].items():
             one = operations.get("get", {"parameters": []})
             for item in one.get("parameters", []):
                 kinds = item["schema"].get("anyOf", [item["schema"]])
@@ -368,7 +369,7 @@ class TestFields:
 
     def test_no_error_names_a_field_that_its_place_does_not_have(self, api, app) -> None:
         """Whatever is misspelt, in the outer object of each body of a recording's routes."""
-        document, seen = app.openapi(), 0
+        document, seen = openapi_of(app), 0
         for path, operations in document["paths"].items():
             for method, operation in operations.items():
                 content = operation.get("requestBody", {}).get("content", {})
@@ -391,7 +392,7 @@ class TestFields:
 
 class TestDryRun:
     def test_is_a_parameter_wherever_there_is_one(self, app) -> None:
-        document = app.openapi()
+        document = openapi_of(app)
         for path, operations in document["paths"].items():
             for method, operation in operations.items():
                 schema = operation.get("requestBody", {}).get("content", {})

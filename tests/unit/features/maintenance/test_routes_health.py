@@ -20,6 +20,7 @@ from structlog.testing import capture_logs
 from app.config import Settings
 from app.errors import StorageError
 from app.http.deps import Services
+from tests.openapi import openapi_of
 
 API = "/api/v1"
 SLOW = ("/events", "/suggestions", "/influence", "/yield")
@@ -140,7 +141,7 @@ def overwrite_text(database: Path, table: str, column: str, text: str, kept: Kep
 def readable(app: FastAPI) -> list[str]:
     """An address for each GET of the interface, the first of everything."""
     found = []
-    for path, operations in app.openapi()["paths"].items():
+    for path, operations in openapi_of(app)["paths"].items():
         if "get" in operations and not path.endswith(SLOW):
             named = path.replace("{dataset}", "broadcast")
             query = "?dataset=broadcast" if "{" not in path else ""
