@@ -24,6 +24,7 @@ from app.tracking.ball_track import (
     BallMode,
     BallTrack,
     Correction,
+    ViewErrors,
 )
 
 NEAR_FRAMES = 3
@@ -191,15 +192,15 @@ def _solved(
     if not len(numbers):
         return None
     near, options = measurements.part(numbers), TrackOptions()
-    late = dict(track.offsets)
-    shift = np.array([late.get(name, 0.0) for name in near.names])
+    known = ViewErrors(dict(track.noise), dict(track.offsets))
+    shift = known.shifts(near.names)
     said = TrackConstraints(
         tuple(_event_constraints(track, corrections)),
         tuple(_held(track, begin, end, first, last, corrections, pitch)),
     )
     own = slice(begin, end + 1)
     runs = [
-        solve_run(near, rows, times[own], shift, pitch, options, said)
+        solve_run(near, rows, times[own], shift, pitch, options, said, known)
         for rows in runs_of(near.times, options.longest_gap_s)
     ]
     if all(run.fitted is None for run in runs):

@@ -103,16 +103,28 @@ def move(m, P, mode, dt):
 @njit(cache=True, nogil=True, error_model="numpy")
 def pin(m, P, e, value, variance):
     """Take a measurement ``e . position = value``; the square of its miss by its variance, and that."""
-    g = np.zeros(6)
+    # Most of a search is spent here: without an array of its own, and with one division, it takes a third.
+    x, y, z = e[0], e[1], e[2]
+    g0 = P[0, 0] * x + P[0, 1] * y + P[0, 2] * z
+    g1 = P[1, 0] * x + P[1, 1] * y + P[1, 2] * z
+    g2 = P[2, 0] * x + P[2, 1] * y + P[2, 2] * z
+    g3 = P[3, 0] * x + P[3, 1] * y + P[3, 2] * z
+    g4 = P[4, 0] * x + P[4, 1] * y + P[4, 2] * z
+    g5 = P[5, 0] * x + P[5, 1] * y + P[5, 2] * z
+    total = g0 * x + g1 * y + g2 * z + variance
+    miss = value - (m[0] * x + m[1] * y + m[2] * z)
+    part = 1.0 / total
+    gains = (g0, g1, g2, g3, g4, g5)
     for i in range(6):
-        g[i] = P[i, 0] * e[0] + P[i, 1] * e[1] + P[i, 2] * e[2]
-    total = g[0] * e[0] + g[1] * e[1] + g[2] * e[2] + variance
-    miss = value - (m[0] * e[0] + m[1] * e[1] + m[2] * e[2])
-    for i in range(6):
-        m[i] += g[i] * miss / total
-        for j in range(6):
-            P[i, j] -= g[i] * g[j] / total
-    return miss * miss / total, total
+        share = gains[i] * part
+        m[i] += share * miss
+        P[i, 0] -= share * g0
+        P[i, 1] -= share * g1
+        P[i, 2] -= share * g2
+        P[i, 3] -= share * g3
+        P[i, 4] -= share * g4
+        P[i, 5] -= share * g5
+    return miss * miss * part, total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

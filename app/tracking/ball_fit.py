@@ -90,6 +90,8 @@ def fit(
     start: FloatArray,
     noise: FloatArray,
     unseen: FloatArray,
+    *,
+    brief: bool = False,
 ) -> Fitted:
     """Fit the way of a ball.
 
@@ -102,23 +104,24 @@ def fit(
         noise: Of each ray, radians, shape (R,).
         unseen: What touches that nobody saw add to the noise of the acceleration before each
             knot, (m/s2)2 s, shape (K,).
+        brief: Leave out what only a result tells: ``event_sigma`` is NaN, and nothing is late.
     """
     problem = _Problem(knots, mode, event, used, noise, unseen, start)
     state = start
     for _ in range(_ROUNDS):
         diagonal, beside, pull = problem.equations(state)
         rows = factor(diagonal, beside)
-        step = -solve_factored(rows, SIZE, pull.ravel()).reshape(-1, SIZE)
+        step = -solve_factored(rows, pull.ravel()).reshape(-1, SIZE)
         most = float(np.abs(step[:, P]).max())
         state = state + step * min(1.0, _MOST_M / max(most, 1e-12))
         if most < _SETTLED_M:
             break
     diagonal, beside, _ = problem.equations(state)
     rows = factor(diagonal, beside)
-    covariance, after = inverse_blocks(rows, SIZE)
-    when, spread = problem.events(state, covariance, after)
+    covariance, after = inverse_blocks(rows)
+    when, spread = problem.events(state, None if brief else (covariance, after))
     miss, slope, weight = problem.misses(state)
-    late = problem.lateness(state, rows)
+    late = (np.zeros((0, 0)), np.zeros(0)) if brief else problem.lateness(state, rows)
     return Fitted(state, covariance, miss, slope, weight, when, spread, *late)
 
 
@@ -174,9 +177,9 @@ class _Problem:
         return found
 
     def events(
-        self, state: FloatArray, covariance: FloatArray, after: FloatArray
+        self, state: FloatArray, blocks: tuple[FloatArray, FloatArray] | None
     ) -> tuple[FloatArray, FloatArray]:
-        """Times of the events before each knot, and their sigmas, both (K,)."""
+        """Times of the events before each knot, and their sigmas, NaN without blocks of covariance, both (K,)."""
         when, spread = np.full(len(state), np.nan), np.full(len(state), np.nan)
         for at in self.loud.tolist():
             _, slopes, own, way, time, slack = hit(
@@ -184,6 +187,9 @@ class _Problem:
                 self.event[at + 1] == BOUNCE,
             )  # fmt: skip
             when[at + 1] = self.knots.times[at] + time
+            if blocks is None:
+                continue
+            covariance, after = blocks
             rows = np.flatnonzero(np.isfinite(own))
             both = np.block([[covariance[at], after[at]], [after[at].T, covariance[at + 1]]])
             noise = np.diag(own[rows]) + slopes[rows] @ both @ slopes[rows].T
@@ -207,7 +213,7 @@ class _Problem:
             np.add.at(tied[view][:, P], knots.at[own], np.einsum("rki,rk->ri", slope[own], push))
         flat = tied.reshape(views, -1)
         for view in range(views):
-            known[view] -= flat @ solve_factored(rows, SIZE, flat[view])
+            known[view] -= flat @ solve_factored(rows, flat[view])
         return (known + known.T) / 2, pull
 
 

@@ -321,72 +321,98 @@ def factor(diagonal, beside):
         beside: Those right of them, shape (K - 1, S, S).
 
     Returns:
-        Rows of the factor, the diagonal in the last column, shape (K * S, 2 * S).
+        Rows of the upper factor by block, from the block itself to the end of the next one, shape (K, S, 2 * S).
     """
     count, size = diagonal.shape[0], diagonal.shape[1]
     wide = 2 * size
-    rows = np.zeros((count * size, wide))
-    for i in range(count * size):
-        block, own = i // size, i % size
-        first = max(0, (block - 1) * size)
-        for j in range(first, i + 1):
-            other = j // size
-            if other == block:
-                total = diagonal[block, own, j % size]
-            else:
-                total = beside[other, j % size, own]
-            begin = max(first, (other - 1) * size)
-            for m in range(begin, j):
-                total -= rows[i, wide - 1 - (i - m)] * rows[j, wide - 1 - (j - m)]
-            if j == i:
-                rows[i, wide - 1] = np.sqrt(max(total, 1e-12))
-            else:
-                rows[i, wide - 1 - (i - j)] = total / rows[j, wide - 1]
+    rows = np.zeros((count, size, wide))
+    for k in range(count):
+        own = rows[k]
+        own[:, :size] = diagonal[k]
+        if k + 1 < count:
+            own[:, size:] = beside[k]
+        for m in range(size if k else 0):
+            before = rows[k - 1, m]
+            for i in range(size):
+                share = before[size + i]
+                for j in range(i, size):
+                    own[i, j] -= share * before[size + j]
+        for i in range(size):
+            part = 1.0 / np.sqrt(max(own[i, i], 1e-12))
+            for j in range(i):
+                own[i, j] = 0.0
+            for j in range(i, wide):
+                own[i, j] *= part
+            for m in range(i + 1, size):
+                share = own[i, m]
+                for j in range(m, wide):
+                    own[m, j] -= share * own[i, j]
     return rows
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def solve_factored(rows, size, right):
-    """Solve for a right side, shape (N,), with the factor of ``factor``."""
-    count, wide = rows.shape
-    found = right.copy()
-    for i in range(count):
-        for m in range(max(0, (i // size - 1) * size), i):
-            found[i] -= rows[i, wide - 1 - (i - m)] * found[m]
-        found[i] /= rows[i, wide - 1]
-    for i in range(count - 1, -1, -1):
-        found[i] /= rows[i, wide - 1]
-        for m in range(max(0, (i // size - 1) * size), i):
-            found[m] -= rows[i, wide - 1 - (i - m)] * found[i]
-    return found
+def solve_factored(rows, right):
+    """Solve for a right side, shape (K * S,), with the factor of ``factor``."""
+    count, size, wide = rows.shape
+    found = np.zeros((count + 1) * size)
+    found[: count * size] = right
+    for k in range(count):
+        for i in range(size):
+            at = k * size + i
+            found[at] /= rows[k, i, i]
+            for j in range(i + 1, wide):
+                found[k * size + j] -= rows[k, i, j] * found[at]
+    for k in range(count - 1, -1, -1):
+        for i in range(size - 1, -1, -1):
+            at = k * size + i
+            total = found[at]
+            for j in range(i + 1, wide):
+                total -= rows[k, i, j] * found[k * size + j]
+            found[at] = total / rows[k, i, i]
+    return found[: count * size]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def inverse_blocks(rows, size):
+def inverse_blocks(rows):
     """Blocks of the inverse on the diagonal, (K, S, S), and right of them, (K - 1, S, S).
 
     Source: K. Takahashi, J. Fagan, M. Chin, 1973: the inverse within the pattern of its factor.
     """
-    count, wide = rows.shape
-    blocks = count // size
-    own, beside = np.zeros((blocks, size, size)), np.zeros((max(blocks - 1, 0), size, size))
-    for i in range(count - 1, -1, -1):
-        block, a = i // size, i % size
-        last = min(count, (block + 2) * size)
-        for j in range(last - 1, i - 1, -1):
-            total = 1.0 / rows[i, wide - 1] if i == j else 0.0
-            for m in range(i + 1, last):
-                # The entry at (m, j), both of this block or the next.
-                low, high = min(m, j), max(m, j)
-                if low // size == high // size:
-                    entry = own[low // size, low % size, high % size]
-                else:
-                    entry = beside[block, low % size, high % size]
-                total -= rows[m, wide - 1 - (m - i)] * entry
-            total /= rows[i, wide - 1]
-            if j // size == block:
-                own[block, a, j % size] = total
-                own[block, j % size, a] = total
-            else:
-                beside[block, a, j % size] = total
+    count, size, wide = rows.shape
+    own, beside = np.zeros((count, size, size)), np.zeros((max(count - 1, 0), size, size))
+    for k in range(count - 1, -1, -1):
+        # The inverse of the block of the factor itself, and that times what is right of it.
+        both = np.zeros((size, wide))
+        for i in range(size - 1, -1, -1):
+            both[i, i] = 1.0
+            for j in range(size, wide):
+                both[i, j] = rows[k, i, j]
+            for m in range(i + 1, size):
+                share = rows[k, i, m]
+                for j in range(m, wide):
+                    both[i, j] -= share * both[m, j]
+            part = 1.0 / rows[k, i, i]
+            for j in range(i, wide):
+                both[i, j] *= part
+        for i in range(size):
+            for j in range(i, size):
+                total = 0.0
+                for m in range(j, size):
+                    total += both[i, m] * both[j, m]
+                own[k, i, j] = total
+        if k + 1 < count:
+            for i in range(size):
+                for m in range(size):
+                    share = both[i, size + m]
+                    for j in range(size):
+                        beside[k, i, j] -= share * own[k + 1, m, j]
+            for i in range(size):
+                for j in range(i, size):
+                    total = own[k, i, j]
+                    for m in range(size):
+                        total -= beside[k, i, m] * both[j, size + m]
+                    own[k, i, j] = total
+        for i in range(size):
+            for j in range(i):
+                own[k, i, j] = own[k, j, i]
     return own, beside

@@ -131,9 +131,25 @@ def joined(
             for name, late in zip(measurements.names, shift, strict=True)
             if abs(late) > LEAST_TOLD_S
         ),
+        noise=_noise(measurements, runs),
         untracked=tuple(sorted(untracked, key=lambda one: one.first)),
         jumps=tuple(jumps),
     )
+
+
+def _noise(measurements: BallMeasurements, runs: Sequence[Run]) -> tuple[tuple[str, float], ...]:
+    """Times that views are noisier than is said of them, the mean over their rays, where it is more than once."""
+    times, rays = dict[str, float](), dict[str, int]()
+    for run in runs:
+        if run.knots is None or run.fitted is None:
+            continue
+        said = measurements.sigma[run.knots.rows] / run.knots.scale
+        for view, name in enumerate(run.names):
+            own = run.knots.view == view
+            times[name] = times.get(name, 0.0) + float((run.knots.noise[own] / said[own]).sum())
+            rays[name] = rays.get(name, 0) + int(own.sum())
+    mean = {name: times[name] / rays[name] for name in sorted(times) if rays[name]}
+    return tuple((name, value) for name, value in mean.items() if value > 1 + 1e-9)
 
 
 def _untracked(measurements: BallMeasurements, run: Run, reason: str) -> Untracked:

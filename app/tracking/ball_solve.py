@@ -11,7 +11,7 @@ from app.tracking.ball_join import OPEN, joined
 from app.tracking.ball_solve_run import FEWEST as FEWEST
 from app.tracking.ball_solve_run import Run, contradiction, runs_of, solve_run, too_few
 from app.tracking.ball_solve_run import TrackOptions as TrackOptions
-from app.tracking.ball_track import BallMeasurements, BallTrack
+from app.tracking.ball_track import BallMeasurements, BallTrack, ViewErrors
 
 _ODD = 0.4
 """Share of one view's rays beyond which it is of something else."""
@@ -29,6 +29,7 @@ def track_ball(
     pitch: Pitch,
     options: TrackOptions | None = None,
     said: TrackConstraints | None = None,
+    known: ViewErrors | None = None,
 ) -> BallTrack:
     """The ball in every frame of a stretch, from one ball in one or more calibrated views.
 
@@ -39,6 +40,7 @@ def track_ball(
         pitch: Where the ball is played.
         options: The defaults without them.
         said: What people say of its way beside that.
+        known: Of a part of a track: what the whole says of the views. It was judged as a whole.
 
     Returns:
         The track; with a reason instead of positions where the measurements say none.
@@ -47,17 +49,16 @@ def track_ball(
     frames, times = np.asarray(frames), np.asarray(times, dtype=float)
     reason = too_few(measurements) if len(frames) else "The stretch has no frames."
     if reason is None:
-        shift = np.zeros(len(measurements.names))
+        shift = (known or ViewErrors()).shifts(measurements.names)
         for _ in range(_SHIFTS):
             runs = [
-                solve_run(measurements, rows, times, shift, pitch, options, said)
+                solve_run(measurements, rows, times, shift, pitch, options, said, known)
                 for rows in runs_of(measurements.times, options.longest_gap_s)
             ]
-            moved = _late(measurements, runs)
-            if not moved.any():
+            if known is not None or not (moved := _late(measurements, runs)).any():
                 break
             shift += moved
-        odd = _odd_view(measurements, runs)
+        odd = None if known is not None else _odd_view(measurements, runs)
         reason = next((run.reason for run in runs if run.reason), None)
         if odd is not None:
             reason = odd

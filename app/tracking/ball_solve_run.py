@@ -14,7 +14,7 @@ from app.tracking.ball_constraints import TrackConstraints
 from app.tracking.ball_fit import Fitted, fit
 from app.tracking.ball_models import NOTHING
 from app.tracking.ball_search import History, Knots, knots_of, louder, search
-from app.tracking.ball_track import BallMeasurements
+from app.tracking.ball_track import BallMeasurements, ViewErrors
 
 FEWEST = 6
 """Instants that a track is made of."""
@@ -102,6 +102,7 @@ def solve_run(
     pitch: Pitch,
     options: TrackOptions,
     said: TrackConstraints | None = None,
+    known: ViewErrors | None = None,
 ) -> Run:
     """Search and fit a run.
 
@@ -113,6 +114,7 @@ def solve_run(
         pitch: Where the ball is played.
         options: As of the track.
         said: What is said beside the measurements.
+        known: Of a part of a track: what the whole says of the views. It was judged as a whole.
     """
     part = measurements.part(rows)
     names = list(measurements.names)
@@ -121,22 +123,25 @@ def solve_run(
     first, last = part.times.min() - options.beyond_s, part.times.max() + options.beyond_s
     own = shift[[names.index(name) for name in part.names]]
     knots = knots_of(part, times[(times >= first) & (times <= last)], own, said)
-    knots = louder(knots, _INEXACT)
+    if known is None:
+        knots = louder(knots, _INEXACT)
+    else:
+        knots = replace(knots, noise=knots.noise * known.factors(part.names)[knots.view])
     if len(np.unique(knots.at)) < FEWEST:
         return Run(rows, "The ball lies where its cameras have no rays.")
     history = search(knots, pitch)
     wrong = 1 - float(history.used.mean())
-    if wrong > _CONTRADICT:
+    if known is None and wrong > _CONTRADICT:
         return Run(rows, contradiction(f"{wrong:.0%} of the measurements fit no ball"))
     event = history.event.copy()
     used, noise = history.used.copy(), knots.noise
     unseen = _unseen(knots)
     state = np.pad(history.state, ((0, 0), (0, 3)))
     for turn in range(4):
-        fitted = fit(knots, history.mode, event, used, state, noise, unseen)
+        fitted = fit(knots, history.mode, event, used, state, noise, unseen, brief=True)
         state = fitted.state
         scale = _scale(knots, fitted, used)
-        if turn == 0 and np.median(scale) > _LOUD:
+        if known is None and turn == 0 and np.median(scale) > _LOUD:
             times_said = float(np.median(scale))
             what = f"the views miss each other by {times_said:.0f} times their noise"
             return Run(rows, contradiction(what))

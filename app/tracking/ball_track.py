@@ -5,6 +5,7 @@ Pitch frame, metres and seconds; z points down, so that a ball in the air has ne
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -74,6 +75,27 @@ class BallMeasurements:
             self.sizes[rows],
             self.size_sigma[rows],
         )
+
+
+@dataclass(frozen=True)
+class ViewErrors:
+    """How wrong views are, as a whole track tells it: a part of it alone would tell less, and otherwise.
+
+    Attributes:
+        noise: As of ``BallTrack``, by name.
+        late: Seconds to add to the times of a view, by name.
+    """
+
+    noise: Mapping[str, float] = field(default_factory=dict)
+    late: Mapping[str, float] = field(default_factory=dict)
+
+    def factors(self, names: Sequence[str]) -> FloatArray:
+        """Times that views are noisier than is said of them, shape (V,)."""
+        return np.array([self.noise.get(name, 1.0) for name in names])
+
+    def shifts(self, names: Sequence[str]) -> FloatArray:
+        """Seconds to add to the times of views, shape (V,)."""
+        return np.array([self.late.get(name, 0.0) for name in names])
 
 
 @dataclass(frozen=True)
@@ -204,6 +226,8 @@ class BallTrack:
         left_out: None where nothing was left out.
         offsets: Seconds to add to a view's times, as the ball shows them, by name; only where that
             is observable and not nought.
+        noise: Times that a view is noisier than is said of it, because its camera is inexact, by name; only where
+            that is more than once.
         untracked: Runs of measurements that are in no track, though others are.
         jumps: Where views that take over put the ball elsewhere, by time.
     """
@@ -221,6 +245,7 @@ class BallTrack:
     reason: str | None = None
     left_out: LeftOut | None = None
     offsets: tuple[tuple[str, float], ...] = ()
+    noise: tuple[tuple[str, float], ...] = ()
     untracked: tuple[Untracked, ...] = ()
     jumps: tuple[ViewJump, ...] = ()
 

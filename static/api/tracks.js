@@ -22,6 +22,8 @@ import { idempotencyKey, queryText, request, requestTagged } from './client.js';
  * @property {string | null} reason
  * @property {number} rate
  * @property {Record<string, number>} unused
+ * @property {Record<string, number>} noise times that balls of a camera are noisier than clicks because it is inexact
+ * @property {Record<string, number>} late seconds to add to the times of a camera
  */
 /**
  * @typedef {object} TrackJson

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
+from typing import Any
 
 import numpy as np
 
+from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.datasets.service import read_dataset_head
-from app.features.tracks.codec import TrackInputs, make_track
+from app.features.tracks.codec import TrackInputs, make_part
 from app.features.tracks.findings import groups_by_frame
 from app.features.tracks.making import read_records
 from app.features.tracks.queries import (
+    TrackGroup,
     find_row,
     keys_of_match,
     list_rows,
@@ -29,13 +34,20 @@ from app.features.tracks.stored import (
     track_etag,
 )
 from app.features.tracks.stretches import frame_of, gather_stretches
+from app.formats.export_record import ExportRecord
 from app.soccer.pitch import Pitch
-from app.tracking.ball_track import BallMeasurements, BallTrack
+from app.tracking.ball_track import BallMeasurements, BallTrack, ViewErrors
 
 AROUND = 25
 """Frames before and after the one that is asked for."""
-_MARGIN = 15
+_MARGIN = 10
 """Frames more that are tracked on either side, so that what is told knows what comes before and after."""
+
+
+_MOST_KEPT = 500
+"""Groups that are kept as they were read: people go from one to the next."""
+_kept: dict[tuple[Any, ...], ExportRecord] = {}
+_lock = Lock()
 
 
 @dataclass(frozen=True)
@@ -114,7 +126,7 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
         ]
         groups = match_groups(session, head.id, [row.match], ids).get(row.match, [])
         near = groups_by_frame(groups, first, last)
-        records = list(read_records(session, list(near.values())))
+        records = _records(session, list(near.values()), head.policy.hash)
         runs = followed_runs(session, head.id).get(row.match, [])
         close = {row.match: [run for run in runs if run.first <= last and first <= run.last]}
         followed = {
@@ -131,8 +143,25 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
     else:
         corrections = (item for item in corrections_of(row) if first <= item.frame <= last)
         inputs = TrackInputs.of(stretches[0], corrections)
-        ball = make_track(inputs)
+        ball = make_part(inputs, ViewErrors(summary.noise, summary.late))
     return Around(track_etag(row), ball, inputs, near, frame)
+
+
+def _records(session: Session, groups: Sequence[TrackGroup], policy: str) -> list[ExportRecord]:
+    """Groups with their solutions; those that were read before for a frame near by are not read again."""
+    key_of = {group.key: (group.id, group.source, group.state, policy) for group in groups}
+    with _lock:
+        found = {key: _kept[said] for key, said in key_of.items() if said in _kept}
+    missing = [group for group in groups if group.key not in found]
+    new = {record.group.key: record for record in read_records(session, missing)}
+    with _lock:
+        # What is not solved by now may be solved without another change.
+        solved = {key_of[key]: record for key, record in new.items() if record.solution is not None}
+        _kept.update(solved)
+        for said in list(_kept)[: max(len(_kept) - _MOST_KEPT, 0)]:
+            del _kept[said]
+    found |= new
+    return [found[group.key] for group in groups if group.key in found]
 
 
 def _nothing(rate: float, first: int, last: int) -> tuple[BallTrack, TrackInputs]:

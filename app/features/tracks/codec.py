@@ -29,10 +29,11 @@ from app.tracking.ball_track import (
     EventKind,
     LeftOut,
     Untracked,
+    ViewErrors,
     ViewJump,
 )
 
-TRACK_VERSION = "4"
+TRACK_VERSION = "5"
 """Of the solver: tracks of another one are stale."""
 EVENT_KINDS: tuple[str, ...] = get_args(EventKind)
 _UPPER = np.triu_indices(6)
@@ -71,6 +72,13 @@ class TrackInputs:
 def make_track(inputs: TrackInputs) -> BallTrack:
     """The track of inputs, with their corrections."""
     track = track_ball(inputs.measurements, inputs.frames, inputs.times, pitch=inputs.pitch)
+    return corrected(inputs, track, correct(inputs, track))
+
+
+def make_part(inputs: TrackInputs, known: ViewErrors) -> BallTrack:
+    """The track of a part of a stretch, with corrections, where the whole says how wrong views are."""
+    measured, frames, times = inputs.measurements, inputs.frames, inputs.times
+    track = track_ball(measured, frames, times, pitch=inputs.pitch, known=known)
     return corrected(inputs, track, correct(inputs, track))
 
 
@@ -230,6 +238,7 @@ def track_to_json(track: BallTrack) -> Json:
             "predicted": left.predicted,
         },
         "offsets": [list(item) for item in track.offsets],
+        "noise": [list(item) for item in track.noise],
     }
 
 
@@ -299,7 +308,8 @@ def track_from_json(value: Mapping[str, Any]) -> BallTrack:
                 left["predicted"],
             ),
             tuple((name, offset) for name, offset in value["offsets"]),
-            # Tracks of earlier versions do not say it.
+            # Tracks of earlier versions do not say these.
+            tuple((name, times) for name, times in value.get("noise", ())),
             tuple(Untracked(*item) for item in value.get("untracked", ())),
             tuple(
                 ViewJump(frame, time, metres, tuple(views))

@@ -27,6 +27,7 @@ class TrackGroup:
         state: What a track depends on: what was said, whether it is solved, whether it is rejected.
         rejected: Whether a person rejected it.
         place: Where its own views put the ball, pitch frame, metres; None where they do not.
+        source: As what its dataset brought it, and how often it was changed.
     """
 
     id: int
@@ -34,6 +35,7 @@ class TrackGroup:
     state: tuple[str, bool, bool]
     rejected: bool
     place: tuple[float, float, float] | None
+    source: tuple[str, int]
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,7 @@ def match_groups(
     statement = (
         select(
             GroupModel.id, GroupModel.key, GroupModel.match, GroupModel.inputs_hash,
-            queue.solved, queue.status, queue.x_m, queue.y_m, queue.height_m,
+            GroupModel.source_hash, GroupModel.revision, queue.solved, queue.status, queue.x_m, queue.y_m, queue.height_m,
         )
         .outerjoin(queue, queue.group_id == GroupModel.id)
         .where(GroupModel.dataset_id == dataset_id)
@@ -180,6 +182,7 @@ def match_groups(
             place = row.x_m, row.y_m, -row.height_m
         rejected = row.status == "rejected"
         state = row.inputs_hash, bool(row.solved), rejected
-        group = TrackGroup(row.id, row.key, state, rejected, place)
+        source = row.source_hash, row.revision
+        group = TrackGroup(row.id, row.key, state, rejected, place, source)
         found.setdefault(row.match, []).append(group)
     return found

@@ -63,6 +63,12 @@ class TrackSummaryDocument(Document, shows=TrackSummary):
         description="Sentences: balls that were not used, jumps where other views take over, and runs of balls "
         "that fit no track."
     )
+    noise: dict[str, float] = Field(
+        description="Times that balls of a camera are noisier than clicks because it is inexact, by camera."
+    )
+    late: dict[str, float] = Field(
+        description="Seconds to add to the times of a camera, as the ball shows them, by camera."
+    )
 
 
 class TrackDocument(Document):

@@ -40,6 +40,8 @@ class TrackSummary:
         unused: Balls that are no measurement, counted by reason.
         warnings: Sentences: balls that took no part, and runs of measurements beside the track that fit
             no ball.
+        noise: Times that balls of a view are noisier than clicks because its camera is inexact, by view.
+        late: Seconds to add to the times of a view, by view.
     """
 
     frames: int
@@ -54,6 +56,8 @@ class TrackSummary:
     rate: float
     unused: dict[str, int]
     warnings: list[str] = field(default_factory=list)
+    noise: dict[str, float] = field(default_factory=dict)
+    late: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,8 @@ def summary_of(track: BallTrack, like: TrackSummary) -> TrackSummary:
         p95_px=None if left is None else left.p95_px,
         worst=worst,
         reason=track.reason,
+        noise=dict(track.noise),
+        late=dict(track.offsets),
     )
 
 

@@ -15,7 +15,7 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import DamagedError, JobCancelled, ReviewError, StorageError
 from app.features.solutions.queries import decode_calibration, encode_calibration, encode_solution
-from app.features.tracks.codec import track_again
+from app.features.tracks.codec import TRACK_VERSION, track_again
 from app.features.versions.frozen_queries import (
     CALIBRATION,
     fitting_key,
@@ -51,6 +51,8 @@ NAMED = 200
 UNEXPECTED = "something went wrong inside the server; its log says what"
 _A_GROUP = 10
 """Of them, in one group."""
+_KEEP = "compute anew and freeze another version, or keep this one as it was frozen"
+"""What to do with numbers that an earlier solver made."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,11 @@ class VersionDifference:
 
 @dataclass
 class VerifyReport:
-    """What came of it; ``differences`` are the first ones, ``different`` counts all of them."""
+    """What came of it; ``differences`` are the first ones, ``different`` counts all of them.
+
+    ``older_tracks`` are sound tracks that come out differently because another version of the solver made them: that
+    version, by stretch. Each is one difference.
+    """
 
     version: str
     hash: str
@@ -81,6 +87,7 @@ class VerifyReport:
     equal: int = 0
     different: int = 0
     differences: list[VersionDifference] = field(default_factory=list)
+    older_tracks: dict[str, str] = field(default_factory=dict)
     solver_version_now: str = SOLVER_VERSION
 
     @property
@@ -96,19 +103,34 @@ class VerifyReport:
 
     @property
     def sentence(self) -> str:
-        """The outcome in one sentence."""
-        if self.ok:
-            groups = f"All {self.groups:,} groups" if self.groups != 1 else "The group"
-            return f"{groups} and the hash came out as they were frozen."
-        why = ""
-        if self.solver_version != self.solver_version_now:
-            why = (
-                f"; the version was computed by solver {self.solver_version}, "
-                f"this is solver {self.solver_version_now}"
+        """The outcome in one sentence, or two where tracks of another version come out differently."""
+        older = self._older_sentence if self.older_tracks else ""
+        if self.equal < self.groups:
+            why = ""
+            if self.solver_version != self.solver_version_now:
+                why = (
+                    f"; the version was computed by solver {self.solver_version}, "
+                    f"this is solver {self.solver_version_now}: {_KEEP}"
+                )
+            return (
+                f"{self.groups - self.equal:,} of {plural(self.groups, 'group')} came out "
+                f"differently{why}.{older}"
             )
-        if self.equal == self.groups:
-            return f"{plural(self.different, 'value')} of the version itself came out differently{why}."
-        return f"{self.groups - self.equal:,} of {plural(self.groups, 'group')} came out differently{why}."
+        if own := self.different - len(self.older_tracks):
+            return f"{plural(own, 'value')} of the version itself came out differently.{older}"
+        groups = f"All {self.groups:,} groups" if self.groups != 1 else "The group"
+        return f"{groups} and the hash came out as they were frozen.{older}"
+
+    @property
+    def _older_sentence(self) -> str:
+        made = " and ".join(sorted(set(self.older_tracks.values())))
+        names = ", ".join(sorted(self.older_tracks)[:_A_GROUP])
+        count = len(self.older_tracks)
+        which = f"track {names} was" if count == 1 else f"{count:,} tracks ({names}) were"
+        return (
+            f" The {which} made by version {made} of the track solver, this is version {TRACK_VERSION}, which makes "
+            f"{'another one' if count == 1 else 'others'}: {_KEEP}."
+        )
 
     def add(self, found: Sequence[VersionDifference]) -> None:
         """Count differences, and keep the first."""
@@ -167,7 +189,7 @@ def verify(
         if progress is not None:
             progress(done, report.groups)
     for stretch, key in version.tracks.items():
-        report.add(list(_track_differences(stretch, key, frozen_tracks.get(key))))
+        _check_track(report, stretch, key, frozen_tracks.get(key))
         if progress is not None:
             progress(done, report.groups)
     return report
@@ -223,21 +245,36 @@ def _version_differences(session: Session, version: Version) -> Iterator[Version
         yield VersionDifference(None, "hash", version.hash, found)
 
 
-def _track_differences(stretch: str, key: str, body: bytes | None) -> Iterator[VersionDifference]:
-    """What of a track is not as it was frozen, when it is computed anew from its frozen inputs."""
+def _check_track(report: VerifyReport, stretch: str, key: str, body: bytes | None) -> None:
+    """Compute a track anew from its frozen inputs, and report what is not as it was frozen."""
     place = f"track {stretch}"
-    if body is None:
-        yield VersionDifference(None, place, key, None)
-    elif fitting_key(key, body) != key:
-        yield VersionDifference(None, place, key, fitting_key(key, body))
-    else:
-        value = read_json(body)
+    if body is None or fitting_key(key, body) != key:
+        found = None if body is None else fitting_key(key, body)
+        report.add([VersionDifference(None, place, key, found)])
+        return
+    value = read_json(body)
+    differences = list(_track_differences(place, value))
+    made_by = str(value["inputs"]["version"])
+    if differences and made_by != TRACK_VERSION:
+        report.older_tracks[stretch] = made_by
+        then, now = f"made by version {made_by}", f"version {TRACK_VERSION} makes another one"
+        differences = [VersionDifference(None, place, then, now)]
+    report.add(differences)
+
+
+def _track_differences(place: str, value: Mapping[str, Any]) -> Iterator[VersionDifference]:
+    """What of a sound track comes out differently."""
+    try:
         now = track_again(value)
-        for name, frozen in value["track"].items():
-            if canonical(now[name]) != canonical(frozen):
-                yield VersionDifference(
-                    None, f"{place}.{name}", _shorten_value(frozen), _shorten_value(now[name])
-                )
+    except Exception as error:
+        # One broken track must not hide what the others say.
+        yield VersionDifference(None, place, None, f"{type(error).__name__}: {error}")
+        return
+    for name, frozen in value["track"].items():
+        if canonical(now[name]) != canonical(frozen):
+            yield VersionDifference(
+                None, f"{place}.{name}", _shorten_value(frozen), _shorten_value(now[name])
+            )
 
 
 def _shorten_value(value: Json) -> Json:

@@ -12,7 +12,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 from app.tracking.ball_solve import TrackOptions, track_ball
-from app.tracking.ball_track import BallMeasurements, BallTrack
+from app.tracking.ball_track import BallMeasurements, BallTrack, ViewErrors
 from tests.bench.link import at_times, made_ball
 from tests.cameras import looking
 
@@ -159,6 +159,32 @@ class TestHandover:
             track = self.handed(camera, kicked=-9.0)
             (kick,) = track.events
             assert kick.kind == "kick" and abs(kick.frame - FRAMES[28]) <= 2
+
+
+class TestPart:
+    """A few frames of a stretch whose cameras are not exact, which the whole knows and they alone do not."""
+
+    def test_it_is_as_the_whole_has_it(self) -> None:
+        said = looking((12.0, -58.0, -12.0), (0.0, 0.0, -0.35), 1100.0)
+        given = seen(BOTH)
+        cameras = zip(given.views, given.cameras, strict=True)
+        given = replace(
+            given, cameras=tuple(said if view == "right" else one for view, one in cameras)
+        )
+        whole = tracked(given)
+        assert whole.reason is None and min(dict(whole.noise).values()) > 2
+        rows = np.arange(20, 29)
+        few = given.part(np.isin(given.frames, FRAMES[rows]))
+        alone = track_ball(few, FRAMES[rows], TIMES[rows], pitch=Pitch())
+        assert alone.reason is not None and "contradict" in alone.reason
+        known = ViewErrors(dict(whole.noise), dict(whole.offsets))
+        part = track_ball(few, FRAMES[rows], TIMES[rows], pitch=Pitch(), known=known)
+        assert part.reason is None and set(part.state) == {"measured"}
+        off = np.linalg.norm(part.position - whole.position[rows], axis=1)
+        assert off.max() < 0.2
+
+    def test_exact_cameras_are_not_said_to_be_noisy(self, track: BallTrack) -> None:
+        assert all(times < 1.3 for _, times in track.noise)
 
 
 class TestLeftOutFrames:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 import pytest
 
+from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.groups.submit import load
 from app.features.tracks.around import AROUND, track_around, tracks_of_group
+from app.features.tracks.making import read_records
+from app.features.tracks.queries import TrackGroup
 from app.features.tracks.service import list_tracks, make_tracks, read_track
 from app.features.verdicts.service import set_verdict
+from app.formats.export_record import ExportRecord
 from tests.flights import FIRST, places
 from tests.unit.features.tracks.test_service import move
 
@@ -50,6 +56,22 @@ class TestTrackAround:
         ]
         assert frames == [FIRST + AT]
         assert not read_track(store, track).ball.contradicted
+
+    def test_reads_what_changed_and_keeps_the_rest(
+        self, store: Store, flight: list[int], track: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        track_around(store, track, FIRST + AT)
+        asked: list[str] = []
+
+        def reading(session: Session, groups: Sequence[TrackGroup]) -> Iterator[ExportRecord]:
+            asked.extend(group.key for group in groups)
+            return read_records(session, groups)
+
+        monkeypatch.setattr("app.features.tracks.around.read_records", reading)
+        move(store, flight[AT], 47.0)
+        detail = track_around(store, track, FIRST + AT)
+        assert [int(key) for key in asked] == [FIRST + AT]
+        assert len(detail.ball.contradicted) == 1
 
     def test_has_no_frames_beyond_those_of_the_track(self, store: Store, track: int) -> None:
         detail = track_around(store, track, FIRST)

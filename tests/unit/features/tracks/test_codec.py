@@ -135,13 +135,13 @@ def pinned() -> TrackInputs:
 
 PLACES = [
     *(-7.788814833480648, 5.525342384329569, -0.11322623429637715),
-    *(-17.306332288806733, 9.96533769330585, -0.08179455165018851),
+    *(-17.306490073534267, 9.965362913594934, -0.08213557481301506),
     *(-3.9237562912575443, -14.084785123826896, -0.9739250604700936),
     *(-3.056739811727608, -2.328541324920376, -1.6898964747200402),
     *(26.615321735434016, -8.915113459216348, -0.18487305472768703),
 ]
 SIGMA = [
-    *(0.02898530599434924, 0.032172126743380824, 0.17110791067565193),
+    *(0.02898530599434924, 0.02912507613665375, 0.17110791067565193),
     *(0.043114813098111875, 0.01989406154150712),
 ]
 EVENTS = [
@@ -154,7 +154,7 @@ class TestVersion:
     def test_the_track_of_a_pinned_input_is_what_its_version_says(self) -> None:
         """A change here asks for another ``TRACK_VERSION``: tracks of the old one are stale then."""
         track = make_track(pinned())
-        assert (TRACK_VERSION, track.reason) == ("4", None)
+        assert (TRACK_VERSION, track.reason) == ("5", None)
         rows = [10, 30, 75, 103, 150]
         assert track.position[rows].ravel() == pytest.approx(PLACES, abs=1e-5)
         assert track.sigma[rows] == pytest.approx(SIGMA, rel=1e-4)

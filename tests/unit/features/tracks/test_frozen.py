@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import text
 
+from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.features.integrity.records import examine_versions
+from app.features.tracks.codec import TRACK_VERSION, track_again
 from app.features.tracks.service import TrackChange, change_track, list_tracks, make_tracks
+from app.features.versions import verify as verify_module
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, read_frozen, read_json
 from app.features.versions.service import Version
@@ -37,6 +42,13 @@ def accepted(store: Store, flight: list[int]) -> list[int]:
 
 def frozen(store: Store, name: str = "v1") -> Version:
     return freeze_dataset(store, "demo", FreezeRequest(name, groups="passing"), actor="ann")
+
+
+def track_elsewhere(value: Mapping[str, Any]) -> Json:
+    """What a solver of another version makes of a frozen track's inputs."""
+    track = track_again(value)
+    track["position"][3][0] += 1e-9
+    return track
 
 
 def unseal(session: Session) -> None:
@@ -66,6 +78,33 @@ class TestVerify:
         version = frozen(store)
         report = verify(store, version.id)
         assert report.ok, report.values()
+
+    def test_a_track_of_an_earlier_solver_is_named_and_not_called_damaged(
+        self, store, accepted, monkeypatch
+    ) -> None:
+        version = frozen(store)
+        monkeypatch.setattr(verify_module, "TRACK_VERSION", "later")
+        assert verify(store, version.id).ok
+        monkeypatch.setattr(verify_module, "track_again", track_elsewhere)
+        report = verify(store, version.id)
+        assert (report.ok, report.equal, report.groups) == (False, report.groups, len(accepted))
+        assert [(item.place, item.frozen, item.now) for item in report.differences] == [
+            ("track rig", f"made by version {TRACK_VERSION}", "version later makes another one")
+        ]
+        assert report.sentence == (
+            f"All {len(accepted)} groups and the hash came out as they were frozen. The track rig was made by "
+            f"version {TRACK_VERSION} of the track solver, this is version later, which makes another one: compute anew and freeze "
+            "another version, or keep this one as it was frozen."
+        )
+
+    def test_a_track_that_breaks_the_solver_does_not_hide_the_rest(
+        self, store, accepted, monkeypatch
+    ) -> None:
+        version = frozen(store)
+        monkeypatch.setattr(verify_module, "track_again", lambda _: 1 / 0)
+        report = verify(store, version.id)
+        assert (report.equal, report.different) == (report.groups, 1)
+        assert report.differences[0].now == "ZeroDivisionError: division by zero"
 
     def test_a_number_that_was_changed_is_found(self, store, accepted) -> None:
         version = frozen(store)
