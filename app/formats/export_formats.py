@@ -29,8 +29,11 @@ from app.formats.manifest import SOFTWARE, software_version
 from app.formats.parquet import write_parquet
 from app.formats.sn_calibration import line_frame_path, line_name_claims
 from app.formats.sn_calibration_writer import write_sn_calibration
-from app.formats.soccernet_v3_writer import labels_frame_path, write_soccernet_v3
-from app.formats.soccernet_v3d_writer import write_soccernet_v3d
+from app.formats.soccernet_v3_writer import (
+    labels_frame_path,
+    write_soccernet_v3,
+    write_soccernet_v3d,
+)
 from app.formats.tracks_writer import (
     TrackRecord,
     write_cdf,

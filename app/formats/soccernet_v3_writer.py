@@ -1,28 +1,40 @@
-"""SoccerNet-v3, written: one Labels-v3.json a match."""
+"""SoccerNet-v3 and v3D, written: one Labels-v3.json a match, and SNv3D.csv, the split lists and Labels-v3D.json as
+released.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from app.errors import InputError
+from app.formats.camera_json import camera_to_json
+from app.formats.csv_text import CsvTable, Value, list_text
+from app.formats.export_record import ExportRecord, chosen_box
 from app.formats.frame_names import fold_file_name, frame_path_by_match
 from app.formats.safe_path import resolve_inside
 from app.formats.soccernet_v3 import (
     GAME,
+    IMAGE,
     JOINED_LISTS,
     LABELS,
+    LABELS_3D,
     MATCH_DEPTH,
     REST,
+    SPLIT_FILES,
+    TABLE,
     image_numbers,
     record_to_json,
 )
-from app.json_text import json_text
+from app.json_text import finite, json_text
+from app.soccer.frames import Box
 from app.soccer.group import Group, View
+from app.soccer.solution import GAMMAS_PERCENT, BallFit
 
 
 def split_key(group: Group) -> tuple[str, str, str]:
@@ -138,3 +150,175 @@ def labels_to_json(match: str, groups: list[Group]) -> dict[str, Any]:
     game = {"UrlLocal": match, **(kept.get(GAME) or {})}
     game |= {"list_actions": list(actions), "list_replays": list(replays)}
     return {**(kept.get(REST) or {}), GAME: game, "actions": actions, "replays": replays}
+
+
+JAC_NAMES = tuple(f"JaC@{gamma / 100:g}" for gamma in GAMMAS_PERCENT)
+COLUMNS = (
+    "league",
+    "season",
+    "match",
+    "main_action",
+    "action",
+    "replay",
+    "img_w",
+    "img_h",
+    "is_ball",
+    "ball_bbox",
+    "calibration",
+    *JAC_NAMES,
+    "ball_3D",
+    "rep_error",
+    "optimized_error",
+    "optimized_d",
+    "set",
+)
+
+
+def write_soccernet_v3d(
+    root: Path,
+    records: Iterable[ExportRecord],
+    *,
+    everything: bool = False,
+    boxes: str = "optimized",
+) -> dict[str, int]:
+    """Write the dataset's files below an existing folder.
+
+    ``ball_bbox`` is the annotated box whatever ``boxes`` says, because the optimised one is
+    defined by it: the square of side ``optimized_d`` around its centre. Labels-v3D.json holds the
+    chosen box of the ball in the views that the 3D ball comes from, the annotated one in all
+    others. Ball values stand in the rows of views in a valid pair, or in all rows
+    with ``everything``, which also adds the column ``verdict``.
+
+    Args:
+        root: Existing folder.
+        records: Groups of SoccerNet; one run of a match is in memory at a time.
+        everything: Whether groups and views that failed a gate take part.
+        boxes: Ball box of Labels-v3D.json, one of ``BOX_KINDS``.
+
+    Returns:
+        Counts: ``groups``, ``views``, ``balls`` (views in which the 3D ball holds).
+
+    Raises:
+        InputError: A group is not from SoccerNet, or two of its match have one image.
+        UnsafePathError: A key would leave ``root``.
+    """
+    counts = {"groups": 0, "views": 0, "balls": 0}
+    labels = LabelsWriter(root, LABELS_3D)
+    with ExitStack() as stack:
+        lists = {
+            split: stack.enter_context((root / name).open("w", encoding="utf-8", newline="\n"))
+            for split, name in SPLIT_FILES.items()
+        }
+        file = stack.enter_context((root / TABLE).open("w", encoding="utf-8", newline=""))
+        table = CsvTable(file, (*COLUMNS, *(("verdict",) if everything else ())))
+        for match, run in groupby(records, key=lambda record: split_key(record.group)):
+            members = list(run)
+            for record in members:
+                _add_rows(table, lists, record, everything, counts)
+            name = "/".join(match)
+            labels.reserve_images(name, (record.group for record in members))
+            labels.write(name, _match_labels(name, members, everything, boxes))
+    return counts
+
+
+def _add_rows(
+    table: CsvTable,
+    lists: Mapping[str, TextIO],
+    record: ExportRecord,
+    everything: bool,
+    counts: dict[str, int],
+) -> None:
+    counts["groups"] += 1
+    match = split_key(record.group)[2]
+    for view in record.group.views:
+        fit = record.ball_fit(view, everything)
+        verdict = (record.verdict_text,) if everything else ()
+        table.add((*_row_values(record, view, fit), *verdict))
+        counts["views"] += 1
+        counts["balls"] += record.has_ball_3d(view)
+        if record.split(view) in lists:
+            lists[record.split(view)].write(f"{match}/{Path(view.key).stem}\n")
+
+
+def _row_values(record: ExportRecord, view: View, fit: BallFit | None) -> Iterator[Value]:
+    numbers = image_numbers(view.key)
+    assert numbers is not None, "split_key has checked it"
+    action, replay = numbers
+    camera = record.camera(view)
+    box = view.ball.box if view.ball else None
+    yield from split_key(record.group)
+    yield from (action, replay is None, None if replay is None else float(replay))
+    yield from (view.size.width, view.size.height, view.ball is not None)
+    yield box_text(box) if box else None
+    yield repr(finite(camera_to_json(camera))) if camera else None
+    yield from _jac_of_view(record, view) or (None,) * len(JAC_NAMES)
+    yield f"[array({list_text(record.point)})]" if fit and record.point else None
+    yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)
+    yield fit.optimized_diameter_px if fit else None
+    yield record.split(view) or None
+
+
+def box_text(box: Box) -> str:
+    """``[x, y, w, h]`` with every digit."""
+    return list_text((box.x, box.y, box.width, box.height))
+
+
+def _jac_of_view(record: ExportRecord, view: View) -> tuple[float, ...] | None:
+    solved = record.view_solution(view)
+    return solved.calibration.jac if solved else None
+
+
+def _match_labels(
+    match: str, records: list[ExportRecord], everything: bool, boxes: str
+) -> dict[str, Any]:
+    labels = labels_to_json(match, [_with_exported_boxes(record, boxes) for record in records])
+    for record in records:
+        main, *replays = record.group.views
+        for view in record.group.views:
+            images = labels["actions"] if view is main else labels["replays"]
+            images[view.key][IMAGE] |= _computed_fields(record, view, everything)
+        calibrated = [view.key for view in replays if record.is_calibrated(view)]
+        labels["actions"][main.key][IMAGE]["calibrated_replays"] = calibrated
+    labels[GAME]["reconstructions"] = [
+        record.group.views[0].key
+        for record in records
+        if sum(map(record.is_calibrated, record.group.views)) > 1
+    ]
+    return labels
+
+
+def _with_exported_boxes(record: ExportRecord, kind: str) -> Group:
+    """The group with the chosen ball box in the views that the 3D ball comes from."""
+    group = record.group
+    for view in group.views:
+        # A view that fell out says nothing about the ball: its fit can lie anywhere.
+        if view.ball is None or record.ball_fit(view, everything=False) is None:
+            continue
+        box = chosen_box(record, view, kind)
+        if box is not None and box != view.ball.box:
+            chosen = replace(view.ball, box=box, point=None)
+            balls = tuple(chosen if ball is view.ball else ball for ball in view.balls)
+            group = group.with_view(replace(view, balls=balls))
+    return group
+
+
+def _computed_fields(record: ExportRecord, view: View, everything: bool) -> dict[str, Any]:
+    """What stands beside the source's own metadata of an image."""
+    values: dict[str, Any] = {}
+    camera, jac, fit = (
+        record.camera(view),
+        _jac_of_view(record, view),
+        record.ball_fit(view, everything),
+    )
+    if camera is not None:
+        values["calibration"] = camera_to_json(camera)
+    if jac is not None:
+        values["JaC"] = {name: float(value) for name, value in zip(JAC_NAMES, jac, strict=True)}
+    if fit is not None and record.point is not None:
+        values["ball_3D"] = [float(value) for value in record.point]
+        values["rep_error"] = fit.error_px
+        values["optimized_error"] = fit.optimized_error_m
+        values["optimized_d"] = fit.optimized_diameter_px
+    if everything or record.override is not None:
+        values["verdict"] = record.verdict_text
+    return values

@@ -13,8 +13,8 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.sample.fixture import Colour, Look, Outfit
-from app.sample.patch import Image, Patch
 from app.sample.play import TEAM, Instant
+from app.sample.props import Image, Patch
 
 JOINTS = (
     "pelvis", "chest", "head",

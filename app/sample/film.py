@@ -18,9 +18,8 @@ from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.sample.cameras import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
 from app.sample.figures import draw_distant_person, draw_person, people_in_view, pose_people
 from app.sample.fixture import Look
-from app.sample.patch import Image
 from app.sample.play import HALF_LENGTH, Instant
-from app.sample.props import draw_ball, draw_goal_posts, draw_net
+from app.sample.props import Image, draw_ball, draw_goal_posts, draw_net
 from app.sample.render import (
     light_direction_in_image,
     light_gain_at,

@@ -35,9 +35,8 @@ from app.sample.film import (
 )
 from app.sample.fixture import make_fixture
 from app.sample.order import RECORDING_SECONDS, SEED, SHORTEST_RECORDING
-from app.sample.patch import Image
 from app.sample.play import BALL_DIAMETER, TEAM, Play, make_play, shirt_numbers
-from app.sample.props import draw_scoreboard
+from app.sample.props import Image, draw_scoreboard
 
 FPS, REPLAY_FPS = 25, 50
 """Of the video and of the main camera; of the cameras of replays."""

@@ -21,7 +21,7 @@ from app.geometry.arrays import BoolArray, FloatArray
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import Ball3D
 from app.solving.ball_covariance import CLICK_DIAGONAL, calibration_covariance
-from app.solving.noise_grid import (
+from app.solving.line_noise import (
     BLOCKS,
     NORMAL_95,
     SPREAD,

@@ -43,13 +43,13 @@ from app.solving.ball_noise import (
     ray_residuals,
 )
 from app.solving.line_noise import (
+    NORMAL_95,
     LineEstimate,
     LineEvidence,
     LineNoise,
     estimate_line_noise,
     line_evidence,
 )
-from app.solving.noise_grid import NORMAL_95
 from app.solving.observations import observations_of_lines
 from app.solving.resect import ResectionProblem
 from app.solving.triangulate import BallObservation, ball_observations

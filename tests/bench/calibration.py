@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.evaluation.cameras import error_without, score_frame, score_frames
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines, make_lines
@@ -18,7 +19,6 @@ from app.soccer.pitch import CIRCLES, MARKINGS, Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
-from app.solving.score import error_without, score_frame, score_frames
 from tests.bench.table import print_table
 
 SIZE = ImageSize(960, 540)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.evaluation.cameras import error_without
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines
@@ -20,7 +21,6 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.score import error_without
 from tests.bench.table import print_table
 
 SIZE, PITCH = ImageSize(960, 540), Pitch()

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from app.sample.practice import LESSONS, Lesson, make_practice
+from app.features.practice.lessons import LESSONS, Lesson, make_practice
 from app.sample.scene import Scene
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch

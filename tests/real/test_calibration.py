@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.evaluation.cameras import score_frame, score_frames
 from app.formats.cameras import read_cameras
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
@@ -16,7 +17,6 @@ from app.soccer.frames import ImageSize
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.solving.calibrate import calibrate
-from app.solving.score import score_frame, score_frames
 from tests.bench.goals import LIMIT_PX, goal_distances, left_out_grass
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.evaluation.cameras import error_without
 from app.features.file_tools.matches import match_shares
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
@@ -17,7 +18,6 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.calibrate import calibrate
 from app.solving.match_position import NO_PLACES, place_of
 from app.solving.pitch_size import PitchFrame, estimate_pitch
-from app.solving.score import error_without
 
 DATA = Path(os.environ.get("TOUCHLINE_REAL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 LINES = DATA / "sn22-dev" / "lines.zip"

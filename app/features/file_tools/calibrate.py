@@ -15,6 +15,7 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
+from app.evaluation.cameras import leave_one_out, score_frame, score_frames
 from app.features.file_tools.matches import (
     MatchShare,
     choose_picture,
@@ -42,7 +43,6 @@ from app.solving.calibrate import calibrate, lone_frame_of, with_lone_covariance
 from app.solving.calibration_findings import calibration_findings, lone_findings
 from app.solving.lone_frame import LoneFrame
 from app.solving.match_position import FramePlace, Places, place_of, share_position
-from app.solving.score import leave_one_out, score_frame, score_frames
 from app.solving.solve import warm_up
 
 CHUNK = 16

@@ -24,13 +24,19 @@ from app.features.jobs.service import Jobs, Pool
 from app.features.people.queries import person_by_name, set_dataset_role
 from app.features.people.roles import Role, log_account_event
 from app.features.people.visibility_queries import COPIES, EVERYTHING, Visibility
-from app.features.practice.lessons import WORDS, Feedback, judge_lesson, lesson_kind
+from app.features.practice.lessons import (
+    LESSONS,
+    WORDS,
+    Feedback,
+    judge_lesson,
+    lesson_kind,
+    write_practice,
+)
 from app.features.practice.recording import recording_practice_work, require_own_recording
 from app.features.solutions.service import solve_dataset
 from app.formats.soccernet_v3 import ARCHIVE
 from app.progress import ReportProgress, partial_progress
 from app.sample.order import SampleOrder
-from app.sample.practice import LESSONS, write_practice
 from app.sample.scene import TRUTH, SceneTruth, read_truth
 from app.sample.write import SampleReport, write_sample
 from app.soccer.policy import PAPER

@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.evaluation.cameras import error_without
 from app.soccer.annotation import make_lines
 from app.soccer.group import Station
 from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import CLICKED, POLICIES, CalibrationPolicy
 from app.solving.calibrate import calibrate, calibrate_station, calibration_key
 from app.solving.jaccard import camera_jaccard
-from app.solving.score import error_without
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, BEND, MAIN, OPPOSITE, PITCH, click
 

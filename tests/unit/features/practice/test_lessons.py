@@ -7,9 +7,16 @@ from dataclasses import replace
 import pytest
 
 from app.features.groups.state import VerdictState
-from app.features.practice.lessons import WORDS, Feedback, judge_lesson
+from app.features.practice.lessons import (
+    CLEAN,
+    LESSONS,
+    WORDS,
+    Feedback,
+    judge_lesson,
+    make_practice,
+    practice_stage,
+)
 from app.sample.faults import FaultPlan
-from app.sample.practice import CLEAN, LESSONS, make_practice, practice_stage
 from app.sample.scene import PRACTICE_KINDS, Scene
 from app.sample.scenes import make_scene
 from app.soccer.annotation import make_lines
