@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import ForeignKey, Index, LargeBinary, Select, delete, func, insert, select, update
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.session import Base, Session
+from app.evaluation.rater_agreement import AgreementLimits
 from app.features.batches.tables import BatchModel
 from app.features.independent_annotations.queries import INDEPENDENT
 from app.features.independent_annotations.tables import IndependentAnnotationModel
@@ -65,6 +66,26 @@ class AgreementLimitsModel(Base):
     changed_by: Mapped[str]
 
 
+class AgreementRow(NamedTuple):
+    """What a group came to in a batch, with its ``number`` and ``status`` in the queue."""
+
+    group_id: int
+    batch_id: int
+    dataset_id: int
+    state: str
+    takes: str
+    pairs: bytes
+    worst: float
+    disagreements: int
+    found: str
+    outcome: str | None
+    take_id: int | None
+    decided: str | None
+    decided_by: str | None
+    number: int
+    status: str
+
+
 _ROWS = select(*AgreementModel.__table__.columns, QueueModel.number, QueueModel.status).join(
     QueueModel, QueueModel.group_id == AgreementModel.group_id
 )
@@ -72,7 +93,7 @@ _ROWS = select(*AgreementModel.__table__.columns, QueueModel.number, QueueModel.
 
 def list_agreements(
     session: Session, dataset_id: int, *, batch_id: int | None = None, state: str | None = None
-) -> Sequence[Any]:
+) -> Sequence[AgreementRow]:
     """What the groups of a dataset came to, each with its ``number`` and ``status``; the worst first.
 
     Args:
@@ -87,13 +108,14 @@ def list_agreements(
     if state is not None:
         where.append(AgreementModel.state == state)
     order = (AgreementModel.worst.desc(), AgreementModel.group_id)
-    return session.execute(_ROWS.where(*where).order_by(*order)).all()
+    return session.rows(AgreementRow, _ROWS.where(*where).order_by(*order))
 
 
-def list_group_agreements(session: Session, group_id: int) -> Sequence[Any]:
+def list_group_agreements(session: Session, group_id: int) -> Sequence[AgreementRow]:
     """What a group came to in each batch, what waits for a decision first."""
     order = (AgreementModel.state != OPEN, AgreementModel.batch_id)
-    return session.execute(_ROWS.where(AgreementModel.group_id == group_id).order_by(*order)).all()
+    mine = AgreementModel.group_id == group_id
+    return session.rows(AgreementRow, _ROWS.where(mine).order_by(*order))
 
 
 def put_agreement(session: Session, values: Mapping[str, Any]) -> None:
@@ -187,7 +209,7 @@ def required_verdicts(session: Session, batch_id: int) -> int | None:
     return verdicts
 
 
-def find_limits(session: Session, dataset_id: int) -> Any | None:
+def find_limits(session: Session, dataset_id: int) -> AgreementLimits | None:
     """The limits of a dataset; None: nobody has set any."""
     columns = [
         column
@@ -195,7 +217,8 @@ def find_limits(session: Session, dataset_id: int) -> Any | None:
         if column.name not in ("dataset_id", "changed", "changed_by")
     ]
     where = AgreementLimitsModel.dataset_id == dataset_id
-    return session.execute(select(*columns).where(where)).one_or_none()
+    row = session.execute(select(*columns).where(where)).one_or_none()
+    return None if row is None else AgreementLimits(**row._mapping)
 
 
 def put_limits(session: Session, dataset_id: int, values: Mapping[str, Any]) -> None:

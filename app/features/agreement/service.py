@@ -20,6 +20,7 @@ from app.features.agreement.queries import (
     AGREED,
     DECIDED,
     OPEN,
+    AgreementRow,
     decide_agreement,
     find_limits,
     list_group_agreements,
@@ -143,8 +144,7 @@ def _worst_views(states: Sequence[GroupState], pairs: Sequence[AnnotationPair]) 
 
 def read_limits(session: Session, dataset: int) -> AgreementLimits:
     """The limits of a dataset, by its id; the defaults where nobody has set any."""
-    row = find_limits(session, dataset)
-    return AgreementLimits() if row is None else AgreementLimits(**row._mapping)
+    return find_limits(session, dataset) or AgreementLimits()
 
 
 def set_limits(
@@ -330,7 +330,7 @@ def adopt_and_settle(
     return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=done)
 
 
-def _stored_agreement(session: Session, group_id: int, batch_id: int | None) -> Any | None:
+def _stored_agreement(session: Session, group_id: int, batch_id: int | None) -> AgreementRow | None:
     """What a group came to in a batch, where its annotations were compared already."""
     rows = list_group_agreements(session, group_id)
     return next((row for row in rows if row.batch_id == (batch_id or 0)), None)

@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 from app.db.json_columns import unpack
 from app.db.store import Store
@@ -20,7 +19,7 @@ from app.evaluation.rater_agreement import (
     krippendorff_alpha,
     measure_spreads,
 )
-from app.features.agreement.queries import AGREED, DECIDED, OPEN, list_agreements
+from app.features.agreement.queries import AGREED, DECIDED, OPEN, AgreementRow, list_agreements
 from app.features.agreement.service import AnnotationComparison, StoredComparison, read_limits
 from app.features.datasets.service import dataset_id
 from app.features.solutions.codec import from_json
@@ -95,7 +94,7 @@ class Agreement:
 class _ComparedGroup:
     """A row with its pairs as they were kept."""
 
-    row: Any
+    row: AgreementRow
     pairs: tuple[AnnotationComparison, ...]
 
     @property

@@ -15,6 +15,7 @@ from app.db.store import Store
 from app.features.batches.leases import BatchMember
 from app.features.batches.own_annotations import own_left, own_part, takes_part, visible_batch
 from app.features.batches.queries import (
+    NumberedBatchGroup,
     batches_that_wait,
     datasets_with_batches,
     entries_of_work,
@@ -195,11 +196,8 @@ def my_work(
 def _returned_groups(session: Session, batch: Batch, name: str) -> list[ReturnedGroup]:
     """What of a batch somebody has back, in its order."""
     person = person_of(name)
-    rows = (
-        *list_returned_rows(session, [batch.id], person),
-        *open_annotations(session, [batch.id], person),
-    )
-    waiting = [row.group_id for row in rows]
+    waiting = [row.group_id for row in list_returned_rows(session, [batch.id], person)]
+    waiting += [copy.group_id for copy in open_annotations(session, [batch.id], person)]
     back = read_returned(session, waiting) if waiting else {}
     return [back[group] for group in waiting if group in back]
 
@@ -230,7 +228,7 @@ def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> T
 
 
 def _measure_paces(
-    entries: Sequence[Any], groups: Sequence[Any], annotations: Sequence[Any]
+    entries: Sequence[Any], groups: Sequence[NumberedBatchGroup], annotations: Sequence[Any]
 ) -> list[Pace]:
     """What each person did, from the log and from what was submitted; of groups, and of own copies.
 
@@ -248,14 +246,16 @@ def _measure_paces(
         times[name].append(row.at)
         if row.kind == "verdict":
             judged[name].add(row.group_id)
-    given = [(row.submitted_by, row.group_id, row.submitted) for row in groups]
+    given: list[tuple[str | None, int, str | None]] = [
+        (row.submitted_by, row.group_id, row.submitted) for row in groups
+    ]
     given += [
         (annotation.person, annotation.copy_id, annotation.submitted) for annotation in annotations
     ]
-    for name, group, at in given:
-        if at is not None:
-            submitted[name].add(group)
-            times[name].append(at)
+    for worker, group, at in given:
+        if worker is not None and at is not None:
+            submitted[worker].add(group)
+            times[worker].append(at)
     return [_measure_pace(name, times[name], judged, submitted) for name in sorted(times)]
 
 

@@ -43,6 +43,39 @@ from app.soccer.choices import BatchState
 
 OPEN: BatchState = "open"
 CLOSED: BatchState = "closed"
+
+
+class BatchRow(NamedTuple):
+    """A batch with the name of its ``dataset``."""
+
+    id: int
+    dataset_id: int
+    name: str
+    kind: str
+    query: str
+    sort: str
+    verdicts: int
+    blind: bool
+    gold_every: int | None
+    due: str | None
+    state: str
+    created: str
+    created_by: str
+    dataset: str
+
+
+class NumberedBatchGroup(NamedTuple):
+    """A group of a batch with its ``number`` in the dataset."""
+
+    batch_id: int
+    group_id: int
+    place: int
+    submitted: str | None
+    submitted_by: str | None
+    settled: str | None
+    number: int
+
+
 _BATCHES = select(*BatchModel.__table__.columns, DatasetModel.name.label("dataset")).join(
     DatasetModel, DatasetModel.id == BatchModel.dataset_id
 )
@@ -98,16 +131,16 @@ _DONE_KINDS = ("edit", "undo", "redo", "verdict")
 """Entries of the log that show that somebody works on a group."""
 
 
-def find_batch(session: Session, batch_id: int) -> Any | None:
+def find_batch(session: Session, batch_id: int) -> BatchRow | None:
     """A batch by its id, with the name of its ``dataset``."""
-    return session.execute(_BATCH, {"id": batch_id}).one_or_none()
+    return session.row(BatchRow, _BATCH, {"id": batch_id})
 
 
-def find_dataset_batches(session: Session, dataset_ids: Collection[int]) -> Sequence[Any]:
+def find_dataset_batches(session: Session, dataset_ids: Collection[int]) -> Sequence[BatchRow]:
     """The batches of datasets, with the names of those; open ones and those that are due first come first."""
     order = (BatchModel.state.desc(), BatchModel.due.is_(None), BatchModel.due, BatchModel.id)
     mine = BatchModel.dataset_id.in_(dataset_ids)
-    return session.execute(_BATCHES.where(mine).order_by(*order)).all()
+    return session.rows(BatchRow, _BATCHES.where(mine).order_by(*order))
 
 
 def datasets_with_batches(session: Session) -> list[int]:
@@ -217,7 +250,7 @@ def groups_given(session: Session, dataset_id: int) -> set[int]:
     return set(session.scalars(statement))
 
 
-def read_batch_groups(session: Session, batch_id: int) -> Sequence[Any]:
+def read_batch_groups(session: Session, batch_id: int) -> Sequence[NumberedBatchGroup]:
     """Every group of a batch in order, with its ``number``."""
     statement = (
         select(
@@ -228,7 +261,7 @@ def read_batch_groups(session: Session, batch_id: int) -> Sequence[Any]:
         .where(BatchGroupModel.batch_id == batch_id)
         .order_by(BatchGroupModel.place)
     )
-    return session.execute(statement).all()
+    return session.rows(NumberedBatchGroup, statement)
 
 
 def find_batch_group(session: Session, batch_id: int, group_id: int) -> BatchGroupModel | None:

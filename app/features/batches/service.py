@@ -16,6 +16,7 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.batches.queries import (
     CLOSED,
     OPEN,
+    BatchRow,
     count_work,
     delete_batch,
     find_batch,
@@ -361,7 +362,7 @@ def read_batches(session: Session, dataset_ids: Collection[int]) -> list[Batch]:
 
 
 def _batches_from_rows(
-    session: Session, rows: Sequence[Any], with_here: bool = True
+    session: Session, rows: Sequence[BatchRow], with_here: bool = True
 ) -> list[Batch]:
     ids = [row.id for row in rows]
     counts = count_work(session, ids)
@@ -376,7 +377,7 @@ def _batches_from_rows(
         count = counts.get(row.id)
         found.append(
             Batch(
-                **row._mapping,
+                **row._asdict(),
                 annotators=names[row.id, Part.ANNOTATOR],
                 reviewers=names[row.id, Part.REVIEWER],
                 # A dataset that begins again leaves a batch without groups.

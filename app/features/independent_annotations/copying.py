@@ -184,10 +184,10 @@ def _dataset_of_copies(session: Session, order: CopyRequest) -> int:
     if row is None:
         name = _free_name(session, f"{stored.dataset[:_NAME]} {copies.batch_id} {order.person}")
         return insert_dataset(session, name, stored.policy, order.person, copies)
-    held = find_dataset(session, int(row.dataset_id))
+    held = find_dataset(session, row.dataset_id)
     if held is not None and policy_from_row(held.policy) != stored.policy:
-        save_policy(session, int(row.dataset_id), stored.policy, order.person)
-    return int(row.dataset_id)
+        save_policy(session, row.dataset_id, stored.policy, order.person)
+    return row.dataset_id
 
 
 def _free_name(session: Session, wanted: str) -> str:

@@ -27,6 +27,7 @@ from app.features.independent_annotations.copying import rename_views_as_origina
 from app.features.independent_annotations.queries import (
     GOLD,
     STARTS,
+    GoldHead,
     IndependentAnnotation,
     gold_head,
     gold_heads,
@@ -288,15 +289,15 @@ def _truth_values(state: GroupState) -> Json:
     }
 
 
-def _gold_with_truth(session: Session, row: Any) -> tuple[GoldGroup, Json]:
+def _gold_with_truth(session: Session, row: GoldHead) -> tuple[GoldGroup, Json]:
     """A gold group, and what is true of it."""
-    truth, fields = gold_truth(session, row.group_id) or {}, row._mapping
+    truth = gold_truth(session, row.group_id) or {}
     gold = GoldGroup(
-        fields["group_id"],
-        fields["label"] or fields["key"],
-        fields["start"],
-        fields["marked"],
-        fields["marked_by"],
+        row.group_id,
+        row.label or row.key,
+        row.start,
+        row.marked,
+        row.marked_by,
         TruthSource(truth.get("source", TruthSource.VERDICT)),
     )
     return gold, truth

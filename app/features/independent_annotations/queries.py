@@ -36,6 +36,35 @@ _READY = (
 _OF_COPY = _ANNOTATIONS.where(IndependentAnnotationModel.copy_id == bindparam("copy"))
 
 
+class OpenCopy(NamedTuple):
+    """A copy in a batch that somebody has begun and not submitted."""
+
+    batch_id: int
+    group_id: int
+
+
+class CopyDataset(NamedTuple):
+    """A dataset of copies, by its ``name``: of ``of_id``, in a batch (0: none), by a person."""
+
+    dataset_id: int
+    of_id: int
+    batch_id: int
+    person: str
+    name: str
+
+
+class GoldHead(NamedTuple):
+    """A gold group without what is true of it."""
+
+    group_id: int
+    dataset_id: int
+    start: str
+    marked: str
+    marked_by: str
+    key: str
+    label: str
+
+
 _COPIES = select(*CopyDatasetModel.__table__.columns, DatasetModel.name).join(
     DatasetModel, DatasetModel.id == CopyDatasetModel.dataset_id
 )
@@ -210,8 +239,10 @@ def count_submitted(session: Session, group_ids: Sequence[int]) -> dict[int, int
     return {row[0]: row[1] for row in rows}
 
 
-def open_annotations(session: Session, batch_ids: Collection[int], person: str) -> Sequence[Any]:
-    """Rows (batch_id, group_id) of the copies in batches that somebody has begun and not submitted."""
+def open_annotations(
+    session: Session, batch_ids: Collection[int], person: str
+) -> Sequence[OpenCopy]:
+    """The copies in batches that somebody has begun and not submitted."""
     mine = (
         IndependentAnnotationModel.person == person,
         IndependentAnnotationModel.submitted.is_(None),
@@ -222,7 +253,7 @@ def open_annotations(session: Session, batch_ids: Collection[int], person: str) 
         IndependentAnnotationModel.copy_id.label("group_id"),
     )
     statement = select(*columns).where(IndependentAnnotationModel.batch_id.in_(batch_ids), *mine)
-    return session.execute(statement.order_by(IndependentAnnotationModel.id)).all()
+    return session.rows(OpenCopy, statement.order_by(IndependentAnnotationModel.id))
 
 
 def read_annotations(
@@ -314,16 +345,16 @@ def insert_copy_dataset(session: Session, dataset_id: int, copies: CopiesOf) -> 
     session.execute(insert(CopyDatasetModel), [{"dataset_id": dataset_id, **vars(copies)}])
 
 
-def list_copies(session: Session, dataset_id: int) -> Sequence[Any]:
-    """``dataset_id``, ``of_id``, ``batch_id``, ``person`` and ``name`` of a dataset's copies."""
-    return session.execute(_COPIES.where(CopyDatasetModel.of_id == dataset_id)).all()
+def list_copies(session: Session, dataset_id: int) -> Sequence[CopyDataset]:
+    """The datasets of a dataset's copies."""
+    return session.rows(CopyDataset, _COPIES.where(CopyDatasetModel.of_id == dataset_id))
 
 
-def find_copies(session: Session, copies: CopiesOf) -> Any | None:
+def find_copies(session: Session, copies: CopiesOf) -> CopyDataset | None:
     """The dataset of such copies."""
     column = CopyDatasetModel
     mine = (column.of_id == copies.of_id) & (column.batch_id == copies.batch_id)
-    return session.execute(_COPIES.where(mine, column.person == copies.person)).one_or_none()
+    return session.row(CopyDataset, _COPIES.where(mine, column.person == copies.person))
 
 
 def copy_dataset_ids(session: Session) -> frozenset[int]:
@@ -372,15 +403,15 @@ def common_start(session: Session, dataset_id: int) -> str | None:
     return max(found, key=(IMPORTED, WITHOUT_BALLS, BARE).index, default=None)
 
 
-def gold_heads(session: Session, dataset_id: int) -> Sequence[Any]:
+def gold_heads(session: Session, dataset_id: int) -> Sequence[GoldHead]:
     """The gold groups of a dataset without what is true of them, by id of the group."""
     statement = _HEADS.where(GoldModel.dataset_id == dataset_id).order_by(GoldModel.group_id)
-    return session.execute(statement).all()
+    return session.rows(GoldHead, statement)
 
 
-def gold_head(session: Session, group_id: int) -> Any | None:
+def gold_head(session: Session, group_id: int) -> GoldHead | None:
     """A gold group without what is true of it; None: it is none."""
-    return session.execute(_HEADS.where(GoldModel.group_id == group_id)).one_or_none()
+    return session.row(GoldHead, _HEADS.where(GoldModel.group_id == group_id))
 
 
 def gold_truth(session: Session, group_id: int) -> Json | None:

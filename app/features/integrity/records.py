@@ -40,7 +40,7 @@ from app.features.versions.frozen_queries import (
     named_texts,
     read_json,
 )
-from app.features.versions.queries import all_versions, annotation_rows
+from app.features.versions.queries import VersionRow, all_versions, annotation_rows
 from app.features.versions.service import calibration_names, version_hash
 from app.soccer.codec import paint_to_json, policy_from_json
 from app.soccer.group import Group
@@ -333,7 +333,7 @@ def _logged_freezes(session: Session) -> dict[int, LogEntry]:
     return found
 
 
-def _matches_log(row: Any, entry: LogEntry | None) -> bool:
+def _matches_log(row: VersionRow, entry: LogEntry | None) -> bool:
     if entry is None:
         return False
     logged = (
@@ -346,9 +346,9 @@ def _matches_log(row: Any, entry: LogEntry | None) -> bool:
     return logged == (row.dataset_id, row.name, row.hash, row.created, row.actor)
 
 
-def _fault_of_version(session: Session, row: Any) -> str | None:
+def _fault_of_version(session: Session, row: VersionRow) -> str | None:
     """What in a version does not follow from its groups; None: all of it does."""
-    rows = [item._mapping for item in annotation_rows(session, row.id)]
+    rows = [item._asdict() for item in annotation_rows(session, row.id)]
     try:
         with as_written():
             counts, policy = parse(row.counts), policy_from_json(parse(row.policy))

@@ -43,6 +43,20 @@ from app.features.people.tables import (
     TeamSettingModel,
 )
 
+
+class PersonRow(NamedTuple):
+    """A person with when they were ``seen`` last in a session that still is."""
+
+    id: int
+    name: str
+    role: str
+    password: str | None
+    disabled: bool
+    created: str
+    created_by: str
+    seen: str | None
+
+
 _PEOPLE = select(*PersonModel.__table__.columns)
 _SEEN = (
     select(func.max(LoginModel.seen))
@@ -51,11 +65,10 @@ _SEEN = (
 )
 
 
-def all_people(session: Session) -> Sequence[Any]:
+def all_people(session: Session) -> Sequence[PersonRow]:
     """Every person by name, with when they were ``seen`` last in a session that still is."""
-    return session.execute(
-        _PEOPLE.add_columns(_SEEN.label("seen")).order_by(PersonModel.name)
-    ).all()
+    statement = _PEOPLE.add_columns(_SEEN.label("seen")).order_by(PersonModel.name)
+    return session.rows(PersonRow, statement)
 
 
 def person_by_name(session: Session, name: str) -> PersonModel | None:
@@ -313,10 +326,10 @@ REQUIRED = "require_second_factor"
 _MINE = SecondFactorModel.__table__
 
 
-def find_second_factor(session: Session, person_id: int) -> Any | None:
+def find_second_factor(session: Session, person_id: int) -> SecondFactorModel | None:
     """The second factor of a person, one that was not confirmed too."""
     statement = select(*_MINE.c).where(SecondFactorModel.person_id == person_id)
-    return session.execute(statement).one_or_none()
+    return session.row(SecondFactorModel, statement)
 
 
 def put_second_factor(session: Session, person_id: int, salt: str, at: str) -> None:

@@ -28,7 +28,7 @@ from app.features.policies.service import (
     policy_with,
     read_policy,
 )
-from app.features.solutions.queries import newest_solution, present_solutions
+from app.features.solutions.queries import list_solved_groups, newest_solution
 from app.soccer.policy import CALIBRATION, ESTIMATED, POLICIES, THRESHOLDS, Policy
 from app.solving.ball_noise import BallNoise, RayResidual, Sigma
 from app.solving.dataset_noise import (
@@ -246,7 +246,7 @@ def take_noise_back(session: Session, dataset: str | int, *, actor: str) -> int:
 def _solved_group_ids(store: Store, dataset_id: int) -> list[int]:
     """Ids of the groups that have a solution, in the dataset's order."""
     with store.read() as session:
-        return [row[0] for row in present_solutions(session, dataset_id) if row[2] is not None]
+        return list_solved_groups(session, dataset_id)
 
 
 def _groups_with_ball_actors(

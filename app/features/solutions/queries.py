@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from sqlalchemy import (
     BindParameter,
@@ -378,31 +378,32 @@ def newest_solution(session: Session) -> int:
     return session.scalar(select(func.max(SolutionModel.id))) or 0
 
 
-def solution_facts(session: Session, ids: Sequence[int]) -> Sequence[Any]:
-    """Rows (group_id, inputs_hash, calibrations, facts) of solutions, as they are stored."""
+class StoredFacts(NamedTuple):
+    """What the gates read of a group, as it is stored beside its solution."""
+
+    group_id: int
+    inputs_hash: str
+    calibrations: str
+    facts: bytes | None
+
+
+def solution_facts(session: Session, ids: Sequence[int]) -> Sequence[StoredFacts]:
+    """The facts of solutions."""
     model = SolutionModel
     statement = select(model.group_id, model.inputs_hash, model.calibrations, model.facts)
-    return session.execute(statement.where(model.id.in_(ids))).all()
+    return session.rows(StoredFacts, statement.where(model.id.in_(ids)))
 
 
-def present_solutions(session: Session, dataset_id: int) -> Sequence[Any]:
-    """Each group of a dataset with the solution that fits it as it is, in the dataset's order.
-
-    Returns:
-        Rows (group_id, inputs_hash, solution_id or None, split, match, pitch_length, pitch_width).
-    """
-    group = GroupModel
+def list_solved_groups(session: Session, dataset_id: int) -> list[int]:
+    """Ids of the groups of a dataset that have a solution that fits them as they are, in its order."""
     statement = (
-        select(
-            group.id, group.inputs_hash, SolutionModel.id, group.split, group.match,
-            group.pitch_length, group.pitch_width,
-        )
-        .join(DatasetModel, DatasetModel.id == group.dataset_id)
-        .outerjoin(SolutionModel, is_current())
-        .where(group.dataset_id == dataset_id)
-        .order_by(group.number)
-    )  # fmt: skip
-    return session.execute(statement).all()
+        select(GroupModel.id)
+        .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)
+        .join(SolutionModel, is_current())
+        .where(GroupModel.dataset_id == dataset_id)
+        .order_by(GroupModel.number)
+    )
+    return list(session.scalars(statement))
 
 
 def unsolved_groups(

@@ -6,14 +6,14 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import get_args
 
 from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError
 from app.features.versions.diff import read_changelog
-from app.features.versions.queries import candidate_rows, version_verdicts
+from app.features.versions.queries import CandidateRow, candidate_rows, version_verdicts
 from app.features.versions.service import Version, read_version
 from app.soccer.choices import VersionRule
 from app.soccer.codec import policy_to_json
@@ -77,7 +77,7 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
         )
 
 
-def _candidate_from_row(row: Any, rule: str) -> Candidate:
+def _candidate_from_row(row: CandidateRow, rule: str) -> Candidate:
     why = _why_not_accepted(row) if rule == "accepted" else _why_not_passing(row)
     return Candidate(
         id=row.group_id,
@@ -91,7 +91,7 @@ def _candidate_from_row(row: Any, rule: str) -> Candidate:
     )
 
 
-def _verdict_json(row: Any) -> Json:
+def _verdict_json(row: CandidateRow) -> Json:
     if row.status == "unreviewed":
         return None
     return {
@@ -102,7 +102,7 @@ def _verdict_json(row: Any) -> Json:
     }
 
 
-def _why_not_accepted(row: Any) -> str | None:
+def _why_not_accepted(row: CandidateRow) -> str | None:
     if row.status != "accepted":
         return _why_rejected_or_deferred(row) or "unreviewed"
     if row.stale:
@@ -110,19 +110,19 @@ def _why_not_accepted(row: Any) -> str | None:
     return _why_not_passed(row)
 
 
-def _why_not_passing(row: Any) -> str | None:
+def _why_not_passing(row: CandidateRow) -> str | None:
     if row.status in ("rejected", "deferred"):
         return _why_rejected_or_deferred(row)
     return _why_not_passed(row)
 
 
-def _why_rejected_or_deferred(row: Any) -> str | None:
+def _why_rejected_or_deferred(row: CandidateRow) -> str | None:
     if row.status == "rejected":
         return f"rejected: {row.reason}"
     return "deferred" if row.status == "deferred" else None
 
 
-def _why_not_passed(row: Any) -> str | None:
+def _why_not_passed(row: CandidateRow) -> str | None:
     if not row.solved:
         return UNSOLVED
     # An override speaks of the gate that failed then, of no other that fails now.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from sqlalchemy import ForeignKey, LargeBinary, Table, UniqueConstraint, func, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
@@ -135,6 +135,60 @@ _VERSIONS = select(*columns_shown(VersionModel), DatasetModel.name.label("datase
 )
 
 
+class VersionRow(NamedTuple):
+    """A version with the name of its ``dataset``; ``actor`` as the reader may see them."""
+
+    id: int
+    dataset_id: int
+    name: str
+    note: str
+    licence: str
+    created: str
+    actor: str
+    hash: str
+    groups: str
+    policy: str
+    policy_hash: str
+    solver_version: str
+    software_version: str
+    split: str
+    counts: str
+    previous: int | None
+    tracks: str | None
+    dataset: str
+
+
+class AnnotationRow(NamedTuple):
+    """What was said of a group of a version, as its hash and its differences need it."""
+
+    key: str
+    member: bool
+    why: str | None
+    split: str
+    splits: str | None
+    verdict: str | None
+    said: str | None
+    ball: str | None
+
+
+class CandidateRow(NamedTuple):
+    """A group of a dataset as it is judged, with what its newest verdict says."""
+
+    group_id: int
+    key: str
+    match: str
+    split: str
+    view_keys: str
+    status: str
+    stale: bool
+    passes: bool | None
+    gate: str | None
+    solved: bool
+    reason: str | None
+    note: str | None
+    override: str | None
+
+
 @dataclass(frozen=True)
 class VersionGroup:
     """One row of a version: a group that is in it, or the reason why it is not."""
@@ -153,20 +207,20 @@ class VersionGroup:
     frames: Mapping[str, Mapping[str, Any]] | None
 
 
-def all_versions(session: Session) -> Sequence[Any]:
+def all_versions(session: Session) -> Sequence[VersionRow]:
     """The versions of every dataset, newest first, each with the name of its ``dataset``."""
-    return session.execute(_VERSIONS.order_by(VersionModel.id.desc())).all()
+    return session.rows(VersionRow, _VERSIONS.order_by(VersionModel.id.desc()))
 
 
-def dataset_versions(session: Session, dataset_id: int) -> Sequence[Any]:
+def dataset_versions(session: Session, dataset_id: int) -> Sequence[VersionRow]:
     """The versions of a dataset, newest first, each with the name of its ``dataset``."""
     statement = _VERSIONS.where(VersionModel.dataset_id == dataset_id)
-    return session.execute(statement.order_by(VersionModel.id.desc())).all()
+    return session.rows(VersionRow, statement.order_by(VersionModel.id.desc()))
 
 
-def version_row(session: Session, version_id: int) -> Any | None:
+def version_row(session: Session, version_id: int) -> VersionRow | None:
     """One version with the name of its ``dataset``."""
-    return session.execute(_VERSIONS.where(VersionModel.id == version_id)).one_or_none()
+    return session.row(VersionRow, _VERSIONS.where(VersionModel.id == version_id))
 
 
 def has_version(session: Session, dataset_id: int, name: str) -> bool:
@@ -216,12 +270,12 @@ def read_page(
     return [_version_group(row) for row in session.execute(statement)]
 
 
-def annotation_rows(session: Session, version_id: int) -> Iterator[Any]:
+def annotation_rows(session: Session, version_id: int) -> Iterator[AnnotationRow]:
     """What was said of each group of a version, as its hash and its differences need it."""
     model = VersionGroupModel
     columns = (model.key, model.member, model.why, model.split, model.splits, model.verdict)
     statement = select(*columns, model.said, model.ball).where(model.version_id == version_id)
-    yield from session.execute(statement.order_by(model.position))
+    yield from session.rows(AnnotationRow, statement.order_by(model.position))
 
 
 def version_verdicts(
@@ -245,7 +299,7 @@ def version_matches(session: Session, version_id: int) -> set[str]:
     return set(session.scalars(statement))
 
 
-def candidate_rows(session: Session, dataset_id: int) -> Sequence[Any]:
+def candidate_rows(session: Session, dataset_id: int) -> Sequence[CandidateRow]:
     """Every group of a dataset as it is judged, with what its newest verdict says."""
     newest = (
         select(VerdictModel.group_id, func.max(VerdictModel.id).label("id"))
@@ -277,7 +331,7 @@ def candidate_rows(session: Session, dataset_id: int) -> Sequence[Any]:
         .outerjoin(VerdictModel, VerdictModel.id == newest.c.id)
         .where(QueueModel.dataset_id == dataset_id)
     )
-    return session.execute(statement).all()
+    return session.rows(CandidateRow, statement)
 
 
 def _version_group(row: Any) -> VersionGroup:

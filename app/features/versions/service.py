@@ -30,6 +30,7 @@ from app.features.versions.frozen_queries import (
 from app.features.versions.queries import Verification as Verification
 from app.features.versions.queries import (
     VersionGroup,
+    VersionRow,
     all_versions,
     dataset_versions,
     read_verifications,
@@ -262,13 +263,13 @@ def require_frozen(keys: set[str], found: Mapping[str, bytes]) -> None:
         )
 
 
-def _versions_from_rows(session: Session, rows: Sequence[Any]) -> list[Version]:
+def _versions_from_rows(session: Session, rows: Sequence[VersionRow]) -> list[Version]:
     verified = read_verifications(session, [row.id for row in rows])
     return [replace(_version_from_row(row), verified=verified.get(row.id)) for row in rows]
 
 
-def _version_from_row(row: Any) -> Version:
-    values = dict(row._mapping)
+def _version_from_row(row: VersionRow) -> Version:
+    values = row._asdict()
     del values["policy_hash"]
     return Version(
         **{

@@ -24,6 +24,28 @@ WAITING, DELIVERED, FAILED = "waiting", "delivered", "failed"
 """States of a delivery."""
 _DISTINCT_KINDS = ("work",)
 """Kinds of entries of which ``app.features.webhooks.queries`` tells."""
+
+
+class DueDelivery(NamedTuple):
+    """A message whose time has come, with the address and the secret of its webhook."""
+
+    id: int
+    webhook_id: int
+    message: str
+    kind: str
+    body: str
+    created: str
+    state: str
+    attempts: int
+    next_at: str | None
+    tried: str | None
+    status: int | None
+    problem: str | None
+    url: str
+    salt: str
+    turn: int
+
+
 _WEBHOOKS = select(*WebhookModel.__table__.columns)
 _DELIVERIES = select(*DeliveryModel.__table__.columns)
 
@@ -147,7 +169,7 @@ def insert_delivery(session: Session, webhook_id: int, message: str, kind: str, 
     return bool(cast(Any, done).rowcount)
 
 
-def due_deliveries(session: Session, at: str, most: int, most_each: int) -> Sequence[Any]:
+def due_deliveries(session: Session, at: str, most: int, most_each: int) -> Sequence[DueDelivery]:
     """Deliveries whose time has come, with ``url`` and ``salt`` of their webhooks; oldest first.
 
     Args:
@@ -166,7 +188,7 @@ def due_deliveries(session: Session, at: str, most: int, most_each: int) -> Sequ
     )
     order = (due.c.turn, due.c.next_at, due.c.id)
     statement = select(due).where(due.c.turn <= most_each).order_by(*order).limit(most)
-    return session.execute(statement).all()
+    return session.rows(DueDelivery, statement)
 
 
 def next_due(session: Session) -> str | None:

@@ -25,6 +25,7 @@ from app.features.webhooks.messages import Message, read_messages, sign_message,
 from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,
+    DueDelivery,
     arrived_since,
     due_deliveries,
     insert_delivery,
@@ -281,7 +282,7 @@ class WebhookSender:
         seconds = (datetime.fromisoformat(due) - self._clock()).total_seconds()
         return min(max(seconds, 0.0), POLL_SECONDS)
 
-    async def _send_delivery(self, client: httpx.AsyncClient, row: Any) -> Attempt:
+    async def _send_delivery(self, client: httpx.AsyncClient, row: DueDelivery) -> Attempt:
         """One try; whatever goes wrong with one address is its own answer."""
         try:
             async with asyncio.timeout(SECONDS):
@@ -300,7 +301,7 @@ class WebhookSender:
         redirected = " (redirects are not followed)" if 300 <= status < 400 else ""
         return Attempt(status, f"it answered {status}{redirected}")
 
-    async def _post_delivery(self, client: httpx.AsyncClient, row: Any) -> int:
+    async def _post_delivery(self, client: httpx.AsyncClient, row: DueDelivery) -> int:
         settings = self._store.settings
         require_allowed(row.url, settings.webhooks)
         headers = sign_message(
@@ -310,7 +311,7 @@ class WebhookSender:
         async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:
             return answer.status_code
 
-    def _save_attempt(self, session: Session, row: Any, answer: Attempt) -> None:
+    def _save_attempt(self, session: Session, row: DueDelivery, answer: Attempt) -> None:
         now = self._clock()
         tried = {"attempts": row.attempts + 1, "tried": text_of(now), "status": answer.status}
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
@@ -324,7 +325,7 @@ class WebhookSender:
         if values.get("state") == FAILED:
             self._turn_off_if_failing(session, row, answer)
 
-    def _turn_off_if_failing(self, session: Session, row: Any, answer: Attempt) -> None:
+    def _turn_off_if_failing(self, session: Session, row: DueDelivery, answer: Attempt) -> None:
         """Tell nobody any more who wants nothing, or has taken nothing for as long as one tries."""
         if answer.status == GONE:
             update_webhook(

@@ -23,7 +23,7 @@ from app.features.groups.revision_queries import (
     groups_after,
     newest_change_id,
 )
-from app.features.solutions.queries import read_calibrations, solution_facts
+from app.features.solutions.queries import StoredFacts, read_calibrations, solution_facts
 from app.features.what_if.cache import (
     CachedBlock,
     CachedTable,
@@ -67,7 +67,7 @@ def _read_facts(session: Session, solution_ids: Sequence[int]) -> dict[int, byte
     return found
 
 
-def _recompute_facts(session: Session, rows: Sequence[Any]) -> Iterator[tuple[int, Facts]]:
+def _recompute_facts(session: Session, rows: Sequence[StoredFacts]) -> Iterator[tuple[int, Facts]]:
     """Facts of solutions from before they were kept, where they still fit their group."""
     keys = {row.group_id: json.loads(row.calibrations) for row in rows}
     calibrations = read_calibrations(session, {key for names in keys.values() for key in names})
