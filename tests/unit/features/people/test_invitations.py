@@ -76,7 +76,7 @@ class TestInviteMany:
             '"boss" is not a role; the roles are none, viewer, annotator, reviewer, lead, admin'
         )
         assert "cannot be the name of a person" in problems[3]
-        assert problems[4] == "anna stands in row 1, too"
+        assert problems[4] == "anna is already in row 1"
         assert problems[5] == '"dora at home" is not an email address'
         assert problems[6].startswith("the role is missing")
         assert names(store) == ["anna", "ben"]

@@ -223,14 +223,18 @@ class TestFreeze:
         with store.write() as session:
             session.execute(delete(SolutionModel))
         change_policy(store, "demo", STRICT, if_match=None, actor="ann")
-        with pytest.raises(ConflictError, match="2 groups wait to be solved"):
+        with pytest.raises(
+            ConflictError, match="2 groups that may belong in the version are not solved yet"
+        ):
             frozen(store)
 
     def test_what_an_earlier_solver_solved_waits_and_how_to_solve_it_is_said(
         self, store, judged, upgrade_solver
     ) -> None:
         upgrade_solver()
-        with pytest.raises(ConflictError, match="2 groups wait to be solved") as refused:
+        with pytest.raises(
+            ConflictError, match="2 groups that may belong in the version are not solved yet"
+        ) as refused:
             frozen(store)
         assert 'touchline solve --dataset "demo"' in str(refused.value.hint)
         assert plan_freeze(store, "demo", FreezeRequest()).unsolved == 2
