@@ -177,7 +177,7 @@ def verify_backup(path: Path) -> BackupManifest:
                         raise InputError(f"{path}, {name}: not what was written")
     except (zipfile.BadZipFile, EOFError, OSError, zlib.error) as error:
         raise InputError(
-            f"{path} is damaged or no backup of Touchline ({error})", hint="Take another one."
+            f"{path} is damaged or no backup of Touchline ({error})", hint="Use another backup."
         ) from error
     return manifest
 

@@ -131,7 +131,7 @@ class Categories:
             if self._index.add(value, category):
                 self._all.append(category)
             else:
-                report.note(path, f"category {category.shown}", "id", "is there twice; left out")
+                report.note(path, f"category {category.shown}", "id", "is listed twice; left out")
 
     def find(self, value: Any) -> Category | None:
         """The category of an annotation's ``category_id``; some tools write its name there."""

@@ -268,7 +268,7 @@ def _add_ball(frame: Frame, ball: BallAnnotation, other: Frame, first: str, repo
             other.path,
             other.record,
             "annotations",
-            f"put the ball elsewhere than {first} does; both are kept, and a person picks one",
+            f"places the ball elsewhere than {first} does; both are kept, and a person has to choose",
         )
     frame.balls.append(ball)
 

@@ -243,7 +243,7 @@ class Team:
         if self.sign_on is not None and self.sign_on.rules.only:
             label = self.sign_on.rules.label
             raise ConflictError(
-                f"people log in by {label} alone here", hint=f"Log in with {label}."
+                f"on this server people log in only with {label}", hint=f"Log in with {label}."
             )
 
     def site(self, request: Request) -> PasskeySite:

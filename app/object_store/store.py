@@ -127,7 +127,7 @@ class ObjectStore:
         with self._translated(key):
             data = bytes(self._engine.get(self._store, key, options=options).bytes())
         if len(data) != end - start:
-            raise StorageError(f"{self.address(key)} came in part only", hint="Try again.")
+            raise StorageError(f"{self.address(key)} was received only in part", hint="Try again.")
         return data
 
     def read_whole(self, key: str, limit: int, etag: str = "") -> tuple[bytes, Stored]:
@@ -149,7 +149,7 @@ class ObjectStore:
                 raise TooLargeError(f"{self.address(key)} is larger than {limit:,} bytes")
             data = bytes(answer.bytes())
         if len(data) != found.size:
-            raise StorageError(f"{self.address(key)} came in part only", hint="Try again.")
+            raise StorageError(f"{self.address(key)} was received only in part", hint="Try again.")
         return data, found
 
     def below(self, folder: str) -> Iterator[Stored]:

@@ -131,7 +131,7 @@ def estimate_lone_frame(
         left_out: Markings that the camera was found without.
 
     Returns:
-        None where the policy takes pitch and picture for known, or the lines leave the camera open.
+        None where the policy takes pitch and picture for known, or the lines do not determine the camera.
     """
     sigma = PRIORS.get(policy.lone_frames)
     if sigma is None:
@@ -178,7 +178,7 @@ class _Fit:
         spread, off = self.frame.noise(self.rows), carry @ self.off
         covariance = carry @ spread @ carry.T + np.outer(off, off)
         if not np.isfinite(covariance).all():
-            raise np.linalg.LinAlgError("the lines leave the camera open")
+            raise np.linalg.LinAlgError("the lines do not determine the camera")
         return LoneFrame(
             covariance,
             self.frame.on(self.unknowns),

@@ -391,7 +391,7 @@ class _Frames:
             self.parameters = self.parameters + alone - carried @ step
             self._known = replace(self._known, shared=self._known.shared + step)
             if not np.isfinite(self.parameters).all():
-                raise np.linalg.LinAlgError("the frames leave the pitch open")
+                raise np.linalg.LinAlgError("the frames do not determine the size of the pitch")
             rest = [np.abs(self.seen(at).offsets) for at in range(len(self._frames))]
             sigmas = np.concatenate([frame.sigmas for frame in self._frames])
             # Of a normal distribution the median distance is 0.6745 standard deviations.

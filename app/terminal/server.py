@@ -75,7 +75,7 @@ def work_against_server(url: str | None, token_file: Path | None, command: str |
         raise InputError(f"{url} is not the address of a server", hint="Write https://NAME.")
     if parts.scheme == "http" and not is_local(parts.hostname):
         raise InputError(
-            f"{url} is not encrypted: a token must not travel in the clear",
+            f"{url} is not encrypted: a token must not be sent unencrypted",
             hint="Write https://; http:// is for this machine alone.",
         )
     _SERVER.set(ServerPlace(url.rstrip("/"), token_file))

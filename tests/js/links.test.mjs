@@ -18,7 +18,7 @@ test('a map says its speed and how well its times are known', () => {
 	const pieces = mapText({ ...MAP, speed: null, pieces: [piece, { ...piece, first: 9, last: 20, speed: 1 }] }, 50);
 	assert.equal(pieces.length, 3);
 	assert.match(pieces[2], /Frames 9 to 20 of the replay run as fast as live/);
-	assert.deepEqual(mapText({ ...MAP, ball_reason: 'The ball rests.' }, 50).slice(1), ['The ball does not tell the times. The ball rests.']);
+	assert.deepEqual(mapText({ ...MAP, ball_reason: 'The ball rests.' }, 50).slice(1), ['The times could not be found from the ball. The ball rests.']);
 	const close = mapText({ ...MAP, outcome: 'offset', reason: 'Too close together; 1 is assumed.', speed: 1, too_close: true }, 50);
 	assert.deepEqual(close, ['Too close together; 1 is assumed.']);
 	assert.match(mapText({ ...MAP, outcome: 'offset', reason: 'One; 1 is assumed.', speed: 1 }, 50)[0], /^One linked instant tells/);

@@ -314,7 +314,7 @@ class TestOnly:
         }
         ruled(only=True)
         for target, body in asked.items():
-            assert_refused(visitor.team.ask("POST", target, body), 409, "by Club alone")
+            assert_refused(visitor.team.ask("POST", target, body), 409, "only with Club")
         ways = json.loads(visitor.team.ask("GET", f"{API}/session").body)["ways"]
         assert ways == {"password": False, "sign_on": "Club"}
         logins = visitor.team.app.state.team.logins

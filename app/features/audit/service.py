@@ -86,7 +86,7 @@ def assign_local_work(store: Store, person_id: int, *, actor: str) -> str:
         if before is not None:
             raise ConflictError(
                 f"what was done as {LOCAL_USER} is shown as {before}'s already",
-                hint="It can be given to one person, and only once.",
+                hint="The work of this home can be assigned to one person, once.",
             )
         at = now()
         body = {"person": person.name, "did": "adopted", "role": person.role, "from": LOCAL_USER}

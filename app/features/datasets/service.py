@@ -116,7 +116,9 @@ def checked_title(text: str, what: str) -> str:
     """
     text = text.strip()
     if not text or len(text) > MAX_TITLE or not text.isprintable():
-        raise InputError(f"{what} has a name of 1 to {MAX_TITLE} letters", pointer="/name")
+        raise InputError(
+            f"the name of {what} must have 1 to {MAX_TITLE} characters", pointer="/name"
+        )
     return text
 
 

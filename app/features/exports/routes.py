@@ -417,9 +417,7 @@ def stored_file(settings: Settings, sealed: str, name: str, request: Request) ->
     store = open_store(settings, store_name)
     stored = store.head(key)
     if stored.etag.strip('"') != etag:
-        raise ChangedObjectError(
-            f"{address} is another file than the export that was written there"
-        )
+        raise ChangedObjectError(f"{address} has changed since the export was written there")
     if store.settings.delivery == "signed":
         found = store.signed(key, SIGNED_SECONDS)
         return RedirectResponse(found, 307, headers={"Cache-Control": "no-store"})

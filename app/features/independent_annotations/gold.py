@@ -153,8 +153,8 @@ def mark_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
     state = load_solved(store, group_id)
     if state.verdict.state not in JUDGED or state.verdict.stale:
         raise ConflictError(
-            "a gold group is one that was accepted or rejected as it is now",
-            hint="Judge it first: what it holds is what everybody is measured by.",
+            "only a group that is accepted or rejected as it is now can be a gold group",
+            hint="Give it a verdict first: annotators are measured against what it holds.",
         )
     with store.write() as session:
         if is_copy(session, state.dataset_id):

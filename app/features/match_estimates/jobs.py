@@ -256,7 +256,7 @@ def _adjust_rig(call: MatchCall, progress: JobProgress) -> Json:
         if inputs != proposed.inputs:
             raise ConflictError(
                 "balls, lines or cameras have changed since that proposal",
-                hint="Look at a new one, and accept that.",
+                hint="Make a new proposal, and accept that.",
             )
         accept_rig(call.store, proposed, what, actor=call.job.actor)
         call.solve()

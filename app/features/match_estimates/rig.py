@@ -131,8 +131,8 @@ def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pi
         )
     if len(pitches) != 1:
         raise InputError(
-            f"the static cameras of {found.name} look at {len(pitches)} sizes of pitch",
-            hint="Cameras are adjusted together where they look at one pitch.",
+            f"the static cameras of {found.name} are given {len(pitches)} sizes of pitch",
+            hint="Give their match one size of pitch first.",
         )
     return states, pitches.pop(), found.policy
 
@@ -181,7 +181,7 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
         if found != {proposed.pitch}:
             raise ConflictError(
                 "the size of the pitch has changed since that proposal",
-                hint="Look at a new one, and accept that.",
+                hint="Make a new proposal, and accept that.",
             )
 
     submit_stations(store, edits, actor=actor, check=check)

@@ -131,7 +131,7 @@ class AccessTokens:
         if not chosen:
             raise InputError("a token needs a scope", pointer="/scopes")
         if not 1 <= days <= MOST_DAYS:
-            raise InputError(f"a token lasts 1 to {MOST_DAYS} days", pointer="/days")
+            raise InputError(f"a token can last from 1 to {MOST_DAYS} days", pointer="/days")
         at, text = self._clock(), new_token_text()
         values = {
             "token_hash": token_hash(text),

@@ -168,7 +168,7 @@ def invite_many(
             try:
                 name, role, address = _checked_invitation(one, seen)
                 if person_by_name(session, name) is not None:
-                    raise InputError(f"there is a {name} already")
+                    raise InputError(f"there is already a user {name}")
             except ReviewError as error:
                 refused.append(_refused_invitation(one, error.message))
                 continue

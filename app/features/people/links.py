@@ -65,7 +65,7 @@ def hash_password(password: str, name: str, *, pointer: str = "/password") -> st
     """
     if not SHORTEST <= len(password) <= LONGEST:
         raise InputError(
-            f"a password has {SHORTEST} to {LONGEST} letters",
+            f"a password must have {SHORTEST} to {LONGEST} characters",
             hint="Three or four unrelated words are easy to remember.",
             pointer=pointer,
         )
@@ -233,6 +233,6 @@ def has_joined(session: Session, person: Any) -> bool:
 
 def _insert_first_admin(session: Session, name: str) -> int:
     if person_by_name(session, name) is not None:
-        raise ConflictError(f"there is a {name} already", hint="Choose another name.")
+        raise ConflictError(f"there is already a user {name}", hint="Choose another name.")
     log_account_event(session, name, name, "first admin", Role.ADMIN)
     return insert_person(session, name, Role.ADMIN, by=name)

@@ -212,7 +212,8 @@ def end_factor(session: Session, login: Login) -> None:
         return
     if is_required(session):
         raise ConflictError(
-            "this server requires a second factor of everybody", hint="Make another one first."
+            "this server requires a second factor of everybody",
+            hint="Add another second factor first.",
         )
     delete_recovery_codes(session, login.person_id)
 

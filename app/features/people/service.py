@@ -131,7 +131,7 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
     with store.write() as session:
         if person_by_name(session, name) is not None:
             raise ConflictError(
-                f"there is a {name} already", hint="A new link for them: reset their password."
+                f"there is already a user {name}", hint="A new link for them: reset their password."
             )
         person, link = insert_invited(session, name, role, actor=actor)
         return _read_person(session, person), link
@@ -198,7 +198,8 @@ def change_person(
         loses = person.role is Role.ADMIN and (off or wanted is not Role.ADMIN)
         if loses and not count_people_who_can_log_in(session, Role.ADMIN, but=person_id):
             raise ConflictError(
-                f"{person.name} is the last admin who can log in", hint="Make another one first."
+                f"{person.name} is the last admin who can log in",
+                hint="Make another person admin first.",
             )
         if wanted is not person.role:
             log_account_event(session, actor, person.name, "role", wanted)
@@ -223,7 +224,7 @@ def find_person(store: Store, name: str) -> Person:
     for person in list_people(store):
         if person.name == name.strip().lower():
             return person
-    raise NotFoundError(f"there is no {name}", hint="touchline users list shows everybody.")
+    raise NotFoundError(f"there is no user {name}", hint="touchline users list shows everybody.")
 
 
 def _read_person(session: Session, person_id: int) -> Person:

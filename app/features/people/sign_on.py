@@ -265,7 +265,7 @@ class SignOn:
             person = person_by_id(session, person_id)
             if person is None or person.disabled:
                 raise NotLoggedInError(
-                    "your account on this server is disabled", hint="An admin of it can say why."
+                    "your account on this server is disabled", hint="Ask an admin of this server."
                 )
             return person_id, person.password
 

@@ -77,8 +77,8 @@ class SignOnRules:
             )
         if self.group_claim and self.groups.isdisjoint(_claim_texts(claims.get(self.group_claim))):
             raise NotLoggedInError(
-                f"at {self.label} you are in none of the groups that may come in here",
-                hint="Whoever runs this server can say which one it takes.",
+                f"you are in none of the groups of {self.label} that may log in here",
+                hint="The operator of this server knows which groups are allowed.",
             )
 
     def name_for(self, claims: Mapping[str, Any]) -> str:

@@ -292,7 +292,7 @@ def _require_own(store: Store, settings: Settings, person: str | None) -> None:
     if keys and not keys <= set(known or ()):
         raise ConflictError(
             f'there is a dataset "{name}" with groups of your own',
-            hint="The practice groups need that name. Rename or delete your dataset first.",
+            hint="The practice needs that name. Rename or delete your dataset first.",
         )
 
 

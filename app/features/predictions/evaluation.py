@@ -209,7 +209,7 @@ def compare_runs(
         InputError: They belong to different datasets, or the field has no difference.
     """
     if field not in FIELDS:
-        raise InputError(f"frames are compared by {', '.join(FIELDS)}", pointer="/field")
+        raise InputError(f"frames can be compared by {', '.join(FIELDS)}", pointer="/field")
     with store.read() as session:
         first, second = read_evaluation(session, first_id), read_evaluation(session, second_id)
         if first.dataset_id != second.dataset_id:

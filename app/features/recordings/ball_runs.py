@@ -176,7 +176,7 @@ def change_run(
         StaleRevisionError: Somebody changed it meanwhile.
     """
     if change.accepted is None and change.confirmed is None:
-        raise InputError("this changes nothing of the run", hint="Send accepted or confirmed.")
+        raise InputError("this request changes nothing", hint="Send accepted or confirmed.")
     before = get_run(store, recording_id, run_id)
     require_etag(before.etag, if_match, "this ball run")
     if change.confirmed is not None:
@@ -246,7 +246,7 @@ def _followed(
     if run is None:
         raise InputError(
             f"nothing near ({click.x:.0f}, {click.y:.0f}) in frame {click.frame} looks like a ball",
-            hint="Click its middle, in a frame where nobody hides it.",
+            hint="Click its middle, in a frame where it is not hidden.",
         )
     return recording, run
 

@@ -107,7 +107,7 @@ def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
     if len(numbers) > MOST_AT_ONCE:
         raise InputError(
             f"{len(numbers):,} instants are too many at once; {MOST_AT_ONCE:,} can be taken",
-            hint="Take fewer of them, or a part of the recording after the other.",
+            hint="Take fewer, or take one part of the recording after another.",
             pointer="/frames",
         )
     if numbers and numbers[-1] >= (recording.frames or 0):

@@ -149,7 +149,7 @@ def change_track(
     """
     if change.verdict is None and change.corrections is None:
         raise InputError(
-            "this changes nothing of the track",
+            "this request changes nothing",
             hint="Send a verdict, with a note where there is something to say, or corrections.",
         )
     solved, notices = _solved_change(store, track_id, change, if_match)

@@ -422,7 +422,7 @@ def _require_some(dataset: DatasetHead, candidates: Sequence[Candidate], rule: s
     if rule == "accepted":
         hint = "Accept groups first, or freeze with groups=passing what the policy alone passes."
     raise InputError(
-        f'no group of "{dataset.name}" enters the version ({reasons or "it has no groups"})',
+        f'no group of "{dataset.name}" can be in the version ({reasons or "it has no groups"})',
         hint=hint,
     )
 

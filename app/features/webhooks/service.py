@@ -220,7 +220,7 @@ def _checked_kinds(kinds: Iterable[Kind]) -> list[str]:
     chosen = sorted({str(kind) for kind in kinds})
     if not chosen or Kind.PING in chosen:
         raise InputError(
-            "a webhook wants one kind of message at least",
+            "a webhook needs at least one kind of message",
             hint=f"Kinds are {', '.join(CHOSEN)}.",
             pointer="/kinds",
         )

@@ -113,7 +113,7 @@ export function BallCard({ one, shot, balls }) {
 		<section class="card ball" aria-label="Ball" aria-busy=${busy}>
 			<h2>Ball${run ? html`<span class="card__aside">frames ${run.first} to ${run.last}</span>` : null}</h2>
 			${run ? html`
-				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}: the ball was added to ${plural(run.placed ?? 0, 'view')}${run.kept ? `; ${plural(run.kept, 'view')} already had one and ${run.kept === 1 ? 'keeps' : 'keep'} it` : ''}. ` : null}Begins: ${ENDS[run.before]}; ends: ${ENDS[run.after]}. ${left ? `${plural(left, 'frame')} uncertain.` : 'Every frame is sure.'}</p>
+				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}: the ball was added to ${plural(run.placed ?? 0, 'view')}${run.kept ? `; ${plural(run.kept, 'view')} already had one and ${run.kept === 1 ? 'keeps' : 'keep'} it` : ''}. ` : null}Begins: ${ENDS[run.before]}; ends: ${ENDS[run.after]}. ${left ? `${plural(left, 'frame')} uncertain.` : 'No frame is uncertain.'}</p>
 				<p data-ball-state=${ball?.state ?? 'lost'}>${ball ? html`Frame ${wanted.value}: <strong>${WORDS[ball.state]}</strong>, ${ball.diameter.toFixed(1)} px wide, centre known to ${ball.sigma.toFixed(1)} px, ${Math.round(100 * ball.confidence)} % sure.` : html`Frame ${wanted.value}: <strong>lost</strong>. Click the ball where it is seen.`}</p>
 				${run.stale ? html`<p class="form__error">The video file has changed since then.</p>` : null}`
 			: html`<p>${runs.length ? 'No ball is followed in this frame. ' : ''}Click the ball in the picture: it is followed both ways until it is lost.</p>`}

@@ -134,9 +134,9 @@ export function useBallKeys(balls) {
 	const keys = useRef(/** @type {Binding[]} */ ([
 		{ keys: ['f'], label: 'Click the ball by keyboard: a cross that the arrows move', group: 'Ball', needs: 'annotate', run: () => latest.current.turnCross() },
 		{ keys: ['y'], label: 'Accept the ball of this run', group: 'Ball', needs: 'annotate', run: () => latest.current.accept() },
-		{ keys: ['u'], label: 'Take that back', group: 'Ball', needs: 'annotate', run: () => latest.current.takeBack() },
+		{ keys: ['u'], label: 'Take the acceptance back', group: 'Ball', needs: 'annotate', run: () => latest.current.takeBack() },
 		{ keys: ['v'], label: 'Next uncertain or lost frame', group: 'Ball', run: () => latest.current.next() },
-		{ keys: ['o'], label: 'These uncertain frames are right', group: 'Ball', needs: 'annotate', run: () => latest.current.confirm() },
+		{ keys: ['o'], label: 'Confirm these uncertain frames', group: 'Ball', needs: 'annotate', run: () => latest.current.confirm() },
 		{ keys: ['Delete'], label: 'Delete the run', group: 'Ball', needs: 'annotate', run: () => latest.current.remove() },
 	]));
 	useKeys(keys.current);
@@ -153,6 +153,6 @@ function crossKeys(latest) {
 			keys: [key, `Shift+${key}`, `Alt+${key}`], label: `Move the cross ${key.slice(5).toLowerCase()}`, group: 'Ball, by cross', shown: '↑ ↓ ← →, with Shift or Alt', when, run: (event) => latest.current.moveCross(x, y, event),
 		})),
 		{ keys: ['Enter'], label: 'Follow the ball from the cross', group: 'Ball, by cross', when, run: () => { const { cross, click } = latest.current; if (cross) click(cross); } },
-		{ keys: ['Escape'], label: 'Put the cross away', group: 'Ball, by cross', when, run: () => latest.current.turnCross() },
+		{ keys: ['Escape'], label: 'Hide the cross', group: 'Ball, by cross', when, run: () => latest.current.turnCross() },
 	];
 }

@@ -39,7 +39,7 @@ export function CameraCard({ one, cameras }) {
 	const fresh = stretch ? stretch.drawn.filter((frame) => !stretch.summary.annotated.includes(frame)) : [];
 	const useless = stretch?.summary.unusable ?? [];
 	const shown = stretch?.summary.pitch;
-	const noGroup = one.groups ? '' : 'A match gets a pitch with its first group: press I at a frame and make a group of it';
+	const noGroup = one.groups ? '' : 'The match has no group yet: press I at a frame, and make a group of it';
 	return html`
 		<section class="card camera" aria-label="Cameras">
 			<h2>Cameras${stretch ? html`<span class="card__aside">frames ${stretch.first} to ${stretch.last}</span>` : null}</h2>

@@ -69,7 +69,7 @@ export function InstantsCard({ one, running: { jobs, watch }, shot, instants, li
 			<label class="form__check"><input type="checkbox" checked=${propose} onChange=${withTick(setPropose)} />Propose cameras afterwards</label>
 			${usable ? html`<label class="form__check"><input type="checkbox" checked=${linked} onChange=${withTick(setLinked)} />With the views of ${plural(usable, 'linked replay')}</label>` : null}
 			<p class="buttons"><button class="button button--primary" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${() => make(false)}>Make ${chosen.size ? plural(chosen.size, 'group') : 'groups'}</button>
-				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why || 'Counts what would become of them, and keeps nothing'} onClick=${() => make(true)}>Dry run</button></p>
+				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why || 'Counts what would be made, and saves nothing'} onClick=${() => make(true)}>Dry run</button></p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}
 			${job?.state === 'done' ? html`<p role="status">${madeText(job.result)}</p>` : null}

@@ -63,7 +63,7 @@ export function BallCard({ link, dataset, reload }) {
 			<form class="linking__files" ref=${form} onSubmit=${(/** @type {SubmitEvent} */ event) => { event.preventDefault(); if (!runs) look(); }}>
 				<label>ball.csv of the live recording <input type="file" name="live" accept=".csv" /></label>
 				<label>ball.csv of the replay’s recording <input type="file" name="replay" accept=".csv" /></label>
-				<button class="button" type="submit" data-needs="lead" data-of=${dataset} aria-disabled=${runs} title=${runs ? 'It is being looked for' : ''}>Find the times from the ball</button>
+				<button class="button" type="submit" data-needs="lead" data-of=${dataset} aria-disabled=${runs} title=${runs ? 'The search is running' : ''}>Find the times from the ball</button>
 			</form>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}

@@ -43,7 +43,7 @@ function Suggestions({ one, shots, shot }) {
 		<h3>Link to live</h3>
 		${found.error ? html`<${FormError} error=${found.error} />` : null}
 		${error ? html`<${FormError} error=${error} />` : null}
-		${found.value && !items.length ? html`<p class="empty-note">No shot of the main camera is before this replay. Choose the live shot yourself.</p>` : null}
+		${found.value && !items.length ? html`<p class="empty-note">No shot of the main camera is before this replay. Choose the live shot by hand.</p>` : null}
 		<ul class="linking__choices">
 			${items.map((item) => html`
 				<li key=${`${item.recording}-${item.first}`}>

@@ -39,7 +39,7 @@ export function keysOfRecording(one, shots, doing) {
 		{ keys: ['ArrowDown'], label: 'Next shot', group: look, run: () => shotBy(1) },
 		{ keys: ['ArrowUp'], label: 'Shot before', group: look, run: () => shotBy(-1) },
 		{ keys: ['s'], label: 'Split the shot at this frame', group: edit, needs: 'annotate', run: () => doing.current.change(splitAt(shots(), wanted.value), 'Split.') },
-		{ keys: ['m'], label: 'Merge the shot with the next one', group: edit, needs: 'annotate', run: () => doing.current.change(mergedWithNext(shots(), at()), 'Merged with the next shot.') },
+		{ keys: ['m'], label: 'Merge the shot with the next', group: edit, needs: 'annotate', run: () => doing.current.change(mergedWithNext(shots(), at()), 'Merged with the next shot.') },
 		...SHOT_KINDS.map(({ kind, label }, index) => /** @type {Binding} */ ({
 			keys: [String(index + 1)], label: `The shot is ${label === 'other' ? 'something else' : `a ${label}`}`, group: edit, needs: 'annotate', run: () => set({ kind }, `The kind of this shot is now ${label}.`),
 		})),

@@ -121,7 +121,7 @@ function chartsOf(frames, around) {
 	const left = { label: `left-out error, px (up to ${most})`, values: frames.left_out_px.map((value) => (value === null ? null : Math.min(value, most))), colour: 'chart-d', points: 4 };
 	/** @type {Curve[]} */
 	const now = around ? [{ label: 'as its groups are now', values: amid(frames.frame, around, around.left_out_px).map((value) => (value === null ? null : Math.min(value, most))), colour: 'chart-c', points: 4 }] : [];
-	return [...charts, { name: 'Error of what was left out and predicted, in each frame', yLabel: 'px', curves: [left, ...now], format: tenths, yRange: /** @type {[number | null, number | null]} */ ([0, null]) }];
+	return [...charts, { name: 'Error of left-out balls, by frame', yLabel: 'px', curves: [left, ...now], format: tenths, yRange: /** @type {[number | null, number | null]} */ ([0, null]) }];
 }
 
 /** What comes of the frame at hand as its groups are now. @param {{around: TrackAround, at: number}} props */

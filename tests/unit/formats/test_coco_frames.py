@@ -96,7 +96,7 @@ class TestOneFrameInSeveralFiles:
         assert len(groups["a.jpg"].views[0].balls) == 2
         (problem,) = report.problems
         assert problem.path.endswith("b.json")
-        assert "put the ball elsewhere than" in problem.problem
+        assert "places the ball elsewhere than" in problem.problem
 
     def test_sizes_and_splits_that_contradict_are_named(
         self, tmp_path: Path, report: Report

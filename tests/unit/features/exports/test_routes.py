@@ -125,7 +125,7 @@ class TestMakeExport:
     @pytest.mark.parametrize(
         ("order", "status", "pointer", "words"),
         [
-            ({"images": "copy"}, 400, "/images", "none of the images"),
+            ({"images": "copy"}, 400, "/images", "no image file of"),
             ({"version": "v1"}, 400, "/all", "its own groups"),
             ({"format": "touchline", "version": 1}, 400, "/version", "whole dataset"),
             ({"format": "issia-3d"}, 400, None, "is not from ISSIA"),

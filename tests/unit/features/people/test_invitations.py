@@ -96,7 +96,7 @@ class TestInviteMany:
         post = LinkMailer(None, None, URL)
         invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
         (row,) = invite_many(store, ROWS[:1], post, actor="local", dry_run=False)
-        assert (row.state, row.problem) == ("refused", "there is a anna already")
+        assert (row.state, row.problem) == ("refused", "there is already a user anna")
 
     def test_tokens_invite_nobody(self, store: Store) -> None:
         with pytest.raises(ForbiddenError):

@@ -47,5 +47,5 @@ class TestHashPassword:
 
     @pytest.mark.parametrize("password", ["short", "x" * 201])
     def test_its_length_is_asked_first(self, password: str) -> None:
-        with pytest.raises(InputError, match="10 to 200 letters"):
+        with pytest.raises(InputError, match="10 to 200 characters"):
             hash_password(password, "anna")
