@@ -254,7 +254,9 @@ class TestFreeze:
 
     def test_nothing_to_freeze_is_one_sentence(self, store, fill, make_group) -> None:
         fill(make_group(7))
-        with pytest.raises(InputError, match=r"no group of \"demo\" can be in the version \(1 unrev"):
+        with pytest.raises(
+            InputError, match=r"no group of \"demo\" can be in the version \(1 unrev"
+        ):
             frozen(store)
         assert list_versions(store, "demo") == []
 
