@@ -60,7 +60,7 @@ from app.http.headers import KnownHosts, SameOrigin, SecurityHeaders
 from app.http.idempotency import Idempotency
 from app.http.metrics import SharedNumbers, install_metrics
 from app.http.openapi import describe
-from app.http.pages import STATIC, Site, install_pages
+from app.http.pages import STATIC, BrowserSite, install_pages
 from app.http.request_limits import THREADS, RequestLimits
 from app.http.request_log import RequestLog
 from app.http.requests import (
@@ -150,7 +150,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
         StorageError: The database cannot be used.
     """
     services = Services.open(settings, pool)
-    site = Site(static, team=settings.team)
+    site = BrowserSite(static, team=settings.team)
     app = FastAPI(
         title="Touchline",
         version=software_version(),
@@ -188,7 +188,7 @@ def create_app(settings: Settings, *, static: Path = STATIC, pool: Pool = nullco
     return app
 
 
-def _add_middleware(app: FastAPI, settings: Settings, site: Site) -> None:
+def _add_middleware(app: FastAPI, settings: Settings, site: BrowserSite) -> None:
     """The first one added is the innermost."""
     app.add_middleware(OneRange)
     app.add_middleware(HeadAsGet)

@@ -43,7 +43,7 @@ def no_answer(_question: Any) -> None:
     """The answer where no questions are asked."""
 
 
-class Caller:
+class CallingServer:
     """The server, as the work sees it; it is a ``ReportProgress`` and a context that is a turn to write."""
 
     def __init__(self, send: Callable[[Message], Answer]):
@@ -107,7 +107,7 @@ def run_in_worker(
         store: The database; the process opens it again.
         kind: What is done; see ``worker_process.KINDS``.
         work: A function of a module; it, its arguments and its result travel by pickle.
-        arguments: Its arguments between the database and the ``Caller``.
+        arguments: Its arguments between the database and the ``CallingServer``.
         limits: What the process may use.
         progress: Receives the progress; the error that it raises is raised in the work.
         stop: Called every now and then; an error that it raises ends the process.
@@ -166,7 +166,7 @@ def run_in_this_thread(
         progress(*value)
         return False, None
 
-    return _run_and_flush(work, store, arguments, Caller(on_message))
+    return _run_and_flush(work, store, arguments, CallingServer(on_message))
 
 
 def with_grace(check: Callable[[], None]) -> Callable[[], None]:
@@ -197,7 +197,7 @@ def _work_in_process(
     send: Callable[[Message], Answer],
 ) -> Any:
     log_to_stderr(settings.log_format)
-    caller = Caller(send)
+    caller = CallingServer(send)
     with (
         structlog.contextvars.bound_contextvars(**log_fields),
         closing(Store.open(settings, caller)) as store,
@@ -206,7 +206,7 @@ def _work_in_process(
 
 
 def _run_and_flush(
-    work: Callable[..., Result], store: Store, arguments: tuple[Any, ...], caller: Caller
+    work: Callable[..., Result], store: Store, arguments: tuple[Any, ...], caller: CallingServer
 ) -> Result:
     result = work(store, *arguments, caller)
     # It is done: to cancel it now is too late.

@@ -28,7 +28,7 @@ UNFINISHED = "transfer"
 
 
 @dataclass(frozen=True)
-class Migrated:
+class MigrationResult:
     """What a migration came to.
 
     Attributes:
@@ -53,7 +53,7 @@ def migrations_folder() -> Path:
     return folder
 
 
-def migrate(settings: Settings) -> Migrated:
+def migrate(settings: Settings) -> MigrationResult:
     """Run the migrations that are missing, after a backup of what is there.
 
     All of them are one transaction: killed midway nothing has happened.
@@ -71,7 +71,7 @@ def migrate(settings: Settings) -> Migrated:
         lock.release()
 
 
-def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
+def bring_up_to_date(settings: Settings, *, alone: bool) -> MigrationResult:
     """The same for who holds the database's lock; ``alone``: and nobody else has it open."""
     dialect = dialect_of(settings)
     if dialect.is_file:
@@ -100,7 +100,7 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> Migrated:
         engine.dispose()
     if copy is not None:
         _delete_older_copies(copy)
-    return Migrated(SCHEMA_REVISION, copy)
+    return MigrationResult(SCHEMA_REVISION, copy)
 
 
 def make_schema(engine: Engine, dialect: Dialect, *, new: bool) -> None:

@@ -23,7 +23,7 @@ from app.errors import DamagedError, InputError
 
 
 @dataclass(frozen=True)
-class Restored:
+class RestoreResult:
     """What a home has been made from.
 
     Attributes:
@@ -45,7 +45,7 @@ class Restored:
     foreign_log: bool = False
 
 
-def restore(settings: Settings, source: Path) -> Restored:
+def restore(settings: Settings, source: Path) -> RestoreResult:
     """Put a backup, or a database file, into the place of a home's database.
 
     The source is examined first. Killed at any moment, the home is as it was, or without a
@@ -74,7 +74,7 @@ def restore(settings: Settings, source: Path) -> Restored:
             raise refused_file_error(Path(error.filename or settings.home), error) from error
 
 
-def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> Restored:
+def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> RestoreResult:
     if zipfile.is_zipfile(source):
         expected, foreign_log = _unpack(source, folder), False
     else:
@@ -90,7 +90,9 @@ def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> Restor
     aside = _move_aside(settings, [path.name for path in folder.iterdir() if path.is_dir()])
     _move_into_home(settings, folder, anchor)
     make_private(settings)
-    return Restored(settings.home, anchor.schema, anchor.entries, rows, files, aside, foreign_log)
+    return RestoreResult(
+        settings.home, anchor.schema, anchor.entries, rows, files, aside, foreign_log
+    )
 
 
 @contextmanager

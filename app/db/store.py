@@ -46,7 +46,7 @@ TURN_SECONDS = 10.0
 processes (``busy_timeout``)."""
 
 
-class Turn:
+class WriteTurn:
     """The turn to write among the threads of one process.
 
     Raises:
@@ -122,7 +122,7 @@ class Store:
         try:
             engine = _open_engine(settings, lock.alone)
             lock.share()
-            return Store(engine, settings, lock, Turn() if turn is None else turn)
+            return Store(engine, settings, lock, WriteTurn() if turn is None else turn)
         except BaseException:
             if engine is not None:
                 engine.dispose()

@@ -39,7 +39,7 @@ RECALLS = np.linspace(0.0, 1.0, 101)
 
 
 @dataclass(frozen=True)
-class Hits:
+class SortedDetections:
     """All detections of all frames, the surest first.
 
     Attributes:
@@ -56,7 +56,7 @@ class Hits:
 
 
 @dataclass(frozen=True)
-class Curve:
+class PrecisionRecallCurve:
     """Precision and recall after each detection, and the score there, all of shape (D,)."""
 
     recall: FloatArray
@@ -64,7 +64,7 @@ class Curve:
     score: FloatArray
 
 
-def find_hits(judged: Sequence[JudgedFrame]) -> Hits:
+def find_hits(judged: Sequence[JudgedFrame]) -> SortedDetections:
     """Match detections to balls as COCO does: the surest that overlaps enough gets the ball."""
     scores, frames, found = [], [], []
     for index, item in enumerate(judged):
@@ -77,7 +77,7 @@ def find_hits(judged: Sequence[JudgedFrame]) -> Hits:
             frames.append(index)
             found.append(hit)
     order = np.argsort(-np.array(scores), kind="stable")
-    return Hits(
+    return SortedDetections(
         np.array(scores)[order],
         np.array(frames, dtype=np.int64)[order],
         np.array(found, dtype=bool).reshape(-1, len(IOUS))[order],
@@ -103,8 +103,8 @@ def coco_average_precision(judged: Sequence[JudgedFrame]) -> tuple[float | None,
 
 
 def precision_recall_curve(
-    hits: Hits, threshold: int = 0, weights: FloatArray | None = None
-) -> Curve:
+    hits: SortedDetections, threshold: int = 0, weights: FloatArray | None = None
+) -> PrecisionRecallCurve:
     """Precision against recall.
 
     Args:
@@ -119,21 +119,21 @@ def precision_recall_curve(
     with np.errstate(invalid="ignore", divide="ignore"):
         precision = right / np.maximum(right + wrong, np.finfo(float).eps)
         recall = right / balls
-    return Curve(recall, precision, hits.scores)
+    return PrecisionRecallCurve(recall, precision, hits.scores)
 
 
-def interpolated_precision(found: Curve) -> float:
+def interpolated_precision(found: PrecisionRecallCurve) -> float:
     """COCO's AP: the mean of the interpolated precision at 101 recalls."""
     return float(_precision_at_recalls(found).mean())
 
 
-def area_under_curve(found: Curve) -> float:
+def area_under_curve(found: PrecisionRecallCurve) -> float:
     """VOC's AP since 2010: the area under the interpolated precision."""
     steps = np.diff(found.recall, prepend=0.0)
     return float(np.sum(steps * _precision_envelope(found.precision)))
 
 
-def mean_interpolated(hits: Hits, weights: FloatArray | None = None) -> float:
+def mean_interpolated(hits: SortedDetections, weights: FloatArray | None = None) -> float:
     """COCO's AP averaged over ``IOUS``: the same as `interpolated` of each, in one go."""
     weights = np.ones(len(hits.balls)) if weights is None else weights
     each, balls = weights[hits.frames], float(weights @ hits.balls)
@@ -148,7 +148,7 @@ def mean_interpolated(hits: Hits, weights: FloatArray | None = None) -> float:
     return float(np.mean(at.mean(axis=1)))
 
 
-def _precision_at_recalls(found: Curve) -> FloatArray:
+def _precision_at_recalls(found: PrecisionRecallCurve) -> FloatArray:
     if not len(found.recall) or not np.isfinite(found.recall).all():
         return np.full(len(RECALLS), np.nan if len(found.recall) else 0.0)
     places = np.searchsorted(found.recall, RECALLS, side="left")
@@ -264,7 +264,7 @@ def precision_recall(judged: Sequence[JudgedFrame]) -> Figure:
     return Figure("precision_recall", "Precision against recall", (panel,), note)
 
 
-def _curve_series(hits: Hits, index: int, words: str) -> Series:
+def _curve_series(hits: SortedDetections, index: int, words: str) -> Series:
     found = precision_recall_curve(hits, index)
     chosen = np.unique(np.linspace(0, max(len(found.recall) - 1, 0), MAX_PLACES).astype(int))
     if not len(found.recall):
@@ -279,13 +279,13 @@ def _curve_series(hits: Hits, index: int, words: str) -> Series:
     )
 
 
-def _highest_recall(hits: Hits, weights: FloatArray) -> float:
+def _highest_recall(hits: SortedDetections, weights: FloatArray) -> float:
     found = precision_recall_curve(hits, 0, weights)
     return float(found.recall[-1]) if len(found.recall) else 0.0
 
 
 @dataclass(frozen=True)
-class Bins:
+class ErrorBins:
     """How frames are sorted into bins [edge, next edge); the last one has no upper end."""
 
     figure: str
@@ -314,22 +314,22 @@ class Bins:
         return f"{low:g} to {high:g} {self.unit}"
 
 
-DISTANCE = Bins(
+DISTANCE = ErrorBins(
     "error_by_distance", "distance_m", "Error by distance", "Distance to the camera", "m",
     (0, 20, 30, 40, 50, 60, 70, 80, 100),
 )  # fmt: skip
-PARALLAX = Bins(
+PARALLAX = ErrorBins(
     "error_by_parallax", "parallax_degrees", "Error by parallax", "Parallax of the views", "°",
     (0, 2, 5, 10, 20, 40, 60, 90, 120),
 )  # fmt: skip
-SIZE = Bins(
+SIZE = ErrorBins(
     "error_by_size", "diameter_px", "Error by size", "Diameter of the true box", "px",
     (0, 6, 8, 10, 12, 14, 16, 20, 24, 32),
 )  # fmt: skip
 MAX_NAMED = 500
 
 
-def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
+def error_figure(frames: Sequence[FrameResult], bins: ErrorBins) -> Figure:
     """Median error of hits in each bin, with the quarters around it, and the frames themselves."""
     kept = [frame for frame in frames if frame.error_m is not None]
     inside: dict[int, list[float]] = {}
@@ -361,7 +361,7 @@ def error_figure(frames: Sequence[FrameResult], bins: Bins) -> Figure:
 
 
 def detection_table(
-    judged: Sequence[JudgedFrame], frames: Sequence[FrameResult], bins: Bins
+    judged: Sequence[JudgedFrame], frames: Sequence[FrameResult], bins: ErrorBins
 ) -> Table:
     """AP over the frames of each bin, with how many of their balls were found.
 
@@ -397,7 +397,7 @@ def detection_table(
     return Table(name, f"Detection by {bins.label.lower()}", columns, tuple(rows), note)
 
 
-def _bin_center(bins: Bins, place: int) -> float:
+def _bin_center(bins: ErrorBins, place: int) -> float:
     low, high = bins.bounds(place)
     return (low + high) / 2 if high is not None else low + (low - bins.edges[place - 1]) / 2
 

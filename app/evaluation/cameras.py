@@ -65,7 +65,7 @@ class FrameScore:
 
 
 @dataclass(frozen=True)
-class Score:
+class CameraScore:
     """Many frames together; a frame without a camera counts as 0 everywhere."""
 
     frames: int
@@ -97,7 +97,7 @@ def score_frame(camera: Camera, lines: Lines, pitch: Pitch, size: ImageSize) -> 
     return FrameScore(jac, challenge, distances)
 
 
-def score_frames(frames: Iterable[FrameScore | None]) -> Score:
+def score_frames(frames: Iterable[FrameScore | None]) -> CameraScore:
     """Many frames together; None stands for a frame without a camera."""
     every = list(frames)
     found = [frame for frame in every if frame is not None]
@@ -105,7 +105,7 @@ def score_frames(frames: Iterable[FrameScore | None]) -> Score:
     jac = np.array([frame.jac for frame in found]).reshape(-1, len(GAMMAS_PERCENT))
     distances = np.array([distance for frame in found for distance in frame.distances_px])
     median, p95 = np.percentile(distances, [50, 95]).tolist() if len(distances) else (None, None)
-    return Score(
+    return CameraScore(
         frames=len(every),
         calibrated=len(found),
         jac=tuple((jac.sum(axis=0) / count).tolist()),

@@ -186,7 +186,7 @@ def _overlapping_detection(
 
 
 @dataclass(frozen=True)
-class Options:
+class EvaluationOptions:
     """How predictions are judged; a run keeps them beside its result.
 
     Attributes:
@@ -207,7 +207,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Inputs:
+class EvaluationInputs:
     """What was predicted, by id of the frame.
 
     Attributes:
@@ -223,8 +223,8 @@ class Inputs:
 
 def evaluate(
     frames: Sequence[Frame],
-    inputs: Inputs,
-    options: Options,
+    inputs: EvaluationInputs,
+    options: EvaluationOptions,
     progress: ReportProgress | None = None,
 ) -> Evaluation:
     """Every table and figure that the inputs allow.
@@ -273,7 +273,7 @@ def evaluate(
 
 
 def _score_all_cameras(
-    frames: Sequence[Frame], inputs: Inputs, say: ReportProgress
+    frames: Sequence[Frame], inputs: EvaluationInputs, say: ReportProgress
 ) -> tuple[Scores, Scores] | None:
     """Predicted cameras and the dataset's own against the lines."""
     if inputs.cameras is None:
@@ -290,9 +290,9 @@ def _score_all_cameras(
 
 def _measure_frames(
     judged: Sequence[JudgedFrame],
-    inputs: Inputs,
+    inputs: EvaluationInputs,
     scores: tuple[Scores, Scores] | None,
-    options: Options,
+    options: EvaluationOptions,
 ) -> list[FrameResult]:
     cameras, careful = inputs.cameras or {}, inputs.careful or {}
     results = []
@@ -325,7 +325,7 @@ def _jac_of_frame(scores: Scores, frame: int) -> float | None:
 def _detection_tables(
     judged: Sequence[JudgedFrame],
     results: Sequence[FrameResult],
-    inputs: Inputs,
+    inputs: EvaluationInputs,
     resamples: Resamples,
 ) -> Iterator[Table]:
     yield detection_summary(judged, resamples)
@@ -335,7 +335,7 @@ def _detection_tables(
 
 
 def _detection_figures(
-    judged: Sequence[JudgedFrame], results: Sequence[FrameResult], inputs: Inputs
+    judged: Sequence[JudgedFrame], results: Sequence[FrameResult], inputs: EvaluationInputs
 ) -> Iterator[Figure]:
     yield precision_recall(judged)
     yield precision_distance(results, predicted=inputs.cameras is not None)
@@ -343,7 +343,9 @@ def _detection_figures(
         yield error_figure(results, bins)
 
 
-def _measure_sensitivity(frames: Sequence[Frame], options: Options) -> tuple[Table, Figure]:
+def _measure_sensitivity(
+    frames: Sequence[Frame], options: EvaluationOptions
+) -> tuple[Table, Figure]:
     able = len(sensitivity.choose_frames(frames, options.seed, len(frames)))
     chosen = sensitivity.choose_frames(frames, options.seed)
     samples = [
@@ -353,7 +355,7 @@ def _measure_sensitivity(frames: Sequence[Frame], options: Options) -> tuple[Tab
 
 
 def _count_denominators(
-    frames: Sequence[Frame], judged: Sequence[JudgedFrame], inputs: Inputs
+    frames: Sequence[Frame], judged: Sequence[JudgedFrame], inputs: EvaluationInputs
 ) -> dict[str, int]:
     """Every denominator, by name."""
     detections = inputs.detections or {}

@@ -26,7 +26,7 @@ STEPS = 21
 
 
 @dataclass(frozen=True)
-class Sample:
+class BallSample:
     """One ball of the sample.
 
     Attributes:
@@ -69,7 +69,7 @@ def choose_frames(frames: Sequence[Frame], seed: int, size: int = SAMPLE) -> lis
     return [able[index] for index in sorted(chosen.tolist())]
 
 
-def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> Sample:
+def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> BallSample:
     """The curves of one ball; the frame is one of ``choose_frames``."""
     camera, box = frame.camera, frame.boxes["optimized"]
     assert camera is not None
@@ -84,7 +84,7 @@ def measure_frame_sensitivity(frame: Frame, diameter_m: float) -> Sample:
         return float(np.linalg.norm(place - origin))
 
     size_slope, shift_slope = error_slopes(camera, box, diameter_m)
-    return Sample(
+    return BallSample(
         frame,
         float(np.linalg.norm(origin - camera.position)),
         np.array([moved(0.0, percent) for percent in size_places()]),
@@ -137,7 +137,7 @@ def _wide_slopes(
     return away / diameter, float(np.linalg.norm(place(0.5) - place(-0.5)))
 
 
-def sensitivity_figure(samples: Sequence[Sample]) -> Figure:
+def sensitivity_figure(samples: Sequence[BallSample]) -> Figure:
     """Both panels, a curve per ball coloured by its distance, the derivative dashed beside it."""
     color = Axis("Distance to the camera", "m")
     size = Panel(
@@ -166,7 +166,7 @@ def sensitivity_figure(samples: Sequence[Sample]) -> Figure:
     return Figure("sensitivity", "Sensitivity of the ball from one view", (size, shift), note)
 
 
-def sensitivity_table(samples: Sequence[Sample], able: int) -> Table:
+def sensitivity_table(samples: Sequence[BallSample], able: int) -> Table:
     """How far the ball moves at the ends of both curves, and what that has to do with distance."""
     rows = (
         _sensitivity_row("size", f"Size ± {SIZE_PERCENT:g} %", samples, able, SIZE_PERCENT),
@@ -189,7 +189,7 @@ def sensitivity_table(samples: Sequence[Sample], able: int) -> Table:
 
 
 def _sensitivity_row(
-    name: str, label: str, samples: Sequence[Sample], able: int, percent: float
+    name: str, label: str, samples: Sequence[BallSample], able: int, percent: float
 ) -> Row:
     curves = [item.by_size if name == "size" else item.by_shift for item in samples]
     slope = [item.size_slope if name == "size" else item.shift_slope for item in samples]
@@ -210,7 +210,7 @@ def _sensitivity_row(
 
 
 def _curve_and_slope(
-    item: Sample, places: FloatArray, moved: FloatArray, slope: float
+    item: BallSample, places: FloatArray, moved: FloatArray, slope: float
 ) -> tuple[Series, ...]:
     name = f"{item.frame.group} {item.frame.view}"
     x = tuple(places.round(9).tolist())

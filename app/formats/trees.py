@@ -18,7 +18,7 @@ from app.formats.file_tree import BROKEN, DEFAULT_LIMITS, FileTree, Limits, Root
 from app.formats.report import Report
 from app.formats.safe_path import is_hidden, open_regular_file, require_safe_path, resolve_inside
 from app.object_store.path import StoredPath
-from app.object_store.store import Stored
+from app.object_store.store import StoredObject
 from app.soccer.group import Media
 from app.zip_file import UNREADABLE, FilePart, count_truncated, open_nested, open_zip
 
@@ -312,7 +312,7 @@ class StoreTree:
     def __init__(self, path: StoredPath, report: Report, limits: Limits):
         self.path = path if path.is_dir() else path.parent
         self._limits = limits
-        self._found: dict[str, Stored] = {}
+        self._found: dict[str, StoredObject] = {}
         start = len(self.path.key) + 1 if self.path.key else 0
         found = self.path.store.below(self.path.key) if path.stored is None else [path.stored]
         for stored in found:
@@ -366,7 +366,7 @@ class StoreTree:
     def close(self) -> None:
         """Nothing to release."""
 
-    def _stored_object(self, name: str) -> Stored:
+    def _stored_object(self, name: str) -> StoredObject:
         stored = self._found.get(name)
         if stored is None:
             raise DatasetFormatError(self.shown(name), None, None, "is not in the store")

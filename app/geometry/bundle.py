@@ -78,7 +78,7 @@ class Rays:
 
 
 @dataclass(frozen=True)
-class Linearized:
+class LinearizedRays:
     """Rays at some cameras and points, in sigmas.
 
     Attributes:
@@ -92,7 +92,7 @@ class Linearized:
     by_point: FloatArray
 
 
-def linearize(parameters: FloatArray, points: FloatArray, rays: Rays) -> Linearized:
+def linearize(parameters: FloatArray, points: FloatArray, rays: Rays) -> LinearizedRays:
     """Residuals and derivatives of all rays.
 
     Args:
@@ -112,7 +112,7 @@ def linearize(parameters: FloatArray, points: FloatArray, rays: Rays) -> Lineari
     slopes /= rays.sigma[:, None, None]
     residuals[behind], slopes[behind] = (BEHIND, 0.0), 0.0
     # A pixel depends on the difference of point and position alone.
-    return Linearized(residuals, slopes, -slopes[:, :, X : Z + 1])
+    return LinearizedRays(residuals, slopes, -slopes[:, :, X : Z + 1])
 
 
 def nearest_points(parameters: FloatArray, rays: Rays) -> FloatArray:
@@ -200,7 +200,7 @@ def bundle_equations(
 
 
 def _point_equations(
-    at: Linearized, weights: FloatArray, rays: Rays
+    at: LinearizedRays, weights: FloatArray, rays: Rays
 ) -> tuple[FloatArray, FloatArray]:
     """J^T W J and gradient of each point, shapes (F, 3, 3) and (F, 3)."""
     information, gradient = np.zeros((rays.points, 3, 3)), np.zeros((rays.points, 3))

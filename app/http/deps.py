@@ -80,7 +80,7 @@ QueryText = Annotated[
 ]
 
 
-class Stopping(Event):
+class StopSignal(Event):
     """Set when the server is told to stop; from then on its time is counted."""
 
     _until = inf
@@ -119,7 +119,7 @@ class Services:
     noises: NoiseStore
     upkeep: Upkeep
     webhooks: WebhookSender
-    stopping: Stopping = field(default_factory=Stopping)
+    stopping: StopSignal = field(default_factory=StopSignal)
 
     @property
     def paint(self) -> PaintFollower:

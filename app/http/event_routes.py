@@ -46,7 +46,7 @@ async def admit_listener(services: AppServices) -> Services:
     return services
 
 
-class Start:
+class StreamStart:
     """Where a listener begins: all that asks the database, done off the event loop."""
 
     def __init__(
@@ -93,7 +93,7 @@ class Start:
 
 
 async def begin(
-    services: AppServices, visibility: SeesWhole, start: Annotated[Start, Depends()]
+    services: AppServices, visibility: SeesWhole, start: Annotated[StreamStart, Depends()]
 ) -> AsyncIterator[Listener]:
     """A feed for as long as the request lasts."""
     feed = services.events.subscribe(
@@ -113,7 +113,7 @@ async def begin(
 def under_way(
     services: AppServices,
     visibility: SeesWhole,
-    start: Annotated[Start, Depends()],
+    start: Annotated[StreamStart, Depends()],
     feed: Annotated[Listener, Depends(begin)],
 ) -> list[bytes]:
     """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
@@ -132,7 +132,7 @@ def under_way(
 @may(Action.READ, dataset=OwnedKind.DATASET, where=Where.SOMEWHERE)
 async def listen(
     request: Request,
-    start: Annotated[Start, Depends()],
+    start: Annotated[StreamStart, Depends()],
     feed: Annotated[Listener, Depends(begin)],
     first: Annotated[list[bytes], Depends(under_way)],
 ) -> StreamingResponse:

@@ -30,7 +30,7 @@ from app.features.jobs.service import Jobs
 from app.features.maintenance.service import Banner, read_banner
 from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import (
-    Change,
+    LoggedChange,
     read_moment,
     read_news,
     read_position,
@@ -104,7 +104,7 @@ EVENTS: dict[str, type[BaseModel]] = {
 
 
 @dataclass
-class Counts:
+class ListenerCounts:
     """Listeners since the server started; ``resumed`` ones came back with the last id they saw."""
 
     open: int = 0
@@ -149,7 +149,7 @@ class Listener:
         meant = self.dataset_id is None or dataset_id in (None, self.dataset_id)
         return meant and self._sight.sees(dataset_id, actor)
 
-    def is_told(self, change: Change) -> bool:
+    def is_told(self, change: LoggedChange) -> bool:
         """Whether a change is told here.
 
         Who saw a dataset that was gone before this one listened, nobody knows any more.
@@ -188,7 +188,7 @@ class Events:
         self._thread: threading.Thread | None = None
         self._solutions = 0
         self._banner: Banner | None = None
-        self._counts = Counts()
+        self._counts = ListenerCounts()
         jobs.listen(self._publish_job)
         store.listen(self._wake.set)
         store.sharing.subscribe(self._receive_lease)
@@ -212,7 +212,7 @@ class Events:
         return [_change_event(item) for item in found if feed.is_told(item)]
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> ListenerCounts:
         """Listeners since the start."""
         with self._lock:
             return replace(self._counts, open=len(self._feeds))
@@ -369,7 +369,7 @@ def first_event(position: int) -> bytes:
     return format_sse_event(comment="listening", id=str(position), retry=RETRY_MS)
 
 
-def _change_event(change: Change) -> bytes:
+def _change_event(change: LoggedChange) -> bytes:
     identity = None if change.id is None else str(change.id)
     if change.group_id is None:
         document = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)

@@ -20,9 +20,9 @@ from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentato
 
 from app.db.store import Store
 from app.errors import StorageError
-from app.features.maintenance.upkeep import Home, read_home
+from app.features.maintenance.upkeep import HomeReport, read_home
 from app.http.deps import Services
-from app.http.events import Counts
+from app.http.events import ListenerCounts
 from app.http.pages import ELSEWHERE
 from app.http.request_limits import RequestLimits
 from app.worker_process import COUNTS
@@ -188,7 +188,7 @@ class SharedNumbers:
         self._counted[key] = sample.value
 
 
-def _stream_metrics(counts: Counts) -> Iterator[Metric]:
+def _stream_metrics(counts: ListenerCounts) -> Iterator[Metric]:
     yield _gauge("event_streams", "Windows that listen for events.", counts.open)
     ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
     text = "Event streams that were opened, came back, or were let go for being too slow."
@@ -223,7 +223,7 @@ def _database_metrics(store: Store) -> Iterator[Metric]:
         yield from _home_metrics(home)
 
 
-def _home_metrics(home: Home) -> Iterator[Metric]:
+def _home_metrics(home: HomeReport) -> Iterator[Metric]:
     yield _gauge("groups", "Groups of all datasets.", home.groups)
     yield _gauge("unsolved_groups", "Groups that wait to be solved.", home.unsolved)
     yield _gauge(

@@ -208,7 +208,7 @@ class IndexPage:
         return IndexPage(html, etag, content_security_policy(script_hashes(html)), styles, modules)
 
 
-class Site:
+class BrowserSite:
     """The folder of the browser application; index.html is read again when it has changed."""
 
     def __init__(self, folder: Path = STATIC, *, team: bool = False):
@@ -248,7 +248,7 @@ class Site:
         return self._page.policy if self._page else content_security_policy()
 
 
-class Modules(StaticFiles):
+class ModuleFiles(StaticFiles):
     """Files of the application: by known types alone, nothing hidden.
 
     Below /static they are always revalidated; below an address that names their version they
@@ -335,7 +335,7 @@ register_url_convertor(_Elsewhere.NAME, _Elsewhere())
 
 def install_pages(
     app: FastAPI,
-    site: Site,
+    site: BrowserSite,
     moment: Callable[[], str] | None = None,
     banner: Callable[[], str] = str,
 ) -> None:
@@ -387,8 +387,8 @@ def install_pages(
     _install_modules(app, site)
 
 
-def _install_modules(app: FastAPI, site: Site) -> None:
-    kept, fresh = Modules(site.folder, FOR_GOOD), Modules(site.folder, REVALIDATED)
+def _install_modules(app: FastAPI, site: BrowserSite) -> None:
+    kept, fresh = ModuleFiles(site.folder, FOR_GOOD), ModuleFiles(site.folder, REVALIDATED)
 
     async def versioned(scope: Scope, receive: Receive, send: Send) -> None:
         """A page of an earlier version goes on, but nobody keeps our files under its address."""

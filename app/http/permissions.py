@@ -19,7 +19,7 @@ from app.errors import ForbiddenError, NotFoundError
 from app.features.datasets.service import no_dataset
 from app.features.people.logins import Login
 from app.features.people.ownership import (
-    Named,
+    NamedResource,
     Ownership,
     find_ownership,
     is_hidden_from,
@@ -152,19 +152,19 @@ _ID: TypeAdapter[int] = TypeAdapter(Annotated[int, Field(ge=1, le=MAX_ID)])
 
 
 @dataclass(frozen=True)
-class Mention:
+class RequestMention:
     """One thing that a request names, and where: ``place`` is ``path``, ``query`` or ``body``."""
 
     place: str
     field: str
-    named: Named
+    named: NamedResource
 
 
 @dataclass(frozen=True)
 class OwnedMention:
     """Where something is that a request mentions; ``ownership`` None: nowhere that the reader sees."""
 
-    mention: Mention
+    mention: RequestMention
     ownership: Ownership | None
 
 
@@ -175,7 +175,7 @@ class RequestSubject:
     permission: Permission
     query: tuple[tuple[str, str], ...]
     body: Any
-    mentions: tuple[Mention, ...]
+    mentions: tuple[RequestMention, ...]
 
     @staticmethod
     def of(
@@ -317,7 +317,7 @@ def _require_may_make(present: Ownership | None, roles: DatasetRoles, action: Ac
 
 
 def _find_ownership_if_needed(
-    store: Store, named: Named, login: Login, visibility: Visibility
+    store: Store, named: NamedResource, login: Login, visibility: Visibility
 ) -> Ownership | None:
     roles: DatasetRoles = login.roles
     if not _needs_ownership(named, roles):
@@ -331,7 +331,7 @@ def _find_ownership_if_needed(
     return None if hidden else found
 
 
-def _needs_ownership(named: Named, roles: DatasetRoles) -> bool:
+def _needs_ownership(named: NamedResource, roles: DatasetRoles) -> bool:
     """Whether it matters where something is: who is the same everywhere is so there."""
     return bool(roles.single or roles.blind) or named.kind in OWNED | {OwnedKind.NEW_DATASET}
 
@@ -341,7 +341,7 @@ def _mentions_of_request(
     path: Mapping[str, str],
     query: tuple[tuple[str, str], ...],
     body: Any,
-) -> Iterator[Mention]:
+) -> Iterator[RequestMention]:
     names = permission.names
     for name, kind in names.items():
         if name in path:
@@ -357,13 +357,13 @@ def _mentions_of_request(
 
 def _mention_of_value(
     place: str, name: str, kind: OwnedKind, value: str | int
-) -> Iterator[Mention]:
+) -> Iterator[RequestMention]:
     """Nothing for what is no id: the route refuses it by the same rule."""
     if kind in TEXTS:
-        yield Mention(place, name, Named(kind, value))
+        yield RequestMention(place, name, NamedResource(kind, value))
         return
     try:
-        yield Mention(place, name, Named(kind, _ID.validate_python(value)))
+        yield RequestMention(place, name, NamedResource(kind, _ID.validate_python(value)))
     except ValidationError:
         return
 

@@ -95,7 +95,7 @@ class Route(APIRoute):
         if self.permission.action is not None and (access := gate.access) is not None:
             login = await access.log_in(request.scope)
         try:
-            body = Body()
+            body = RequestBody()
             if request.method not in SAFE_METHODS:
                 body = await self._read_request_body(gate, request)
             if access is None or login is None:
@@ -110,7 +110,7 @@ class Route(APIRoute):
         login: Login,
         gate: Gate,
         request: Request,
-        body: Body,
+        body: RequestBody,
         handler: Handler,
     ) -> Response:
         """The answer to somebody, if they may have it."""
@@ -139,7 +139,7 @@ class Route(APIRoute):
         self,
         gate: Gate,
         request: Request,
-        body: Body,
+        body: RequestBody,
         handler: Handler,
         hidden: Callable[[], Coroutine[Any, Any, bool]] | None = None,
     ) -> Response:
@@ -158,7 +158,7 @@ class Route(APIRoute):
             partial(self._answer_within_limits, gate, read, handler),
         )
 
-    async def _read_request_body(self, gate: Gate, request: Request) -> Body:
+    async def _read_request_body(self, gate: Gate, request: Request) -> RequestBody:
         """The body of a request that may change something.
 
         Raises:
@@ -167,15 +167,15 @@ class Route(APIRoute):
         types = request.headers.getlist("content-type")
         if self._takes_bytes:
             require_bytes(types)
-            return Body()
+            return RequestBody()
         most = gate.max_json_bytes
         if self.permission.action is None:
             most = min(most, MAX_STRANGERS_BYTES)
         sent = await read_body(request.headers, request.receive, most)
         if not sent:
-            return Body(sent)
+            return RequestBody(sent)
         require_json_type(types)
-        return Body(sent, read_json(sent), has_value=True)
+        return RequestBody(sent, read_json(sent), has_value=True)
 
     async def _answer_within_limits(
         self, gate: Gate, request: Request, handler: Handler
@@ -191,7 +191,7 @@ class SecretRoute(Route):
 
 
 @dataclass(frozen=True)
-class Body:
+class RequestBody:
     """What a request brings: its bytes, None where they are not read here, and their JSON value."""
 
     sent: bytes | None = None
@@ -202,7 +202,7 @@ class Body:
 class ReadRequest(StarletteRequest):
     """A request whose body has been read, or is read by ``receive`` as it passes."""
 
-    def __init__(self, request: Request, body: Body, receive: Receive | None = None):
+    def __init__(self, request: Request, body: RequestBody, receive: Receive | None = None):
         super().__init__(request.scope, receive or request.receive)
         if body.sent is not None:
             self._body = body.sent

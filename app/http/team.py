@@ -18,7 +18,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import ConflictError, NotLoggedInError, TooManyTriesError
 from app.features.people.access_tokens import AccessTokens
-from app.features.people.devices import CHALLENGE_LASTS, Attempts, Devices
+from app.features.people.devices import CHALLENGE_LASTS, AttemptWindow, Devices
 from app.features.people.devices import LASTS as DEVICE_LASTS
 from app.features.people.logins import LASTS, Login, LoginMethod, Logins
 from app.features.people.passkeys import Passkeys, PasskeySite
@@ -61,7 +61,7 @@ class AttemptLimits:
 
     def __init__(self, store: Store | None = None) -> None:
         shared = store is not None and store.sharing.is_shared
-        self._shared = Attempts(store) if store is not None and shared else None
+        self._shared = AttemptWindow(store) if store is not None and shared else None
         self._windows = MovingWindowRateLimiter(MemoryStorage())
 
     def count_login(self, address: str, name: str | None = None, device: str | None = None) -> None:

@@ -20,7 +20,7 @@ from app.durable import replace_file
 from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
 from app.json_text import digest_of
 from app.media.images import JPEG, SIDEWAYS, ImageHeader, check_scans, check_size, read_header
-from app.media.object_frames import Archives, is_stored, read_object
+from app.media.object_frames import ArchiveMembers, is_stored, read_object
 from app.media.video import Times, frame_at, kept_index, make_index, open_video
 from app.object_store.path import unseal_address
 from app.soccer.group import Media
@@ -28,7 +28,7 @@ from app.wording import plural
 
 JPEG_QUALITY = 88
 LINK_HINT = "Put the file itself there, or import the folder again."
-_ARCHIVES = Archives()
+_ARCHIVES = ArchiveMembers()
 _FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
 """Pixels as stored; ``_turn_upright`` turns them as the header says, for OpenCV and browsers differ."""
 _CACHE_VERSION = 2

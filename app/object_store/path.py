@@ -13,7 +13,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from app.errors import InputError, NotFoundError
-from app.object_store.store import SCHEME, ObjectStore, Stored, open_configured, open_store
+from app.object_store.store import SCHEME, ObjectStore, StoredObject, open_configured, open_store
 
 if TYPE_CHECKING:
     from app.config import Settings, StoreSettings
@@ -73,7 +73,7 @@ class StoredPath:
     store_name: str
     settings: StoreSettings
     key: str
-    stored: Stored | None = None
+    stored: StoredObject | None = None
 
     @property
     def store(self) -> ObjectStore:
@@ -119,7 +119,7 @@ class StoredPath:
         """Itself: there are no links."""
         return self
 
-    def of(self, stored: Stored) -> StoredPath:
+    def of(self, stored: StoredObject) -> StoredPath:
         """An object of the same store."""
         return StoredPath(self.store_name, self.settings, stored.key, stored)
 

@@ -42,7 +42,7 @@ class ChangedObjectError(NotFoundError):
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredObject:
     """An object.
 
     Attributes:
@@ -106,7 +106,7 @@ class ObjectStore:
         """What people call an object or folder."""
         return f"{SCHEME}{self.name}/{key}"
 
-    def head(self, key: str) -> Stored:
+    def head(self, key: str) -> StoredObject:
         """What there is under a key.
 
         Raises:
@@ -130,7 +130,7 @@ class ObjectStore:
             raise StorageError(f"{self.address(key)} was received only in part", hint="Try again.")
         return data
 
-    def read_whole(self, key: str, limit: int, etag: str = "") -> tuple[bytes, Stored]:
+    def read_whole(self, key: str, limit: int, etag: str = "") -> tuple[bytes, StoredObject]:
         """A whole object.
 
         Args:
@@ -152,7 +152,7 @@ class ObjectStore:
             raise StorageError(f"{self.address(key)} was received only in part", hint="Try again.")
         return data, found
 
-    def below(self, folder: str) -> Iterator[Stored]:
+    def below(self, folder: str) -> Iterator[StoredObject]:
         """Every object below a folder (empty: the whole store), by key.
 
         Raises:
@@ -162,7 +162,7 @@ class ObjectStore:
             for some in self._engine.list(self._store, folder or None, chunk_size=LISTED):
                 yield from map(_stored_from_metadata, some)
 
-    def folder(self, folder: str) -> tuple[list[str], list[Stored]]:
+    def folder(self, folder: str) -> tuple[list[str], list[StoredObject]]:
         """Names of folders in a folder, and the objects in it.
 
         Raises:
@@ -242,8 +242,8 @@ class _ObjectWriter:
         """Nothing: a part that is too small would be refused."""
 
 
-def _stored_from_metadata(meta: Any) -> Stored:
-    return Stored(meta["path"], meta["size"], meta["e_tag"] or "")
+def _stored_from_metadata(meta: Any) -> StoredObject:
+    return StoredObject(meta["path"], meta["size"], meta["e_tag"] or "")
 
 
 def _load_library() -> Any:

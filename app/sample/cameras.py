@@ -152,7 +152,7 @@ POINTS_PER_MARKING = 5
 
 
 @dataclass(frozen=True)
-class Certainty:
+class CameraCertainty:
     """Standard deviations that follow from clicks with 1 px noise.
 
     ``ball_sigma_m``: of the ray to the ball, metres at the ball, its longest axis.
@@ -163,7 +163,7 @@ class Certainty:
     size_sigma: float
 
 
-def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> Certainty:
+def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> CameraCertainty:
     """What a calibration from the visible markings would know about a ball.
 
     Args:
@@ -192,7 +192,7 @@ def estimate_certainty(camera: Camera, ball: FloatArray, seen: Mask) -> Certaint
     sigma = float(np.sqrt(max(float(np.linalg.eigvalsh(spread)[-1]), 0.0)))
     size = _ball_size_gradient(camera, x[-1])
     size_sigma = float(np.sqrt(max(float(size @ covariance @ size), 0.0)))
-    return Certainty(sigma * float(x[-1, 2]) / focal, size_sigma)
+    return CameraCertainty(sigma * float(x[-1, 2]) / focal, size_sigma)
 
 
 def _projected_normals(x: FloatArray, tangents: FloatArray) -> FloatArray:
@@ -351,7 +351,7 @@ def find_camera(
     return None
 
 
-def _is_good_certainty(known: Certainty) -> bool:
+def _is_good_certainty(known: CameraCertainty) -> bool:
     return known.ball_sigma_m < 0.06 and known.size_sigma < 0.04
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.sample.fixture import Colour, Look, Outfit
+from app.sample.fixture import Colour, MatchLook, Outfit
 from app.sample.play import TEAM, Instant
 from app.sample.props import Image, Patch
 
@@ -191,7 +191,7 @@ def people_in_view(camera: Camera, instant: Instant, pose: Pose, image: Image) -
     return people
 
 
-def outfit_of_person(look: Look, index: int) -> Outfit:
+def outfit_of_person(look: MatchLook, index: int) -> Outfit:
     """What person ``index`` of an instant wears."""
     if index == 2 * TEAM:
         return look.referee
@@ -201,7 +201,7 @@ def outfit_of_person(look: Look, index: int) -> Outfit:
 
 
 def draw_person(
-    image: Image, person: DrawnPerson, look: Look, number: int, gain: Colour, lit_from: float
+    image: Image, person: DrawnPerson, look: MatchLook, number: int, gain: Colour, lit_from: float
 ) -> None:
     """Draw one person.
 
@@ -237,7 +237,7 @@ _DISTANT = (
 """Joint, joint, radius as a share of body height, and what covers it: what is left of people far away."""
 
 
-def draw_distant_person(image: Image, person: DrawnPerson, look: Look, gain: Colour) -> None:
+def draw_distant_person(image: Image, person: DrawnPerson, look: MatchLook, gain: Colour) -> None:
     """Draw somebody who is too small for more than the colours of the kit.
 
     Args:

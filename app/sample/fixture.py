@@ -87,7 +87,7 @@ class Stands:
 
 
 @dataclass(frozen=True)
-class Look:
+class MatchLook:
     """Everything that the frames of one match have in common."""
 
     seed: int
@@ -122,13 +122,13 @@ _KEEPERS = (_LIME, _PINK, _TEAL, _GREY, _ORANGE)
 _REFEREES = (_YELLOW, _BLACK, _TEAL)
 
 
-def make_look(index: int, seed: int, evening: bool) -> Look:
+def make_look(index: int, seed: int, evening: bool) -> MatchLook:
     """The look of match ``index``: neighbours differ in kits, grass and light."""
     rng = np.random.default_rng([seed, index, 0x100C])
     home, away = _PAIRS[(index + seed) % len(_PAIRS)]
     keepers = [_colour_far_from(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)]
     referee = _colour_far_from(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
-    return Look(
+    return MatchLook(
         seed=int(rng.integers(1 << 31)),
         home=home,
         away=away,
@@ -263,7 +263,7 @@ class Fixture:
     away: str
     score: tuple[int, int]
     split: str
-    look: Look
+    look: MatchLook
 
     @property
     def name(self) -> str:

@@ -23,7 +23,7 @@ from app.sample.figures import (
     people_in_view,
     pose_people,
 )
-from app.sample.fixture import Colour, Lamp, Light, Look
+from app.sample.fixture import Colour, Lamp, Light, MatchLook
 from app.sample.play import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
 from app.sample.props import draw_ball, draw_goal_posts, draw_net, draw_scoreboard
 from app.sample.scene import Scene
@@ -240,7 +240,7 @@ def render(scene: Scene, view_key: str) -> Image:
     return image
 
 
-def _empty_stadium(camera: Camera, instant: Instant, look: Look) -> Image:
+def _empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> Image:
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     background = np.empty((HEIGHT, WIDTH), np.uint8)
     shadow = shadow_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
@@ -268,13 +268,13 @@ def shading_camera(camera: Camera) -> ShadingCamera:
     return ShadingCamera(camera.rotation, camera.position, *lens)
 
 
-def shading_grass(look: Look) -> ShadingGrass:
+def shading_grass(look: MatchLook) -> ShadingGrass:
     """The grass of a match."""
     grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
     return ShadingGrass(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def shading_stadium(camera: Camera, look: Look) -> ShadingStadium:
+def shading_stadium(camera: Camera, look: MatchLook) -> ShadingStadium:
     """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
     atlas, levels = board_atlas(look.seed)
@@ -300,7 +300,7 @@ def shading_stadium(camera: Camera, look: Look) -> ShadingStadium:
     )
 
 
-def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> None:
+def _draw_movers(image: Image, camera: Camera, instant: Instant, look: MatchLook) -> None:
     """Everything that stands on the grass, far things first."""
     side = light_direction_in_image(camera, look)
     gain = look.light.exposure
@@ -316,7 +316,9 @@ def _draw_movers(image: Image, camera: Camera, instant: Instant, look: Look) -> 
         draw_net(image, camera, sign, gain)
 
 
-def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, side: float) -> None:
+def _draw_play(
+    image: Image, camera: Camera, instant: Instant, look: MatchLook, side: float
+) -> None:
     """People and the ball, far ones first."""
     people = people_in_view(camera, instant, pose_people(instant), image)
     ball_depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
@@ -332,7 +334,7 @@ def _draw_play(image: Image, camera: Camera, instant: Instant, look: Look, side:
             draw_person(image, person, look, instant.numbers[person.index], gain, side)
 
 
-def light_direction_in_image(camera: Camera, look: Look) -> float:
+def light_direction_in_image(camera: Camera, look: MatchLook) -> float:
     """Which side of the image the light comes from, -1 left to +1 right."""
     if len(look.light.lamps) > 1:
         return 0.3
@@ -341,7 +343,7 @@ def light_direction_in_image(camera: Camera, look: Look) -> float:
     return float(-(camera.rotation[0] @ shift) / max(length, 0.3))
 
 
-def light_gain_at(look: Look, place: FloatArray) -> Colour:
+def light_gain_at(look: MatchLook, place: FloatArray) -> Colour:
     """Light on somebody who stands there, per channel."""
     b, g, r = look.light.exposure
     if look.light.shade is None:

@@ -242,7 +242,7 @@ REPLAY_COUNT_SHARE = (0.50, 0.3374, 0.1626)
 
 
 @dataclass(frozen=True)
-class Shot:
+class CameraShot:
     """One camera at one moment."""
 
     camera: Camera
@@ -250,7 +250,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Stage:
+class MatchStage:
     """What all groups of a match share."""
 
     fixture: Fixture
@@ -275,20 +275,22 @@ def make_match(
     return [_make_scene(stage, number, faults) for number in wanted]
 
 
-def make_stage(match: int, groups: int, seed: int) -> Stage:
+def make_stage(match: int, groups: int, seed: int) -> MatchStage:
     """What the groups of a match share: the same for the same seed."""
     rng = np.random.default_rng([seed, match, 0x21])
-    return Stage(make_fixture(match, seed), place_cameras(rng), shirt_numbers(rng), seed, groups)
+    return MatchStage(
+        make_fixture(match, seed), place_cameras(rng), shirt_numbers(rng), seed, groups
+    )
 
 
-def _make_scene(stage: Stage, number: int, faults: bool) -> Scene:
+def _make_scene(stage: MatchStage, number: int, faults: bool) -> Scene:
     # Faults draw from their own stream, so that a scene without them is else the same.
     fault_rng = np.random.default_rng([stage.seed, stage.fixture.index, number, 0xFA])
     plan = plan_fault(fault_rng, _draw_replay_count(_scene_rng(stage, number)) + 1)
     return make_scene(stage, number, plan if faults else None)
 
 
-def _scene_rng(stage: Stage, number: int) -> np.random.Generator:
+def _scene_rng(stage: MatchStage, number: int) -> np.random.Generator:
     return np.random.default_rng([stage.seed, stage.fixture.index, number])
 
 
@@ -296,7 +298,7 @@ def _draw_replay_count(rng: np.random.Generator) -> int:
     return 1 + int(rng.choice(3, p=REPLAY_COUNT_SHARE))
 
 
-def make_scene(stage: Stage, number: int, plan: FaultPlan | None) -> Scene:
+def make_scene(stage: MatchStage, number: int, plan: FaultPlan | None) -> Scene:
     """One scene of a match, with the fault that somebody planned for it, or none.
 
     Args:
@@ -341,8 +343,8 @@ def make_scene(stage: Stage, number: int, plan: FaultPlan | None) -> Scene:
 
 
 def _film_moment(
-    rng: np.random.Generator, stage: Stage, replays: int, plan: FaultPlan | None
-) -> tuple[list[Shot], float | None]:
+    rng: np.random.Generator, stage: MatchStage, replays: int, plan: FaultPlan | None
+) -> tuple[list[CameraShot], float | None]:
     """Main camera and replays of a new moment, and the size of a fault of filming."""
     instant, main = _main_shot(rng, stage)
     cameras = [main] + [_aim_replay(rng, stage, main, instant.ball) for _ in range(replays)]
@@ -360,10 +362,10 @@ def _film_moment(
     instants = [
         cleared if one is instant else clear_lines_of_sight(one, positions) for one in instants
     ]
-    return [Shot(c, i) for c, i in zip(cameras, instants, strict=True)], amount
+    return [CameraShot(c, i) for c, i in zip(cameras, instants, strict=True)], amount
 
 
-def _main_shot(rng: np.random.Generator, stage: Stage) -> tuple[Instant, Camera]:
+def _main_shot(rng: np.random.Generator, stage: MatchStage) -> tuple[Instant, Camera]:
     while True:
         instant = make_instant(rng, stage.numbers)
         # The main camera turns about its tripod; its lens moves a little with it.
@@ -373,7 +375,9 @@ def _main_shot(rng: np.random.Generator, stage: Stage) -> tuple[Instant, Camera]
             return instant, camera
 
 
-def _aim_replay(rng: np.random.Generator, stage: Stage, main: Camera, ball: FloatArray) -> Camera:
+def _aim_replay(
+    rng: np.random.Generator, stage: MatchStage, main: Camera, ball: FloatArray
+) -> Camera:
     while True:
         _, seat = choose_replay_position(rng, stage.rig, ball)
         if parallax_angle_at_ball(main.position, seat, ball) < MIN_PARALLAX:
@@ -384,7 +388,7 @@ def _aim_replay(rng: np.random.Generator, stage: Stage, main: Camera, ball: Floa
 
 
 def _aim_neighbour(
-    rng: np.random.Generator, stage: Stage, main: Camera, ball: FloatArray
+    rng: np.random.Generator, stage: MatchStage, main: Camera, ball: FloatArray
 ) -> tuple[Camera, float]:
     while True:
         position, distance = position_beside_main(rng, main.position)
@@ -394,7 +398,7 @@ def _aim_neighbour(
 
 
 def _film_other_moment(
-    rng: np.random.Generator, stage: Stage, main: Camera, instant: Instant
+    rng: np.random.Generator, stage: MatchStage, main: Camera, instant: Instant
 ) -> tuple[Camera, Instant, float]:
     while True:
         _, seat = choose_replay_position(rng, stage.rig, instant.ball)
@@ -412,7 +416,7 @@ def _record_fault(
     return (PlantedFault(plan.kind, keys[plan.view_index], amount=amount),)
 
 
-def _image_metadata(rng: np.random.Generator, stage: Stage, number: int) -> dict[str, Any]:
+def _image_metadata(rng: np.random.Generator, stage: MatchStage, number: int) -> dict[str, Any]:
     """What SoccerNet-v3 says of each image; a replay carries the time of its action."""
     seconds = (number + float(rng.uniform(0.1, 0.9))) / stage.groups * 2 * 45 * 60
     half = 1 if seconds < 45 * 60 else 2

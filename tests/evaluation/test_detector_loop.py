@@ -18,7 +18,7 @@ from app.evaluation.frame import Detection, iou
 from app.features.datasets.tables import ViewModel
 from app.features.groups.edit import set_ball
 from app.features.groups.submit import load, submit
-from app.features.imports.sources import Source, import_source
+from app.features.imports.sources import ImportSource, import_source
 from app.features.predictions.accept import AcceptRequest, accept_predicted_balls
 from app.features.predictions.detect import DetectRequest, OnnxModel, run_detector
 from app.features.predictions.evaluation import run_tables
@@ -40,7 +40,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = Settings(home=home)
     store = Store.open(settings)
     write_sample(home / "sample", groups=GROUPS, seed=3, faults=False, workers=1)
-    import_source(store, "drawn", Source("soccernet-v3", home / "sample"), settings)
+    import_source(store, "drawn", ImportSource("soccernet-v3", home / "sample"), settings)
     solve_dataset(store, "drawn")
     store.close()
     return home

@@ -25,7 +25,7 @@ from app.evaluation.frame import FrameNames, NamedFrame
 from app.evaluation.prediction_files import read_predicted_cameras, read_predictions
 from app.features.imports.sources import (
     STATIC,
-    Source,
+    ImportSource,
     _open_static_folder,
     _read_groups,
     import_source,
@@ -144,7 +144,7 @@ class Readers:
                 read_frame(Media(str(path), frame=frame), width, False, self.settings)
 
     def _import(self, kind: str, path: Path, whole: bool) -> None:
-        source = Source(kind, path, name="upload")
+        source = ImportSource(kind, path, name="upload")
         done = import_source(self.store, "fuzz", source, self.settings, dry_run=True)
         _require_said(done.report)
         json_text(done.values()).encode()
@@ -153,7 +153,7 @@ class Readers:
             _use(list(islice(_groups_of(source, self.settings), GROUPS)))
 
 
-def _groups_of(source: Source, settings: Settings) -> Iterator[Group]:
+def _groups_of(source: ImportSource, settings: Settings) -> Iterator[Group]:
     report = Report()
     if source.format in STATIC:
         return _open_static_folder(source, report, LIMITS).groups()

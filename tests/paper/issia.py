@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.db.store import Store
-from app.evaluation.evaluate import Evaluation, Inputs, Options, evaluate
+from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOptions, evaluate
 from app.evaluation.frame import Frame
 from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import ingest
@@ -66,7 +66,7 @@ def run_issia(store: Store, seed: int, folder: Path = FOLDER) -> Issia | None:
         groups=len({frame.group_id for frame in placed}),
         train=len(placed) - len(tested),
         test=len(tested),
-        found=evaluate(tested, Inputs(detections), Options()),
+        found=evaluate(tested, EvaluationInputs(detections), EvaluationOptions()),
     )
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from app.db.store import Store
-from app.evaluation.evaluate import Evaluation, Inputs, Options, evaluate
+from app.evaluation.evaluate import Evaluation, EvaluationInputs, EvaluationOptions, evaluate
 from app.evaluation.frame import Detection, Frame
 from app.features.datasets.service import get_dataset
 from app.features.imports.ingest import ingest
-from app.features.predictions.frames import Truth, live_truth
+from app.features.predictions.frames import EvaluationTruth, live_truth
 from app.features.solutions.service import solve_dataset
 from app.sample.scene import Scene
 from app.soccer.frames import Box
@@ -31,7 +31,7 @@ class Study:
     """
 
     groups: int
-    truth: Truth
+    truth: EvaluationTruth
     base: Evaluation
     opt: Evaluation
     looseness: tuple[float, float]
@@ -50,10 +50,10 @@ def run_study(
     ratios = tuple(_learnt(truth.frames, boxes, kind) for kind in ("annotated", "optimized"))
     cameras = _cameras(truth.frames, scenes, seed)
     careful = {frame.id: boxes[_key(frame)] for frame in truth.frames}
-    options = Options(min_jac=truth.policy.min_jac)
+    options = EvaluationOptions(min_jac=truth.policy.min_jac)
     base, opt = (
         evaluate(
-            truth.frames, Inputs(_detections(truth.frames, boxes, ratio, seed), careful, cameras),
+            truth.frames, EvaluationInputs(_detections(truth.frames, boxes, ratio, seed), careful, cameras),
             options,
         )
         for ratio in ratios

@@ -10,7 +10,7 @@ import httpx
 import pyotp
 import pytest
 
-from app.features.people.devices import Attempts
+from app.features.people.devices import AttemptWindow
 from app.features.people.links import make_first_link
 from app.features.people.logins import LoginMethod
 from app.features.people.roles import Role
@@ -256,7 +256,7 @@ class TestSecondFactor:
         self, visitor: SignOnVisitor, ruled: Any, codes: list[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         # Counted in the database, as processes do that share one.
-        attempts = Attempts(visitor.team.store)
+        attempts = AttemptWindow(visitor.team.store)
         monkeypatch.setattr(visitor.team.app.state.team.attempts, "_shared", attempts)
         visitor.provider.who |= {"amr": ["pwd", "mfa"], "acr": "high"}
         address, cookie = visitor.begin()

@@ -24,7 +24,7 @@ from app.http.deps import Services
 from app.http.errors import install_handlers
 from app.http.headers import SecurityHeaders
 from app.http.idempotency import Idempotency
-from app.http.pages import Site, install_pages
+from app.http.pages import BrowserSite, install_pages
 from app.http.request_limits import RequestLimits
 from app.http.requests import MAX_JSON_BYTES
 from app.http.route import Gate
@@ -90,7 +90,7 @@ def write_static(folder: Path) -> Path:
 @pytest.fixture
 def pages_client(plain_app: FastAPI, client_of, static_folder: Path) -> TestClient:
     """A client of the pages and modules of a few files, without the rest of the application."""
-    site = Site(static_folder)
+    site = BrowserSite(static_folder)
     install_handlers(plain_app)
     install_pages(plain_app, site)
     plain_app.add_middleware(SecurityHeaders, policy=site.policy)

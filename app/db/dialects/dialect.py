@@ -40,7 +40,7 @@ AGAIN = ""
 """The word that stands for all that may have been said while nobody could listen."""
 
 
-class Sharing(Protocol):
+class ProcessSharing(Protocol):
     """What a process knows of the others.
 
     Attributes:
@@ -75,33 +75,33 @@ class Sharing(Protocol):
         """End all claims, and stop listening."""
 
 
-class Alone:
+class SingleProcess:
     """The one server of a database: everything is its own, and nobody listens."""
 
     is_shared = False
 
     def claim(self, name: str) -> bool:
-        """See ``Sharing``."""
+        """See ``ProcessSharing``."""
         return True
 
     def holds(self, name: str) -> bool:
-        """See ``Sharing``."""
+        """See ``ProcessSharing``."""
         return True
 
     def release(self, name: str) -> None:
-        """See ``Sharing``."""
+        """See ``ProcessSharing``."""
 
     def publish(self, session: Session, word: str) -> None:
-        """See ``Sharing``."""
+        """See ``ProcessSharing``."""
 
     def subscribe(self, hearer: Hearer) -> None:
-        """See ``Sharing``."""
+        """See ``ProcessSharing``."""
 
     def listen(self) -> None:
-        """See ``Sharing``."""
+        """See ``ProcessSharing``."""
 
     def close(self) -> None:
-        """See ``Sharing``."""
+        """See ``ProcessSharing``."""
 
 
 WRITE = {"touchline_write": True}
@@ -118,7 +118,7 @@ def unstorable_text_error() -> InputError:
     )
 
 
-class Failure(Enum):
+class DatabaseFailure(Enum):
     """Why a database did not do what it was asked."""
 
     FULL = "full"
@@ -171,13 +171,13 @@ class Dialect(Protocol):
 
     def sharing(
         self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
-    ) -> Sharing:
+    ) -> ProcessSharing:
         """What processes with this database say to each other; ``reported`` names what fails."""
 
     def require_promises(self, engine: Engine) -> None:
         """Raise StorageError where the database does not keep what we promise."""
 
-    def failure(self, error: DBAPIError) -> tuple[Failure, str]:
+    def failure(self, error: DBAPIError) -> tuple[DatabaseFailure, str]:
         """Why a statement failed, and the engine's name for it."""
 
     def interrupted(
@@ -270,39 +270,41 @@ def report_storage_errors(settings: Settings) -> Iterator[None]:
         yield
     except DBAPIError as error:
         kind, name = dialect_of(settings).failure(error)
-        if kind is Failure.TEXT:
+        if kind is DatabaseFailure.TEXT:
             raise unstorable_text_error() from error
-        if kind is not Failure.OTHER or isinstance(error, OperationalError):
+        if kind is not DatabaseFailure.OTHER or isinstance(error, OperationalError):
             raise _storage_error(error, kind, name, settings) from error
         raise StorageError(
             "the database could not carry out the request", hint="Nothing was saved. Try again."
         ) from error
 
 
-def _storage_error(error: DBAPIError, kind: Failure, name: str, settings: Settings) -> StorageError:
+def _storage_error(
+    error: DBAPIError, kind: DatabaseFailure, name: str, settings: Settings
+) -> StorageError:
     file = settings.database_name
-    if kind is Failure.FULL:
+    if kind is DatabaseFailure.FULL:
         return StorageError(
             "the disk is full: the change was not saved, everything before it is safe",
             hint="Free some space and send the change again.",
         )
-    if kind is Failure.BUSY:
+    if kind is DatabaseFailure.BUSY:
         return BusyError(
             "another process is writing; the change was not saved", hint="Try again in a moment."
         )
-    if kind is Failure.DAMAGED:
+    if kind is DatabaseFailure.DAMAGED:
         return DamagedError(f"{file} is damaged or not a database", hint=EXAMINE)
-    if kind is Failure.UNREADABLE:
+    if kind is DatabaseFailure.UNREADABLE:
         return StorageError(
             f"{file} cannot be read and written ({name})",
             hint="Make the home folder and its files writable, or set TOUCHLINE_HOME to another.",
         )
-    if kind is Failure.DISK:
+    if kind is DatabaseFailure.DISK:
         return StorageError(
             f"the disk does not read or write {file} ({name})",
             hint="Free space on the disk; touchline doctor reports how much is left.",
         )
-    if kind is Failure.AWAY:
+    if kind is DatabaseFailure.AWAY:
         return StorageError(
             f"{file} cannot be reached" + (f" ({name})" if name else ""),
             hint="Is the server of the database running, and are TOUCHLINE_DATABASE_URL's host,"

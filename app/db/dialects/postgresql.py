@@ -29,7 +29,7 @@ from sqlalchemy.dialects.postgresql.psycopg import PGDialect_psycopg
 from sqlalchemy.exc import ArgumentError, DataError, DBAPIError, NoSuchModuleError, OperationalError
 
 from app.config import Settings
-from app.db.dialects.dialect import AUTOCOMMIT, Failure, Sharing
+from app.db.dialects.dialect import AUTOCOMMIT, DatabaseFailure, ProcessSharing
 from app.db.dialects.postgresql_sharing import Reported, ServerSharing
 from app.db.session import Session
 from app.errors import InputError, StorageError
@@ -37,7 +37,7 @@ from app.errors import InputError, StorageError
 _Compiler: Any = PGDialect_psycopg.statement_compiler
 
 
-class Statements(_Compiler):  # type: ignore[misc]
+class StatementCompiler(_Compiler):  # type: ignore[misc]
     """LIKE that takes no notice of the case of ASCII letters; the columns' collation is C."""
 
     def visit_like_op_binary(self, binary: Any, operator: Any, **kw: Any) -> str:
@@ -49,7 +49,7 @@ class Statements(_Compiler):  # type: ignore[misc]
         return str(self.visit_not_ilike_op_binary(binary, operator, **kw))
 
 
-class Types(PGTypeCompiler):
+class TypeCompiler(PGTypeCompiler):
     """Whole numbers of 64 bits."""
 
     def visit_INTEGER(self, type_: Any, **kw: Any) -> str:
@@ -57,7 +57,7 @@ class Types(PGTypeCompiler):
         return "BIGINT"
 
 
-class Columns(PGDDLCompiler):
+class ColumnCompiler(PGDDLCompiler):
     """Columns as they are created: collation "C" for text, bigint ids, deferrable references."""
 
     def get_column_specification(self, column: Column[Any], **kw: Any) -> str:
@@ -163,21 +163,21 @@ LOOK_SECONDS = 0.2
 """Between two looks whether a statement is still wanted."""
 
 _FAILURES = {
-    "53100": Failure.FULL,
-    "55P03": Failure.BUSY,
-    "40P01": Failure.BUSY,
-    "40001": Failure.BUSY,
-    "XX001": Failure.DAMAGED,
-    "XX002": Failure.DAMAGED,
-    "25006": Failure.UNREADABLE,
-    "42501": Failure.UNREADABLE,
-    "58030": Failure.DISK,
-    "22021": Failure.TEXT,
-    "22P05": Failure.TEXT,
-    "53300": Failure.AWAY,
-    "57P01": Failure.AWAY,
-    "57P02": Failure.AWAY,
-    "57P03": Failure.AWAY,
+    "53100": DatabaseFailure.FULL,
+    "55P03": DatabaseFailure.BUSY,
+    "40P01": DatabaseFailure.BUSY,
+    "40001": DatabaseFailure.BUSY,
+    "XX001": DatabaseFailure.DAMAGED,
+    "XX002": DatabaseFailure.DAMAGED,
+    "25006": DatabaseFailure.UNREADABLE,
+    "42501": DatabaseFailure.UNREADABLE,
+    "58030": DatabaseFailure.DISK,
+    "22021": DatabaseFailure.TEXT,
+    "22P05": DatabaseFailure.TEXT,
+    "53300": DatabaseFailure.AWAY,
+    "57P01": DatabaseFailure.AWAY,
+    "57P02": DatabaseFailure.AWAY,
+    "57P03": DatabaseFailure.AWAY,
 }
 """By SQLSTATE (PostgreSQL, Appendix A)."""
 
@@ -209,9 +209,9 @@ class PostgreSQL:
                 hint="Run pip install 'touchline[postgres]', or leave TOUCHLINE_DATABASE_URL unset.",
             ) from error
         dialect: Any = engine.dialect
-        dialect.statement_compiler = Statements
-        dialect.ddl_compiler = Columns
-        dialect.type_compiler_instance = Types(dialect)
+        dialect.statement_compiler = StatementCompiler
+        dialect.ddl_compiler = ColumnCompiler
+        dialect.type_compiler_instance = TypeCompiler(dialect)
         event.listen(engine, "connect", partial(_set_up_connection, lasting))
         event.listen(engine, "begin", _begin_transaction)
         _close_connections_after_disposal(engine)
@@ -228,7 +228,7 @@ class PostgreSQL:
     def nonblocking_engine(self, settings: Settings) -> None:
         """See ``Dialect``."""
 
-    def sharing(self, engine: Engine, reported: Reported) -> Sharing:
+    def sharing(self, engine: Engine, reported: Reported) -> ProcessSharing:
         """See ``Dialect``."""
         return ServerSharing(engine, reported)
 
@@ -247,21 +247,21 @@ class PostgreSQL:
                     hint="Create it with ENCODING 'UTF8' TEMPLATE template0.",
                 )
 
-    def failure(self, error: DBAPIError) -> tuple[Failure, str]:
+    def failure(self, error: DBAPIError) -> tuple[DatabaseFailure, str]:
         """See ``Dialect``."""
         state = str(getattr(error.orig, "sqlstate", None) or "")
         if error.connection_invalidated or state.startswith("08"):
-            return Failure.AWAY, state
+            return DatabaseFailure.AWAY, state
         # Nobody answered, so nobody said why.
         if not state and isinstance(error, OperationalError):
-            return Failure.AWAY, state
+            return DatabaseFailure.AWAY, state
         # The driver itself refuses U+0000, which no text of the server can hold.
         if not state and isinstance(error, DataError):
-            return Failure.TEXT, state
+            return DatabaseFailure.TEXT, state
         # Who we are (28) and what there is (3D) is asked before anything else.
         if state.startswith(("28", "3D")):
-            return Failure.AWAY, state
-        return _FAILURES.get(state, Failure.OTHER), state
+            return DatabaseFailure.AWAY, state
+        return _FAILURES.get(state, DatabaseFailure.OTHER), state
 
     @contextmanager
     def interrupted(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:

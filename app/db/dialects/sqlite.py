@@ -14,7 +14,12 @@ from sqlalchemy.dialects.sqlite.base import SQLiteCompiler
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 from app.config import Settings
-from app.db.dialects.dialect import AUTOCOMMIT, Alone, Failure, unstorable_text_error
+from app.db.dialects.dialect import (
+    AUTOCOMMIT,
+    DatabaseFailure,
+    SingleProcess,
+    unstorable_text_error,
+)
 from app.db.session import Session
 from app.errors import StorageError
 
@@ -46,15 +51,15 @@ _BEFORE = "touchline_changes"
 """Where a connection notes how many rows it had changed before its transaction."""
 
 _FAILURES = {
-    "SQLITE_FULL": Failure.FULL,
-    "SQLITE_BUSY": Failure.BUSY,
-    "SQLITE_LOCKED": Failure.BUSY,
-    "SQLITE_CORRUPT": Failure.DAMAGED,
-    "SQLITE_NOTADB": Failure.DAMAGED,
-    "SQLITE_READONLY": Failure.UNREADABLE,
-    "SQLITE_CANTOPEN": Failure.UNREADABLE,
-    "SQLITE_PERM": Failure.UNREADABLE,
-    "SQLITE_IOERR": Failure.DISK,
+    "SQLITE_FULL": DatabaseFailure.FULL,
+    "SQLITE_BUSY": DatabaseFailure.BUSY,
+    "SQLITE_LOCKED": DatabaseFailure.BUSY,
+    "SQLITE_CORRUPT": DatabaseFailure.DAMAGED,
+    "SQLITE_NOTADB": DatabaseFailure.DAMAGED,
+    "SQLITE_READONLY": DatabaseFailure.UNREADABLE,
+    "SQLITE_CANTOPEN": DatabaseFailure.UNREADABLE,
+    "SQLITE_PERM": DatabaseFailure.UNREADABLE,
+    "SQLITE_IOERR": DatabaseFailure.DISK,
 }
 """By how SQLite's name of an error begins."""
 
@@ -88,9 +93,9 @@ class SQLite:
 
     def sharing(
         self, engine: Engine, reported: Callable[[], AbstractContextManager[None]]
-    ) -> Alone:
+    ) -> SingleProcess:
         """See ``Dialect``; one server has a file."""
-        return Alone()
+        return SingleProcess()
 
     def require_promises(self, engine: Engine) -> None:
         """See ``Dialect``."""
@@ -100,14 +105,14 @@ class SQLite:
                 if answer != expected:
                     raise StorageError(f"SQLite refuses {name}={value} (it answers {answer})")
 
-    def failure(self, error: DBAPIError) -> tuple[Failure, str]:
+    def failure(self, error: DBAPIError) -> tuple[DatabaseFailure, str]:
         """See ``Dialect``."""
         name = str(getattr(error.orig, "sqlite_errorname", ""))
         # Text that is no UTF-8 has no name of its own.
         if "Could not decode to UTF-8" in str(error.orig):
-            return Failure.DAMAGED, name
+            return DatabaseFailure.DAMAGED, name
         found = (kind for start, kind in _FAILURES.items() if name.startswith(start))
-        return next(found, Failure.OTHER), name
+        return next(found, DatabaseFailure.OTHER), name
 
     @contextmanager
     def interrupted(self, session: Session, ends: Callable[[], bool]) -> Iterator[None]:
@@ -212,7 +217,7 @@ def _try_to_begin_write(connection: Connection, *, last: bool) -> bool:
     try:
         connection.exec_driver_sql("BEGIN IMMEDIATE")
     except OperationalError as error:
-        if last or DIALECT.failure(error)[0] is not Failure.BUSY:
+        if last or DIALECT.failure(error)[0] is not DatabaseFailure.BUSY:
             raise
         return False
     return True

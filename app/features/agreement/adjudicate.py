@@ -46,7 +46,7 @@ class OpenCase:
 
 
 @dataclass(frozen=True)
-class Case:
+class AgreementCase:
     """A group that waits for a decision, with what it is to be decided between.
 
     Attributes:
@@ -82,7 +82,7 @@ def list_waiting(store: Store, dataset: str | int) -> list[OpenCase]:
     return found
 
 
-def get_case(store: Store, group_id: int, *, actor: str) -> Case:
+def get_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
     """What is to be decided about a group.
 
     Raises:
@@ -104,7 +104,7 @@ def get_case(store: Store, group_id: int, *, actor: str) -> Case:
     refused = None
     if own and (others := _possible_judges(store, original.dataset_id, annotations)):
         refused = f"you annotated this group yourself; {_join_names(others)} can decide"
-    return Case(
+    return AgreementCase(
         original,
         row.batch_id or None,
         tuple(annotations),

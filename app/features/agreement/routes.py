@@ -12,10 +12,15 @@ from app.evaluation.annotation_distance import (
     Ball3DDistance,
     ViewDistance,
 )
-from app.evaluation.rater_agreement import AgreementLimits, Coefficient, Disagreement, Spread
+from app.evaluation.rater_agreement import (
+    AgreementLimits,
+    Coefficient,
+    Disagreement,
+    Spread,
+)
 from app.features.agreement import adjudicate
 from app.features.agreement import service as limits
-from app.features.agreement.adjudicate import Case, OpenCase
+from app.features.agreement.adjudicate import AgreementCase, OpenCase
 from app.features.agreement.service import AnnotationPair, Comparison, compare_groups
 from app.features.agreement.summary import (
     GroupAgreement,
@@ -190,7 +195,7 @@ class CaseDocument(Document):
     )
 
     @staticmethod
-    def of(case: Case) -> CaseDocument:
+    def of(case: AgreementCase) -> CaseDocument:
         """The document of a case."""
         return CaseDocument.model_validate(
             {

@@ -15,7 +15,7 @@ from app.features.batches.queries import mark_submitted as hand_in_group
 from app.features.batches.service import Batch, Part, get_batch, list_batches
 from app.features.independent_annotations.adopt import adopt_annotation
 from app.features.independent_annotations.known_truth import (
-    Terms,
+    BatchTerms,
     begin_next,
     count_gold_left,
     fresh_outside,
@@ -52,7 +52,7 @@ def next_own(store: Store, batch: Batch, person: str) -> IndependentAnnotation |
     adopt_submitted(store, batch, person)
     with store.read() as session:
         groups = _list_waiting_groups(session, batch)
-    terms = Terms(
+    terms = BatchTerms(
         batch.id,
         batch.dataset_id,
         groups,

@@ -51,7 +51,7 @@ class StallReason(StrEnum):
 
 
 @dataclass(frozen=True)
-class Stall:
+class BatchStall:
     """Since when a batch stands still, and why."""
 
     why: StallReason
@@ -65,7 +65,7 @@ def last_of(session: Session, batch: Batch) -> str:
     return max(time for time in times if time is not None)
 
 
-def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> Stall | None:
+def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> BatchStall | None:
     """Whether a batch has stalled at a time; None: it has not, is done, or is closed.
 
     Args:
@@ -77,9 +77,9 @@ def stall_of(batch: Batch, last: str, at: datetime, hours: float) -> Stall | Non
     if not batch.is_open or batch.settled >= batch.groups:
         return None
     if at - datetime.fromisoformat(last) > timedelta(hours=hours):
-        return Stall(StallReason.IDLE, last)
+        return BatchStall(StallReason.IDLE, last)
     if batch.due is not None and batch.due < at.date().isoformat():
-        return Stall(StallReason.OVERDUE, batch.due)
+        return BatchStall(StallReason.OVERDUE, batch.due)
     return None
 
 
@@ -97,13 +97,13 @@ def notify_of_stalls(store: Store, at: datetime) -> int:
 
 def _find_stalled_groups(
     session: Session, datasets: list[int], at: datetime, hours: float
-) -> list[tuple[Batch, Stall]]:
+) -> list[tuple[Batch, BatchStall]]:
     batches = [read_batch(session, one) for one in batches_that_wait(session, datasets)]
     found = [(one, stall_of(one, last_of(session, one), at, hours)) for one in batches]
     return [(batch, stall) for batch, stall in found if stall is not None]
 
 
-def _notify_of_stall(session: Session, batch: Batch, stall: Stall, at: datetime) -> int:
+def _notify_of_stall(session: Session, batch: Batch, stall: BatchStall, at: datetime) -> int:
     event = f"batch{batch.id}_{stall.why}{time_suffix(stall.since)}"
     details = {"why": str(stall.why), "since": stall.since}
     return announce(

@@ -155,11 +155,11 @@ def import_(
             print_error(*nothing)
             raise typer.Exit(1)
         return
-    from app.features.imports.sources import Source, import_source
+    from app.features.imports.sources import ImportSource, import_source
 
     settings = read_settings()
     root = _resolve_source(settings, path)
-    source = Source(
+    source = ImportSource(
         format_,
         root,
         size=size,

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.db.database_worker import Caller
+from app.db.database_worker import CallingServer
 from app.db.home import DAY, delete_path, last_written
 from app.db.json_columns import Json
 from app.db.session import now
@@ -294,7 +294,7 @@ def _export_in_worker(
     out: Root,
     beside: Path,
     request: Mapping[str, Any],
-    caller: Caller,
+    caller: CallingServer,
 ) -> ExportReport:
     """``export_dataset`` in a worker process, as it was requested.
 

@@ -6,7 +6,7 @@ from sqlalchemy import false, func, not_, or_, select
 
 from app.db.log import DEEDS, LogModel
 from app.db.session import Session
-from app.features.queue.queries import Listing, Order
+from app.features.queue.queries import Listing, RowOrder
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import is_solved
 
@@ -30,7 +30,7 @@ def newest_entry_time(session: Session, dataset_id: int) -> str | None:
 def exported_groups(session: Session, dataset_id: int, everything: bool) -> list[int]:
     """Ids of the groups that an export takes: all, or the accepted ones that may go out."""
     where = () if everything else (_ACCEPTED, _CURRENT, _SOLVED, _QUALIFIES)
-    return Listing(session, dataset_id, where).ids(Order("number"))
+    return Listing(session, dataset_id, where).ids(RowOrder("number"))
 
 
 def left_out_groups(session: Session, dataset_id: int) -> dict[str, int]:

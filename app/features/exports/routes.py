@@ -41,7 +41,7 @@ from app.http.problem import Responses, responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.object_store.path import split_address, unseal_address
-from app.object_store.store import ChangedObjectError, ObjectStore, Stored, open_store
+from app.object_store.store import ChangedObjectError, ObjectStore, StoredObject, open_store
 from app.soccer.choices import BoxKind, ExportFormat, JobState, PicturesSent, TrainingViews
 
 SIGNED_SECONDS = 60
@@ -433,7 +433,7 @@ def stored_file(settings: Settings, sealed: str, name: str, request: Request) ->
 
 
 def _partial_response(
-    store: ObjectStore, stored: Stored, headers: dict[str, str], request: Request
+    store: ObjectStore, stored: StoredObject, headers: dict[str, str], request: Request
 ) -> Response:
     range_header = request.headers.get("range", "")
     # A range of another content than the one that is there would be a part of nothing.
@@ -468,7 +468,7 @@ def _parse_range(range_header: str, size: int) -> tuple[int, int] | None:
     return (start, end) if start < end else None
 
 
-def _read_chunks(store: ObjectStore, stored: Stored, start: int, end: int) -> Iterator[bytes]:
+def _read_chunks(store: ObjectStore, stored: StoredObject, start: int, end: int) -> Iterator[bytes]:
     """The bytes, as fast as the client takes them; a thread waits for the store, not the loop."""
     for at in range(start, end, STORE_CHUNK):
         yield store.read(stored.key, at, min(at + STORE_CHUNK, end), stored.etag)

@@ -16,7 +16,7 @@ from app.features.groups.submit import read_solved, require_open
 from app.features.queue.queries import (
     Condition,
     Listing,
-    Order,
+    RowOrder,
     any_of,
     compare_condition,
     contains_text,
@@ -80,7 +80,7 @@ def read_findings(
     """
     with store.read() as session:
         where = [*_finding_conditions(kind, dismissed), compare_condition("number", ">", after)]
-        ids = Listing(session, dataset_id, where).ids(Order("number"), limit)
+        ids = Listing(session, dataset_id, where).ids(RowOrder("number"), limit)
         states = read_states(session, ids)
     return [_group_findings(state, kind, dismissed) for state in states]
 

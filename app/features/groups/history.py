@@ -15,7 +15,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
-from app.features.groups.state import GroupState, Record, need_group
+from app.features.groups.state import GroupState, GroupWithoutSolution, need_group
 from app.features.groups.state_snapshot import StateSnapshot, StationRecord
 from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
 from app.features.groups.undo_stacks import undo_entry_body
@@ -154,7 +154,7 @@ def redo(store: Store, group_id: int, **how: Unpack[EditOptions]) -> GroupState:
 
 
 def _plan_step(kind: str) -> Plan:
-    def plan(session: Session, record: Record, _actor: str) -> GroupChange:
+    def plan(session: Session, record: GroupWithoutSolution, _actor: str) -> GroupChange:
         body = undo_entry_body(session, record.stacks, kind, "in this group")
         try:
             group = edit_from_json(body["edit"]).apply(record.stored.group)

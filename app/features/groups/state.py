@@ -214,7 +214,7 @@ class GroupState:
 
 
 @dataclass(frozen=True)
-class Record:
+class GroupWithoutSolution:
     """A group with all that is kept about it but its solution.
 
     Attributes:
@@ -299,7 +299,7 @@ def need_group(session: Session, group_id: int) -> StoredGroup:
     return stored
 
 
-def read_record(session: Session, group_id: int) -> Record:
+def read_record(session: Session, group_id: int) -> GroupWithoutSolution:
     """A group's record as it is in a session's snapshot.
 
     Raises:
@@ -311,14 +311,14 @@ def read_record(session: Session, group_id: int) -> Record:
     return records[0]
 
 
-def read_records(session: Session, group_ids: Sequence[int]) -> list[Record]:
+def read_records(session: Session, group_ids: Sequence[int]) -> list[GroupWithoutSolution]:
     """Records of groups in the order asked for; at most a few hundred."""
     groups = read_groups(session, group_ids)
     noticed, dismissals = read_import_findings(session, group_ids)
     verdicts = read_last_verdicts(session, group_ids)
     stacks = read_stacks(session, group_ids)
     return [
-        Record(
+        GroupWithoutSolution(
             stored,
             tuple(noticed[number]),
             tuple(verdicts.get(number, ())),

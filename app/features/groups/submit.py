@@ -26,7 +26,7 @@ from app.features.groups.queries import StoredGroup, group_of_view
 from app.features.groups.revision_queries import next_revision, save_revision
 from app.features.groups.state import (
     GroupState,
-    Record,
+    GroupWithoutSolution,
     need_group,
     read_etags,
     read_record,
@@ -104,8 +104,8 @@ class _AppliedChange:
 
     change: GroupChange
     painted: Group
-    before: Record
-    after: Record
+    before: GroupWithoutSolution
+    after: GroupWithoutSolution
     solution: Solution
     encoded: EncodedSolution
 
@@ -131,7 +131,7 @@ class EditOptions(TypedDict):
 Solver = Callable[[Group, Policy, Mapping[str, Calibration]], Solution]
 Then = Callable[[Session, GroupState], None]
 Find = Callable[[Session], int]
-Plan = Callable[[Session, Record, str], GroupChange]
+Plan = Callable[[Session, GroupWithoutSolution, str], GroupChange]
 
 
 def load(store: Store, group_id: int) -> GroupState:
@@ -276,7 +276,7 @@ def solved_state(session: Session, group_id: int) -> GroupState:
 
 def read_solved(
     store: Store, group_id: int, *, needed: bool = True
-) -> tuple[Record, Solution | None]:
+) -> tuple[GroupWithoutSolution, Solution | None]:
     """A group's record and its solution, which is computed and kept where it is needed."""
     with store.read() as session:
         record = read_record(session, group_id)
@@ -354,7 +354,10 @@ def submit_change(
 
 
 def _apply_change(
-    before: Record, change: GroupChange, painted: Group, result: tuple[Solution, EncodedSolution]
+    before: GroupWithoutSolution,
+    change: GroupChange,
+    painted: Group,
+    result: tuple[Solution, EncodedSolution],
 ) -> _AppliedChange:
     at = now()
     stored = next_revision(before.stored, change.group, at)
@@ -405,7 +408,7 @@ def combine_edits(stored: StoredGroup, edits: Sequence[Edit], actor: str) -> Edi
 
 
 def _plan_edits(edits_of: Callable[[StoredGroup], Sequence[Edit]]) -> Plan:
-    def plan(_session: Session, record: Record, actor: str) -> GroupChange:
+    def plan(_session: Session, record: GroupWithoutSolution, actor: str) -> GroupChange:
         group = record.stored.group
         edit = combine_edits(record.stored, edits_of(record.stored), actor)
         body = edit_and_inverse_to_json(edit, edit.inverse(group))

@@ -31,7 +31,7 @@ from app.solving.jaccard import (
 
 
 @dataclass(frozen=True)
-class Offer:
+class EditOffer:
     """An edit that carries a fix out, the words on its button and those beside what it changes."""
 
     label: str
@@ -40,7 +40,7 @@ class Offer:
 
 
 @dataclass(frozen=True)
-class Guide:
+class FixGuide:
     """Where a person is led who has to look or draw: what no edit can do for them.
 
     Attributes:
@@ -60,7 +60,7 @@ class Guide:
 
 def offers_of_fix(
     group: Group, fix: Fix | None, point: ImagePoint | None = None
-) -> tuple[Offer, ...]:
+) -> tuple[EditOffer, ...]:
     """The edits that carry out a fix: none when only a person can, several to choose from.
 
     Args:
@@ -74,13 +74,13 @@ def offers_of_fix(
     action = _ACTIONS[fix.action]
     found = ((one, action.edit(view, one, point)) for one in _fixes_to_choose(view, fix))
     return tuple(
-        Offer(_button_text(action.label, one), edit, _button_text(action.caption, one))
+        EditOffer(_button_text(action.label, one), edit, _button_text(action.caption, one))
         for one, edit in found
         if edit
     )
 
 
-def guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> Guide | None:
+def guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> FixGuide | None:
     """Where a fix leads a person; None where an edit carries it out.
 
     Args:
@@ -91,10 +91,10 @@ def guide_of_fix(fix: Fix | None, point: ImagePoint | None = None) -> Guide | No
         return None
     action = _ACTIONS[fix.action]
     reads = fix.action == READ_PAINT
-    return Guide(action.label, action.caption, fix.marking, point, reads)
+    return FixGuide(action.label, action.caption, fix.marking, point, reads)
 
 
-def offers_of_finding(group: Group, finding: Finding) -> tuple[Offer, ...]:
+def offers_of_finding(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
     """The edits that mend what a finding says: those of its fix, or its ball's box fitted."""
     if finding.kind == "ball_size":
         return _fitted_box_offers(group, finding)
@@ -103,7 +103,7 @@ def offers_of_finding(group: Group, finding: Finding) -> tuple[Offer, ...]:
     return offers_of_fix(group, finding.fix)
 
 
-def guide_of_finding(finding: Finding) -> Guide | None:
+def guide_of_finding(finding: Finding) -> FixGuide | None:
     """Where a finding leads a person; None where it offers edits, or nothing."""
     if finding.kind == "visible_not_annotated":
         return guide_of_fix(Fix("draw_marking", finding.view, finding.marking))
@@ -136,7 +136,7 @@ def move_ball_edit(view: str, ball: BallAnnotation, point: ImagePoint) -> SetBal
     return set_ball(view, replace(ball, box=moved))
 
 
-def _beside_track_offers(group: Group, finding: PlacedFinding) -> tuple[Offer, ...]:
+def _beside_track_offers(group: Group, finding: PlacedFinding) -> tuple[EditOffer, ...]:
     """The ball at the place of the track, another ball of the view, or the view left out."""
     key = finding.view
     view = None if key is None else group.view(key)
@@ -147,14 +147,14 @@ def _beside_track_offers(group: Group, finding: PlacedFinding) -> tuple[Offer, .
     return (*moved, *picked, *offers_of_fix(group, Fix("exclude_view", key)))
 
 
-def _fitted_box_offers(group: Group, finding: Finding) -> tuple[Offer, ...]:
+def _fitted_box_offers(group: Group, finding: Finding) -> tuple[EditOffer, ...]:
     """A box as large as the ball looks at its distance; the number is how many times as large it is now."""
     view = None if finding.view is None else group.view(finding.view)
     ball = None if view is None else view.ball
     if view is None or ball is None or ball.box is None or not finding.number:
         return ()
     box = Box.square(ball.box.center, ball.box.diameter / finding.number)
-    return (Offer("Fit the box", set_ball(view.key, replace(ball, box=box))),)
+    return (EditOffer("Fit the box", set_ball(view.key, replace(ball, box=box))),)
 
 
 def _button_text(text: str, fix: Fix, **more: str | float) -> str:
@@ -340,7 +340,7 @@ _GUIDES = frozenset(name for name, action in _ACTIONS.items() if action.edit is 
 
 
 @dataclass(frozen=True)
-class Influence:
+class MarkingInfluence:
     """One marking's influence on the camera of its view.
 
     Attributes:
@@ -361,7 +361,7 @@ class Influence:
 
 def marking_influences(
     station: Station, pitch: Pitch, policy: CalibrationPolicy
-) -> list[Influence]:
+) -> list[MarkingInfluence]:
     """The influence of each annotated marking, by refitting without it.
 
     Args:
@@ -384,7 +384,7 @@ def marking_influences(
             if rest is None
             else _jac_and_distance_without(rest, marking, station, pitch, policy)
         )
-        found.append(Influence(marking, whole.jac, jac, largest.get(marking), error))
+        found.append(MarkingInfluence(marking, whole.jac, jac, largest.get(marking), error))
     return found
 
 

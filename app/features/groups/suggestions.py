@@ -10,8 +10,8 @@ import numpy as np
 
 from app.features.groups.edit import Edit, SetLines
 from app.features.groups.suggested_edits import (
-    Guide,
-    Offer,
+    EditOffer,
+    FixGuide,
     condition_sentence,
     edit_of_fix,
     guide_of_fix,
@@ -82,8 +82,8 @@ class Suggestion:
     sentence: str
     fix: Fix
     point: ImagePoint | None
-    offers: tuple[Offer, ...]
-    guide: Guide | None
+    offers: tuple[EditOffer, ...]
+    guide: FixGuide | None
     value: float | None
     passes: bool
 

@@ -87,7 +87,7 @@ class IngestReport:
 
 
 @dataclass(frozen=True)
-class Origin:
+class ImportOrigin:
     """Into which dataset, from where, and who brings it."""
 
     dataset_id: int
@@ -133,7 +133,7 @@ def ingest(
     while batch := list(islice(sound, BATCH)):
         with ingest_session(store, keep=not dry_run) as session:
             identity = _ensure_dataset(session, dataset, actor, policy or first_policy(batch))
-            origin = Origin(identity, source, actor, lines_left)
+            origin = ImportOrigin(identity, source, actor, lines_left)
             ingest_batch(session, origin, batch, report, stations)
         done += len(batch)
         if progress is not None:
@@ -179,7 +179,7 @@ def _ensure_dataset(session: Session, dataset: str, actor: str, policy: Policy) 
 
 
 def _find_missing_groups(
-    session: Session, origin: Origin, seen: Collection[str], report: IngestReport
+    session: Session, origin: ImportOrigin, seen: Collection[str], report: IngestReport
 ) -> set[int]:
     """Count the groups that the same source brought last and that did not come this time."""
     missing: set[int] = set()
@@ -229,7 +229,7 @@ def _with_absolute_media_path(view: View) -> View:
 
 def ingest_batch(
     session: Session,
-    origin: Origin,
+    origin: ImportOrigin,
     batch: Sequence[Group],
     report: IngestReport,
     stations: set[str],
@@ -272,7 +272,10 @@ def ingest_batch(
 
 
 def insert_new_groups(
-    session: Session, origin: Origin, fresh: Sequence[tuple[Group, str]], shared: dict[str, int]
+    session: Session,
+    origin: ImportOrigin,
+    fresh: Sequence[tuple[Group, str]],
+    shared: dict[str, int],
 ) -> list[int]:
     """Insert groups that a dataset has not yet, with their source hashes; returns their ids.
 
@@ -301,7 +304,7 @@ def insert_new_groups(
 
 def _update_group(
     session: Session,
-    origin: Origin,
+    origin: ImportOrigin,
     group_id: int,
     incoming: Group,
     digest: str,

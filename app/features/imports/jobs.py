@@ -14,7 +14,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, TooLargeError
 from app.features.datasets.queries import find_dataset, has_more_groups
 from app.features.datasets.service import get_dataset_head, require_name
-from app.features.imports.sources import FORMATS, Source, import_source
+from app.features.imports.sources import FORMATS, ImportSource, import_source
 from app.features.imports.upload_queries import get_upload, keep_upload, upload_path
 from app.features.imports.uploads import resolve_folder
 from app.features.jobs.queries import Job
@@ -165,7 +165,7 @@ def import_work(jobs: Jobs, store: Store, settings: Settings, progress: JobProgr
 def import_in_worker(
     store: Store,
     dataset: str,
-    source: Source,
+    source: ImportSource,
     *,
     actor: str,
     dry_run: bool,
@@ -195,7 +195,7 @@ def import_in_worker(
 def import_in_this_process(
     store: Store,
     dataset: str,
-    source: Source,
+    source: ImportSource,
     actor: str,
     dry_run: bool,
     policy: Policy | None,
@@ -281,7 +281,7 @@ def _import_result(
     }
 
 
-def source_of(settings: Settings, request: ImportRequest) -> Source:
+def source_of(settings: Settings, request: ImportRequest) -> ImportSource:
     """What a request means, under a name that tells nobody where it lies.
 
     Raises:
@@ -298,7 +298,7 @@ def source_of(settings: Settings, request: ImportRequest) -> Source:
     offset = options.pop("frame_offset", 8)
     if isinstance(offset, dict):
         offset = {int(camera): number for camera, number in offset.items()}
-    source = Source(
+    source = ImportSource(
         request.format,
         path,
         size=None if size is None else ImageSize(*size),

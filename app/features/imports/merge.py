@@ -28,8 +28,8 @@ from app.features.groups.undo_stacks import (
 from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
 from app.features.imports.edits_export import GROUPS, SPARE, STATIONS
 from app.features.imports.ingest import (
+    ImportOrigin,
     IngestReport,
-    Origin,
     UnassignedFrame,
     ingest_batch,
     ingest_session,
@@ -66,7 +66,7 @@ from app.soccer.group import Group, Station
 
 
 def merge_stations(
-    session: Session, origin: Origin, exported: Iterable[MergeStation], report: IngestReport
+    session: Session, origin: ImportOrigin, exported: Iterable[MergeStation], report: IngestReport
 ) -> None:
     """Bring static cameras up to what another installation made of them."""
     for item in exported:
@@ -91,7 +91,7 @@ def _is_only_in_other(session: Session, stored: StoredStation, item: MergeStatio
 
 def _merge_station(
     session: Session,
-    origin: Origin,
+    origin: ImportOrigin,
     stored: StoredStation,
     item: MergeStation,
     report: IngestReport,
@@ -128,7 +128,7 @@ def _finding_sentence(decision: str, stored: StoredStation) -> str | None:
 
 def _take_other_station(
     session: Session,
-    origin: Origin,
+    origin: ImportOrigin,
     stored: StoredStation,
     item: MergeStation,
     chain: StationRevisionChain,
@@ -145,7 +145,7 @@ def _take_other_station(
 
 def _save_conflict(
     session: Session,
-    origin: Origin,
+    origin: ImportOrigin,
     stored: StoredStation,
     chain: StationRevisionChain,
     sentence: str | None,
@@ -165,7 +165,7 @@ def _save_conflict(
 
 def _log_station(
     session: Session,
-    origin: Origin,
+    origin: ImportOrigin,
     stored: StoredStation,
     chain: StationRevisionChain,
     sentence: str | None,
@@ -205,7 +205,7 @@ class _MergeRun:
     counted: set[str]
     """Static cameras that are counted already."""
 
-    def origin(self, session: Session) -> Origin:
+    def origin(self, session: Session) -> ImportOrigin:
         """The dataset, made with the other's policy when there is none of that name."""
         row = find_dataset(session, self.dataset)
         number = (
@@ -213,7 +213,7 @@ class _MergeRun:
             if row is None
             else int(row.id)
         )
-        return Origin(number, self.source, self.actor)
+        return ImportOrigin(number, self.source, self.actor)
 
 
 def merge_edits(
@@ -336,7 +336,10 @@ def _merge_batch(
 
 
 def _groups_only_in_other(
-    session: Session, origin: Origin, items: Mapping[str, MergeGroup], known: Mapping[str, int]
+    session: Session,
+    origin: ImportOrigin,
+    items: Mapping[str, MergeGroup],
+    known: Mapping[str, int],
 ) -> list[Group]:
     """What the other's dataset brought and this one's never did: groups as they came."""
     stored = read_groups(session, list(known.values()))

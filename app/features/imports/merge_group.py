@@ -15,7 +15,7 @@ from app.features.groups.reimport import KeptEdit
 from app.features.groups.revision_queries import save_group
 from app.features.groups.undo_stacks import RevisionChain, pitch_size
 from app.features.imports.body import import_body, row_ids_of_views
-from app.features.imports.ingest import IngestReport, Origin, save_findings
+from app.features.imports.ingest import ImportOrigin, IngestReport, save_findings
 from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, group_verdicts
 from app.features.pitches.service import give_pitch
@@ -71,7 +71,7 @@ def decide_merge(here: UnitHistory, there: UnitHistory) -> str:
 
 def merge_group(
     session: Session,
-    origin: Origin,
+    origin: ImportOrigin,
     stored: StoredGroup,
     chain: RevisionChain,
     exported: MergeGroup,
@@ -181,7 +181,7 @@ def _new_findings(session: Session, group_id: int, kept: list[KeptEdit]) -> list
 
 
 def merge_verdicts(
-    session: Session, origin: Origin, group_id: int, exported: Sequence[Mapping[str, Any]]
+    session: Session, origin: ImportOrigin, group_id: int, exported: Sequence[Mapping[str, Any]]
 ) -> bool:
     """Add the verdicts of another installation that are not here; whether there were any.
 
@@ -205,7 +205,7 @@ def merge_verdicts(
 
 
 def merge_dismissals(
-    session: Session, origin: Origin, group_id: int, exported: Sequence[Mapping[str, Any]]
+    session: Session, origin: ImportOrigin, group_id: int, exported: Sequence[Mapping[str, Any]]
 ) -> bool:
     """Add what was dismissed in another installation and is not here; whether there was any.
 

@@ -107,7 +107,7 @@ FRAMES_HINT = (
 
 
 @dataclass(frozen=True)
-class Source:
+class ImportSource:
     """Files of one format, and what they do not say themselves.
 
     Attributes:
@@ -151,7 +151,7 @@ class Source:
             InputError: Naming the option, and the formats that use it; or the grouping is none.
         """
         check_grouping(self.grouping)
-        usual = Source(self.format, self.path)
+        usual = ImportSource(self.format, self.path)
         given = {
             name
             for name in USERS
@@ -181,10 +181,10 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportResult:
     """What the files held (``report``) and what became of it (``result``)."""
 
-    source: Source
+    source: ImportSource
     report: Report
     result: IngestReport
 
@@ -275,14 +275,14 @@ class Imported:
 def import_source(
     store: Store,
     dataset: str,
-    source: Source,
+    source: ImportSource,
     settings: Settings,
     progress: ReportProgress | None = None,
     *,
     actor: str = "local",
     dry_run: bool = False,
     policy: Policy | None = PAPER,
-) -> Imported:
+) -> ImportResult:
     """Bring the files into a dataset, which is made when there is none of that name.
 
     Killed anywhere and started again, it ends in the same state.
@@ -318,7 +318,7 @@ def import_source(
             covariances=covariances,
             dry_run=dry_run,
         )
-        return Imported(source, report, result)
+        return ImportResult(source, report, result)
     if source.format == "touchline":
         # It solves what it brings; who imports anything else need not load a solver.
         from app.features.imports.merge import merge_edits
@@ -334,7 +334,7 @@ def import_source(
             progress=progress,
             dry_run=dry_run,
         )
-        return Imported(source, report, result)
+        return ImportResult(source, report, result)
     folder = _open_static_folder(source, report, limits) if source.format in STATIC else None
     groups = _read_groups(source, settings, report, limits) if folder is None else folder.groups()
     if source.frames is not None:
@@ -367,7 +367,7 @@ def import_source(
         )
     if source.format not in BALLS_ELSEWHERE and (sentence := counts.without_ball()):
         report.remark(sentence)
-    return Imported(source, report, result)
+    return ImportResult(source, report, result)
 
 
 def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
@@ -377,7 +377,7 @@ def _size_of_picture(settings: Settings, data: bytes, name: str) -> ImageSize:
 
 
 def _read_groups(
-    source: Source, settings: Settings, report: Report, limits: Limits
+    source: ImportSource, settings: Settings, report: Report, limits: Limits
 ) -> Iterator[Group]:
     path, calibration = source.path, source.calibration or "given"
     match source.format:
@@ -405,7 +405,7 @@ def _read_groups(
             return read_sn_calibration(path, size, report, calibration=calibration, limits=limits)
 
 
-def _open_static_folder(source: Source, report: Report, limits: Limits) -> IssiaFolder:
+def _open_static_folder(source: ImportSource, report: Report, limits: Limits) -> IssiaFolder:
     options = IssiaOptions(
         frame_offset=source.frame_offset,
         flipped=source.flipped,
@@ -417,7 +417,9 @@ def _open_static_folder(source: Source, report: Report, limits: Limits) -> Issia
     return read(source.path, options, report, limits)
 
 
-def _report_contradicted(folder: IssiaFolder, dataset: str, source: Source, report: Report) -> None:
+def _report_contradicted(
+    folder: IssiaFolder, dataset: str, source: ImportSource, report: Report
+) -> None:
     """Say of which static cameras the lines do not fit the given camera, and what to do."""
     from app.features.solutions.service import contradicted_cameras, contradiction_sentence
 

@@ -16,7 +16,7 @@ from app.features.groups.edit import SetPaint
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.reimport import SharedStations
-from app.features.imports.ingest import Origin, insert_new_groups
+from app.features.imports.ingest import ImportOrigin, insert_new_groups
 from app.features.imports.queries import newest_imports, shared_stations
 from app.features.independent_annotations.queries import (
     BARE,
@@ -66,7 +66,7 @@ def copy_group(session: Session, order: CopyRequest, start: Group) -> int:
     insert_readings(session, dataset_id, group.paint.values())
     shared = SharedStations(session, dataset_id, SOURCE, order.person)
     shared.insert_or_update(view.station for view in group.views if view.station.key not in own)
-    origin = Origin(dataset_id, SOURCE, order.person)
+    origin = ImportOrigin(dataset_id, SOURCE, order.person)
     (copy_id,) = insert_new_groups(session, origin, [(group, source_hash(group))], shared.ids)
     return copy_id
 

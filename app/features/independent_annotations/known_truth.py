@@ -216,7 +216,7 @@ def _no_truth_error(source: TruthSource) -> InputError:
 
 
 @dataclass(frozen=True)
-class Terms:
+class BatchTerms:
     """What a batch asks of own annotations.
 
     Attributes:
@@ -239,7 +239,7 @@ class Terms:
 
 
 def begin_next(
-    store: Store, terms: Terms, *, person: str, chance: Random | None = None
+    store: Store, terms: BatchTerms, *, person: str, chance: Random | None = None
 ) -> IndependentAnnotation | None:
     """The independent annotation that a person shall work on now: the one that is open, else a new one.
 
@@ -265,7 +265,7 @@ def begin_next(
 
 
 def _next_annotation(
-    session: Session, terms: Terms, person: str, chance: Random
+    session: Session, terms: BatchTerms, person: str, chance: Random
 ) -> IndependentAnnotation | None:
     annotations = annotations_of_batch(session, terms.batch_id, terms.dataset_id)
     mine = [annotation for annotation in annotations if annotation.person == person]

@@ -59,7 +59,7 @@ WRONG_VERSION = "not as it was frozen"
 
 
 @dataclass
-class People:
+class KnownPeople:
     """Who there is, and as what.
 
     Attributes:
@@ -95,10 +95,10 @@ def examine_people(session: Session, restore: str) -> list[Check]:
     ]
 
 
-def _present_people(session: Session) -> People:
+def _present_people(session: Session) -> KnownPeople:
     people = all_people(session)
     names = {row.id: row.name for row in people}
-    return People(
+    return KnownPeople(
         accounts={row.name: (row.role, bool(row.disabled)) for row in people},
         roles={
             (names[row.person_id], row.dataset_id): row.role for row in all_dataset_roles(session)
@@ -107,8 +107,8 @@ def _present_people(session: Session) -> People:
     )
 
 
-def _logged_people(session: Session) -> People:
-    people, deleted = People(), None
+def _logged_people(session: Session) -> KnownPeople:
+    people, deleted = KnownPeople(), None
     for entry in entries_of_kinds(session, [PERSON, DELETED, DATASET]):
         if entry.kind == DELETED:
             _replay_dataset_deletion(people, entry)
@@ -120,7 +120,7 @@ def _logged_people(session: Session) -> People:
     return people
 
 
-def _replay_dataset_deletion(people: People, deleted: LogEntry) -> None:
+def _replay_dataset_deletion(people: KnownPeople, deleted: LogEntry) -> None:
     """Roles in a dataset go with it, or to the one that begins afresh in its place."""
     gone = {key: role for key, role in people.roles.items() if key[1] == deleted.dataset_id}
     for name, dataset in gone:
@@ -131,7 +131,7 @@ def _replay_dataset_deletion(people: People, deleted: LogEntry) -> None:
             people.unsure[name, dataset] = role
 
 
-def _replay_dataset_creation(people: People, made: LogEntry, deleted: LogEntry | None) -> None:
+def _replay_dataset_creation(people: KnownPeople, made: LogEntry, deleted: LogEntry | None) -> None:
     """A dataset that an earlier version made right after it deleted another may have its roles."""
     if deleted is None or made.body["name"] != deleted.body["name"]:
         return
@@ -140,32 +140,32 @@ def _replay_dataset_creation(people: People, made: LogEntry, deleted: LogEntry |
         people.unsure[name, made.dataset_id] = people.unsure.pop((name, dataset))
 
 
-def _replay_account(people: People, entry: LogEntry, name: str) -> None:
+def _replay_account(people: KnownPeople, entry: LogEntry, name: str) -> None:
     _, disabled = people.accounts.get(name, ("", False))
     people.accounts[name] = (entry.body["role"], disabled)
 
 
-def _replay_disabling(people: People, entry: LogEntry, name: str) -> None:
+def _replay_disabling(people: KnownPeople, entry: LogEntry, name: str) -> None:
     people.accounts[name] = (entry.body["role"], entry.body["did"] == "disabled")
 
 
-def _replay_role_given(people: People, entry: LogEntry, name: str) -> None:
+def _replay_role_given(people: KnownPeople, entry: LogEntry, name: str) -> None:
     assert entry.dataset_id is not None
     people.unsure.pop((name, entry.dataset_id), None)
     people.roles[name, entry.dataset_id] = entry.body["role"]
 
 
-def _replay_role_taken(people: People, entry: LogEntry, name: str) -> None:
+def _replay_role_taken(people: KnownPeople, entry: LogEntry, name: str) -> None:
     assert entry.dataset_id is not None
     people.unsure.pop((name, entry.dataset_id), None)
     people.roles.pop((name, entry.dataset_id), None)
 
 
-def _replay_adoption(people: People, entry: LogEntry, name: str) -> None:
+def _replay_adoption(people: KnownPeople, entry: LogEntry, name: str) -> None:
     people.shown[entry.body["from"]] = name
 
 
-_STEPS: Mapping[str, Callable[[People, LogEntry, str], None]] = {
+_STEPS: Mapping[str, Callable[[KnownPeople, LogEntry, str], None]] = {
     "first admin": _replay_account,
     "invited": _replay_account,
     "came by single sign-on": _replay_account,

@@ -163,7 +163,7 @@ _REVISION = text("UPDATE alembic_version SET version_num = :revision")
 
 
 @dataclass(frozen=True)
-class Transferred:
+class TransferResult:
     """What a transfer came to.
 
     Attributes:
@@ -185,7 +185,7 @@ def transfer_database(
     tell: Callable[[str, int], None] = lambda *_: None,
     *,
     replace_null: bool = False,
-) -> Transferred:
+) -> TransferResult:
     """Copy a database into an empty one, or go on with a copy that was stopped.
 
     Args:
@@ -239,7 +239,7 @@ def _copy_all_tables(
     dialect: Dialect,
     yields: Path,
     tell: Callable[[str, int], None],
-) -> Transferred:
+) -> TransferResult:
     anchor = anchor_of(session)
     if anchor is None:
         raise InputError(
@@ -259,7 +259,7 @@ def _copy_all_tables(
         copy.execute(_REVISION, {"revision": anchor.schema})
         versions = _version_hashes(copy)
         copy.commit()
-    return Transferred(rows, copied, entries, versions)
+    return TransferResult(rows, copied, entries, versions)
 
 
 def _prepare_target(target: Engine, dialect: Dialect, installation: str) -> None:

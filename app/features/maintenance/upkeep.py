@@ -166,7 +166,7 @@ class Upkeep:
 
 
 @dataclass(frozen=True)
-class Home:
+class HomeReport:
     """A home as its operator sees it.
 
     Attributes:
@@ -196,7 +196,7 @@ class Home:
         return max(0.0, waits.total_seconds())
 
 
-def read_home(store: Store) -> Home:
+def read_home(store: Store) -> HomeReport:
     """The home of this moment, read in one short transaction.
 
     Raises:
@@ -207,7 +207,7 @@ def read_home(store: Store) -> Home:
         entries, jobs = newest_entry(session), count_jobs(session)
     settings = store.settings
     free = shutil.disk_usage(settings.home).free
-    return Home(groups, unsolved, oldest, entries, jobs, file_sizes(settings), free)
+    return HomeReport(groups, unsolved, oldest, entries, jobs, file_sizes(settings), free)
 
 
 def file_sizes(settings: Settings) -> dict[str, int]:

@@ -93,7 +93,7 @@ def _folded_name(name: str) -> bytes:
     return name.strip().lower().encode("utf-8", "replace")
 
 
-class Attempts:
+class AttemptWindow:
     """Tries in a moving window.
 
     Args:

@@ -87,7 +87,7 @@ def role_at(found: Ownership, roles: DatasetRoles, name: str) -> Role:
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedResource:
     """What a request names, by its id or by whatever else names a thing of that kind."""
 
     kind: OwnedKind
@@ -103,7 +103,7 @@ _GROUPS: Mapping[OwnedKind, str] = {
 
 
 def is_hidden_from(
-    store: Store, named: Named, found: Ownership, reader: RestrictedReader | None
+    store: Store, named: NamedResource, found: Ownership, reader: RestrictedReader | None
 ) -> bool:
     """Whether a group, or what belongs to one, is hidden from somebody who annotates blind."""
     kind, dataset = _GROUPS.get(named.kind), found.dataset
@@ -115,7 +115,7 @@ def is_hidden_from(
         return is_hidden_group(session, reader, dataset, **{kind: named.by})
 
 
-def find_ownership(store: Store, named: Named, visibility: Visibility) -> Ownership | None:
+def find_ownership(store: Store, named: NamedResource, visibility: Visibility) -> Ownership | None:
     """Where something is that an address names; None where there is nothing of that name.
 
     Args:

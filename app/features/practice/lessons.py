@@ -31,7 +31,7 @@ from app.sample.scene import (
     ViewTruth,
     truth_to_json,
 )
-from app.sample.scenes import Stage, make_scene, make_stage
+from app.sample.scenes import MatchStage, make_scene, make_stage
 from app.sample.write import JPEG_QUALITY, ZIP_DATE
 from app.soccer.group import Group, View, view_letter
 
@@ -77,7 +77,7 @@ def make_practice() -> list[Scene]:
     return [make_scene(stage, lesson.number, _fault_plan_of_lesson(lesson)) for lesson in LESSONS]
 
 
-def practice_stage() -> Stage:
+def practice_stage() -> MatchStage:
     """The match that all lessons are from."""
     return make_stage(0, MATCH_GROUPS, SEED)
 

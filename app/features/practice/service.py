@@ -17,7 +17,7 @@ from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
 from app.features.groups.state import GroupState, read_states
 from app.features.imports.queries import known_groups
-from app.features.imports.sources import Source, import_source
+from app.features.imports.sources import ImportSource, import_source
 from app.features.jobs.queries import Job
 from app.features.jobs.runner import JobProgress, run_job_in_worker
 from app.features.jobs.service import Jobs, Pool
@@ -197,7 +197,7 @@ def _make_lessons(
     if person is not None:
         _open_dataset(store, person, actor)
     progress(0, 1, "Reading the groups.")
-    source = Source("soccernet-v3", folder.resolve(), name="the practice groups")
+    source = ImportSource("soccernet-v3", folder.resolve(), name="the practice groups")
     import_source(store, name, source, settings, None, actor=actor)
     solve_dataset(store, name, None, partial_progress(progress, "Solving the groups."))
     return _group_ids(store, name)
@@ -376,7 +376,7 @@ def make_sample_dataset(
         return found
     drawing = partial_progress(progress, "Drawing the pictures.")
     written = write_sample(folder, **vars(order), progress=drawing, workers=workers)
-    source = Source("soccernet-v3", folder.resolve())
+    source = ImportSource("soccernet-v3", folder.resolve())
     reading = partial_progress(progress, "Reading the groups.")
     import_source(store, name, source, store.settings, reading, actor=actor)
     with pool() as executor:

@@ -69,7 +69,7 @@ class AcceptRequest:
 
 
 @dataclass(frozen=True)
-class Accepted:
+class AcceptedView:
     """One view whose prediction is to be accepted, or why not."""
 
     view_id: int
@@ -90,7 +90,7 @@ class AcceptPlan:
     """
 
     predictions: PredictionSet
-    changes: tuple[Accepted, ...]
+    changes: tuple[AcceptedView, ...]
     refused: dict[str, int]
 
     @property
@@ -252,7 +252,7 @@ def _read_views(session: Session, dataset_id: int, request: AcceptRequest) -> li
 
 def _judge_box(
     row: StoredView, boxes: Sequence[PredictedBox], name: str, request: AcceptRequest
-) -> Accepted:
+) -> AcceptedView:
     best = max(boxes, key=lambda box: (box.score, -box.id))
     balls = row.balls
     why = None
@@ -264,7 +264,7 @@ def _judge_box(
         why = "the_same"
     elif balls and not request.replace:
         why = "annotated"
-    return Accepted(row.id, row.key, row.group_id, row.group, best, why)
+    return AcceptedView(row.id, row.key, row.group_id, row.group, best, why)
 
 
 def _box_problem(box: PredictedBox, view: StoredView) -> str | None:
@@ -273,8 +273,8 @@ def _box_problem(box: PredictedBox, view: StoredView) -> str | None:
     return box_problem(place, ImageSize(view.width, view.height))
 
 
-def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]:
-    groups: dict[int, list[Accepted]] = {}
+def _by_group(items: Sequence[AcceptedView]) -> Iterator[tuple[int, list[AcceptedView]]]:
+    groups: dict[int, list[AcceptedView]] = {}
     for item in items:
         groups.setdefault(item.group_id, []).append(item)
     yield from groups.items()
@@ -282,7 +282,7 @@ def _by_group(items: Sequence[Accepted]) -> Iterator[tuple[int, list[Accepted]]]
 
 def _accept_edit(
     store: Store,
-    item: Accepted,
+    item: AcceptedView,
     name: str,
     request: AcceptRequest,
     actor: str,
@@ -315,7 +315,7 @@ def _accept_edit(
     return "changed_meanwhile"
 
 
-def _still_fits(state: GroupState, item: Accepted, request: AcceptRequest) -> bool:
+def _still_fits(state: GroupState, item: AcceptedView, request: AcceptRequest) -> bool:
     view: View | None = state.group.view(item.view)
     return view is not None and (request.replace or not view.balls)
 

@@ -10,7 +10,7 @@ from app.db.json_columns import Json
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import InputError, NotFoundError
-from app.evaluation.evaluate import Inputs, Options, evaluate
+from app.evaluation.evaluate import EvaluationInputs, EvaluationOptions, evaluate
 from app.evaluation.frame import Detection, Frame
 from app.evaluation.result import Evaluation, Table
 from app.features.datasets.service import DatasetHead, read_dataset_head
@@ -18,7 +18,7 @@ from app.features.groups.view_queries import StoredView, dataset_views
 from app.features.predictions.evaluation import read_evaluation, track_evaluation
 from app.features.predictions.frames import (
     LIVE_RULES,
-    Truth,
+    EvaluationTruth,
     live_truth,
     unknown_rule,
     version_truth,
@@ -207,7 +207,7 @@ def run_evaluation(
             if request.version is not None:
                 version = _own_version(session, found, request.version)
             result, pins = track_evaluation(session, found, version, tracks)
-            options, more = Options(), {}
+            options, more = EvaluationOptions(), {}
         else:
             truth = _read_truth(session, found, request)
             inputs = _read_inputs(session, sets)
@@ -216,7 +216,7 @@ def run_evaluation(
         if not truth.frames:
             raise _no_frames(found, request)
         _require_common_frames(truth, inputs, sets)
-        options = Options(
+        options = EvaluationOptions(
             boxes=request.boxes,
             min_score=request.min_score,
             ball_diameter_m=truth.policy.ball_diameter_m,
@@ -286,7 +286,9 @@ def _find_track_set(
     return found
 
 
-def _read_truth(session: Session, dataset: DatasetHead, request: EvaluationRequest) -> Truth:
+def _read_truth(
+    session: Session, dataset: DatasetHead, request: EvaluationRequest
+) -> EvaluationTruth:
     if request.version is None:
         return live_truth(session, dataset, request.groups, request.split)
     version = _own_version(session, dataset, request.version)
@@ -309,7 +311,7 @@ def _own_set(session: Session, dataset: DatasetHead, set_id: int, pointer: str) 
     return found
 
 
-def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Inputs:
+def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> EvaluationInputs:
     predictions, careful = sets.get("predictions"), sets.get("careful")
     detections = cameras = boxes = None
     if predictions is not None:
@@ -322,11 +324,11 @@ def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Inputs:
             cameras = read_predicted_cameras(session, predictions.id)
     if careful is not None:
         boxes = careful_boxes(session, careful)
-    return Inputs(detections, boxes, cameras)
+    return EvaluationInputs(detections, boxes, cameras)
 
 
 def _pinned_options(
-    request: EvaluationRequest, options: Options, sets: Mapping[str, PredictionSet]
+    request: EvaluationRequest, options: EvaluationOptions, sets: Mapping[str, PredictionSet]
 ) -> dict[str, Json]:
     """What was asked for, beside what the truth pins."""
     return {
@@ -347,7 +349,9 @@ def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
     return InputError(f'no group of "{dataset.name}" takes part{of}', hint=hint)
 
 
-def _require_common_frames(truth: Truth, inputs: Inputs, sets: Mapping[str, PredictionSet]) -> None:
+def _require_common_frames(
+    truth: EvaluationTruth, inputs: EvaluationInputs, sets: Mapping[str, PredictionSet]
+) -> None:
     """Refuse predictions of which none belongs to a frame that takes part: AP 0 would be false."""
     frames = {frame.id for frame in truth.frames}
     for name, predicted in (

@@ -31,7 +31,7 @@ LIVE_RULES: tuple[str, ...] = get_args(LiveRule)
 
 
 @dataclass(frozen=True)
-class Truth:
+class EvaluationTruth:
     """Frames, and what pins them.
 
     Attributes:
@@ -46,7 +46,7 @@ class Truth:
     pins: Json
 
 
-def version_truth(session: Session, version: Version, split: str | None) -> Truth:
+def version_truth(session: Session, version: Version, split: str | None) -> EvaluationTruth:
     """The frames of a frozen version, with the ids that its views have today."""
     rows = list(read_rows(session, version.id, members=True))
     frames: list[Frame] = []
@@ -60,10 +60,12 @@ def version_truth(session: Session, version: Version, split: str | None) -> Trut
                     frames.append(frame)
                     gone += frame.id < 0
     pins = truth_pins(version.policy, version.solver_version, version.hash, version.groups, version)
-    return Truth(tuple(frames), version.policy, gone, pins)
+    return EvaluationTruth(tuple(frames), version.policy, gone, pins)
 
 
-def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | None) -> Truth:
+def live_truth(
+    session: Session, dataset: DatasetHead, rule: str, split: str | None
+) -> EvaluationTruth:
     """The frames of a dataset as it is now; the pin is a digest of all that they follow from.
 
     Raises:
@@ -90,7 +92,7 @@ def live_truth(session: Session, dataset: DatasetHead, rule: str, split: str | N
                 if split is None or frame.split == split
             ]
     pins = truth_pins(dataset.policy, SOLVER_VERSION, digest(sorted(hashes)), rule)
-    return Truth(tuple(frames), dataset.policy, 0, pins)
+    return EvaluationTruth(tuple(frames), dataset.policy, 0, pins)
 
 
 def group_frames(

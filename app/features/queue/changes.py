@@ -31,7 +31,7 @@ SOLVED = "solved"
 
 
 @dataclass(frozen=True)
-class Change:
+class LoggedChange:
     """A group that is not what it was, or, without a group, a dataset.
 
     Attributes:
@@ -52,7 +52,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class News:
+class NewChanges:
     """What there is to tell at one moment.
 
     Attributes:
@@ -64,8 +64,8 @@ class News:
 
     entry: int
     solution: int
-    changes: Mapping[int, list[Change]]
-    solved: list[Change]
+    changes: Mapping[int, list[LoggedChange]]
+    solved: list[LoggedChange]
 
 
 def read_position(store: Store) -> int:
@@ -80,38 +80,40 @@ def read_moment(store: Store) -> tuple[int, int]:
         return newest_entry(session), newest_solution(session)
 
 
-def read_solved_since(store: Store, solution: int) -> list[Change]:
+def read_solved_since(store: Store, solution: int) -> list[LoggedChange]:
     """Groups that got a solution after another one; datasets as a whole where they are many."""
     with store.read() as session:
         behind = newest_solution(session) - solution
         if behind > FAR:
             names = dataset_names(session)
-            return [Change(None, key, name, SOLVED, None) for key, name in names.items()]
+            return [LoggedChange(None, key, name, SOLVED, None) for key, name in names.items()]
         return read_solved(session, solution) if behind > 0 else []
 
 
-def read_news(store: Store, places: Collection[int], solution: int | None) -> News:
+def read_news(store: Store, places: Collection[int], solution: int | None) -> NewChanges:
     """What has changed since some entries of the log, and since a solution (None: none is told)."""
     with store.read() as session:
         entry, newest = newest_entry(session), newest_solution(session)
         changes = {place: read_changes(session, place) for place in places if place < entry}
-        solved: list[Change] = []
+        solved: list[LoggedChange] = []
         if solution is not None and newest > solution:
             changed = {item.group_id for items in changes.values() for item in items}
             solved = read_solved(session, solution, changed)
-    return News(entry, newest, changes, solved)
+    return NewChanges(entry, newest, changes, solved)
 
 
-def read_changes(session: Session, after: int) -> list[Change]:
+def read_changes(session: Session, after: int) -> list[LoggedChange]:
     """What has changed since an entry of the log, each group once, in the order of the log."""
     newest = newest_entry(session)
     if newest - after > FAR:
         names = dataset_names(session)
-        return [Change(newest, key, name, EVERYTHING, None) for key, name in names.items()]
+        return [LoggedChange(newest, key, name, EVERYTHING, None) for key, name in names.items()]
     return _add_names_and_etags(session, changes_after_entry(session, after))
 
 
-def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) -> list[Change]:
+def read_solved(
+    session: Session, after: int, known: Iterable[int | None] = ()
+) -> list[LoggedChange]:
     """Groups that got a solution after another one; ``known`` are told of already."""
     skipped = set(known)
     found = [
@@ -122,7 +124,7 @@ def read_solved(session: Session, after: int, known: Iterable[int | None] = ()) 
     return _add_names_and_etags(session, found)
 
 
-def _add_names_and_etags(session: Session, found: Iterable[StoredChange]) -> list[Change]:
+def _add_names_and_etags(session: Session, found: Iterable[StoredChange]) -> list[LoggedChange]:
     """Changes with names and ETags; a dataset with too many of them is told as a whole."""
     items = _newest_change_of_each_group(found)
     sizes = Counter(item.dataset_id for item in items if item.group_id is not None)
@@ -135,7 +137,7 @@ def _add_names_and_etags(session: Session, found: Iterable[StoredChange]) -> lis
     items = [item for item in items if ends.get(item.dataset_id, item) is item]
     etags = read_etags(session, [item.group_id for item in items if item.group_id is not None])
     return [
-        Change(
+        LoggedChange(
             item.id,
             item.dataset_id,
             names.get(item.dataset_id),

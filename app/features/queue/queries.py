@@ -200,7 +200,7 @@ def _order_column(column: str | ColumnElement[Any]) -> Any:
     return _COMPUTED.get(column, getattr(QueueModel, column))
 
 
-class Order:
+class RowOrder:
     """A total order of groups: the number comes last, so that no two are equal.
 
     Groups without what is sorted by come last either way.
@@ -286,7 +286,7 @@ class Listing:
         found: int | None = self.session.scalar(self._over_all_groups(select(func.count())))
         return found or 0
 
-    def place(self, order: Order, keys: Sequence[Key], group_id: int) -> tuple[int | None, int]:
+    def place(self, order: RowOrder, keys: Sequence[Key], group_id: int) -> tuple[int | None, int]:
         """How many groups come before some keys, None where the group is not here; and how many
         there are."""
         here = func.sum(case((QueueModel.group_id == group_id, 1), else_=0))
@@ -306,17 +306,17 @@ class Listing:
             statement = statement.order_by(QueueModel.number)
         return self.session.execute(statement).all()
 
-    def rows_after(self, order: Order, keys: Sequence[Key] | None, limit: int) -> Sequence[Any]:
+    def rows_after(self, order: RowOrder, keys: Sequence[Key] | None, limit: int) -> Sequence[Any]:
         """Rows in order with their keys, from the one after these keys on, or from the first."""
         after = [] if keys is None else [order.after(keys)]
         statement = _select_rows(order).where(*self._conditions, *after).limit(limit)
         return self.session.execute(statement).all()
 
-    def ids(self, order: Order, limit: int | None = None) -> list[int]:
+    def ids(self, order: RowOrder, limit: int | None = None) -> list[int]:
         """Ids in order, of all or of the first."""
         return self._read_ids(self._ids_statement.order_by(*order.ascending).limit(limit))
 
-    def ids_from(self, order: Order, start: int, limit: int, total: int) -> list[int]:
+    def ids_from(self, order: RowOrder, start: int, limit: int, total: int) -> list[int]:
         """Ids from a position on, in order, out of ``total``.
 
         SQLite sorts as many rows as it skips and reads, and wide rows cost it several times as
@@ -333,7 +333,7 @@ class Listing:
         return self._read_ids(backwards)[::-1]
 
     def ids_around(
-        self, order: Order, keys: Sequence[Key], limit: int, total: int
+        self, order: RowOrder, keys: Sequence[Key], limit: int, total: int
     ) -> tuple[list[int], list[int]]:
         """Ids just before some keys and just after, the nearest first, out of ``total``."""
         ids = self._page_of_ids(order, limit, total)
@@ -350,7 +350,7 @@ class Listing:
     def _ids_statement(self) -> Select[int]:
         return select(QueueModel.group_id).where(*self._conditions)
 
-    def _over_all_groups(self, statement: Any, order: Order | None = None) -> Select[Any]:
+    def _over_all_groups(self, statement: Any, order: RowOrder | None = None) -> Select[Any]:
         """The statement over all groups."""
         filtered = statement.select_from(QueueModel).where(*self._conditions)
         names = _column_names(self.conditions) | (
@@ -358,7 +358,7 @@ class Listing:
         )
         return filtered if _is_sorted(names) else _with_index(_choose_index(names), filtered)
 
-    def _page_of_ids(self, order: Order, reach: int, total: int) -> Select[int]:
+    def _page_of_ids(self, order: RowOrder, reach: int, total: int) -> Select[int]:
         """Ids of which ``reach`` are read in order, out of ``total``."""
         few = self.conditions and reach * _FEW > total
         if few:
@@ -399,7 +399,7 @@ def _with_index(index: str | None, statement: Select[Any]) -> Select[Any]:
     return statement.with_hint(QueueModel, f"INDEXED BY {index}", "sqlite")
 
 
-def read_rows(session: Session, ids: Sequence[int], order: Order) -> Sequence[Any]:
+def read_rows(session: Session, ids: Sequence[int], order: RowOrder) -> Sequence[Any]:
     """The rows of groups in order, with their keys."""
     return session.execute(_select_rows(order).where(QueueModel.group_id.in_(ids))).all()
 
@@ -422,7 +422,7 @@ def columns_from(
     return session.execute(statement).all()
 
 
-def find_place(session: Session, group_id: int, order: Order) -> tuple[int, list[Key]] | None:
+def find_place(session: Session, group_id: int, order: RowOrder) -> tuple[int, list[Key]] | None:
     """The dataset of a group and its keys in an order; None where there is no such group."""
     statement = select(QueueModel.dataset_id, *order.keys).where(QueueModel.group_id == group_id)
     row = session.execute(statement).one_or_none()
@@ -489,5 +489,5 @@ def _select_columns(names: Iterable[str]) -> Select[Any]:
     return select(*(getattr(QueueModel, name) for name in names))
 
 
-def _select_rows(order: Order) -> Select[Any]:
+def _select_rows(order: RowOrder) -> Select[Any]:
     return select(*QueueModel.__table__.columns, *order.keys).order_by(*order.ascending)

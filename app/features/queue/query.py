@@ -24,7 +24,7 @@ from app.errors import InputError
 from app.features.batches.queries import place_column
 from app.features.queue import queries as conditions
 from app.features.queue.fields import BY_NAME, FIELDS, ORDERS
-from app.features.queue.queries import Condition, Order
+from app.features.queue.queries import Condition, RowOrder
 from app.json_text import MAX_ID
 
 MAX_LENGTH = 1000
@@ -66,12 +66,12 @@ class Query:
         return sha256(" ".join(self.text.split()).encode()).hexdigest()[:16]
 
     @property
-    def order(self) -> Order:
+    def order(self) -> RowOrder:
         """The order in which it lists groups."""
         if self.batch is not None:
-            return Order(place_column(self.batch))
+            return RowOrder(place_column(self.batch))
         # "newest" says the direction itself.
-        return Order(SORTS[self.sort], self.descending != (self.sort == "newest"))
+        return RowOrder(SORTS[self.sort], self.descending != (self.sort == "newest"))
 
 
 @dataclass(frozen=True)

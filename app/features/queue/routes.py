@@ -25,7 +25,7 @@ from app.features.groups.solution_schemas import (
     OfferDocument,
 )
 from app.features.groups.submit import find_view
-from app.features.groups.suggested_edits import Influence, marking_influences
+from app.features.groups.suggested_edits import MarkingInfluence, marking_influences
 from app.features.groups.suggestions import Suggestion, find_suggestions
 from app.features.people.visibility_queries import is_blind
 from app.features.queue.fields import FIELDS, ORDERS, FieldKind
@@ -393,7 +393,7 @@ class Suggestions(ListDocument[SuggestionDocument]):
     """What would make a group pass, the gentlest first; empty when it passes."""
 
 
-class InfluenceDocument(Document, shows=Influence):
+class InfluenceDocument(Document, shows=MarkingInfluence):
     """What the camera would be without one marking."""
 
     jac: Jac | None = Field(description="JaC of the view as it is, by gamma in per cent.")

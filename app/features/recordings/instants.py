@@ -20,7 +20,7 @@ from app.durable import replace_file
 from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_row
 from app.features.groups.queries import StoredGroup, read_groups
-from app.features.imports.ingest import BATCH, IngestReport, Origin, ingest_batch
+from app.features.imports.ingest import BATCH, ImportOrigin, IngestReport, ingest_batch
 from app.features.recordings.cameras import SOURCE, cameras_at
 from app.features.recordings.index import read_index
 from app.features.recordings.link_frames import linked_frames
@@ -153,7 +153,7 @@ def take_instants(
     replays = _linked_views(store, recording, numbers, there) if linked else _LinkedViews()
     wanted = [number for number in numbers if number not in there or number in replays.of]
     index = read_index(store.settings, recording.require_readable())
-    origin, report = Origin(recording.dataset_id, recording.name, actor), IngestReport()
+    origin, report = ImportOrigin(recording.dataset_id, recording.name, actor), IngestReport()
     done, total = len(numbers) - len(wanted), len(numbers)
     progress(done, total)
     tracked = cameras_at(store, recording, wanted)

@@ -109,7 +109,7 @@ Solve = Callable[[Group, Policy, Mapping[str, Calibration]], tuple[Solution, Enc
 
 
 @dataclass(frozen=True)
-class Result:
+class SolveResult:
     """What a worker sends back for one group: a solution, or the reason why there is none."""
 
     key: SolutionKey
@@ -159,7 +159,7 @@ def rethreshold_tasks(
             yield RethresholdTask(tuple(kept), before, policy)
 
 
-def rethreshold_task(task: RethresholdTask) -> list[Result]:
+def rethreshold_task(task: RethresholdTask) -> list[SolveResult]:
     """The solutions of those groups of which tau decides nothing new; runs in a worker.
 
     What is damaged is left out, like all others: it is solved.
@@ -179,7 +179,7 @@ def _kept_by_policy(task: RethresholdTask) -> Iterator[list[KeptSolution]]:
             yield kept
 
 
-def _apply_thresholds(task: RethresholdTask, kept: Sequence[KeptSolution]) -> Iterator[Result]:
+def _apply_thresholds(task: RethresholdTask, kept: Sequence[KeptSolution]) -> Iterator[SolveResult]:
     policy = task.policy
     facts = facts_from_bytes([item.facts for item in kept])
     same = has_unchanged_pairs(facts, task.before[kept[0].policy_hash], policy)
@@ -190,7 +190,7 @@ def _apply_thresholds(task: RethresholdTask, kept: Sequence[KeptSolution]) -> It
         solution = rethreshold(item.solution, diagonals[place].tolist(), policy)
         if solution is not None:
             key = SolutionKey(item.group_id, item.inputs_hash, policy.hash)
-            yield Result(key, item.group, solution.passes, item.encode(solution))
+            yield SolveResult(key, item.group, solution.passes, item.encode(solution))
 
 
 _AGAIN = "importing the files again with `--calibration given`"
@@ -255,7 +255,7 @@ def outcome_sentence(
 
 
 @dataclass(frozen=True)
-class Task:
+class SolveTask:
     """A chunk of groups on its way to a worker: plain bytes, so that it travels anywhere."""
 
     groups: tuple[tuple[SolutionKey, bytes], ...]
@@ -291,7 +291,7 @@ def solve_dataset(
     found, ids = get_dataset_head(store, dataset), chosen(stale_groups(store, dataset))
     report = SolveReport(total=len(ids))
 
-    def keep(results: Sequence[Result]) -> None:
+    def keep(results: Sequence[SolveResult]) -> None:
         _save_results(store, results, report)
         if progress is not None:
             progress(report.solved + len(report.failed), report.total)
@@ -324,7 +324,7 @@ def _split_into_chunks(ids: Sequence[int], largest: int) -> Iterator[Sequence[in
         start, size = start + size, min(2 * size, largest)
 
 
-def solve_task(task: Task) -> list[Result]:
+def solve_task(task: SolveTask) -> list[SolveResult]:
     """Solve the groups of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.calibrations.items()}
     return [
@@ -332,16 +332,18 @@ def solve_task(task: Task) -> list[Result]:
     ]
 
 
-def _solve_one(key: SolutionKey, group: Group, task: Task, known: dict[str, Calibration]) -> Result:
+def _solve_one(
+    key: SolutionKey, group: Group, task: SolveTask, known: dict[str, Calibration]
+) -> SolveResult:
     try:
         solution, encoded = solve_encoded(group, task.policy, known)
     except Exception as error:
         # One broken group must not stop the others; it stays stale and is reported by name.
-        return Result(key, group.key, problem=f"{type(error).__name__}: {error}")
-    return Result(key, group.key, solution.passes, encoded)
+        return SolveResult(key, group.key, problem=f"{type(error).__name__}: {error}")
+    return SolveResult(key, group.key, solution.passes, encoded)
 
 
-def _save_results(store: Store, results: Sequence[Result], report: SolveReport) -> None:
+def _save_results(store: Store, results: Sequence[SolveResult], report: SolveReport) -> None:
     solutions = [(item.key, item.solution) for item in results if item.solution is not None]
     if not results:
         return
@@ -355,7 +357,7 @@ def _save_results(store: Store, results: Sequence[Result], report: SolveReport) 
     report.failed += [(item.group, item.problem) for item in results if item.solution is None]
 
 
-def _make_task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Task:
+def _make_task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> SolveTask:
     with store.read() as session:
         policy = read_dataset_head(session, dataset.id).policy
         stored = read_groups(session, ids, extras=False).values()
@@ -365,7 +367,7 @@ def _make_task(store: Store, dataset: DatasetHead, ids: Sequence[int]) -> Task:
         (SolutionKey(item.id, item.inputs_hash, policy.hash), pack(group_to_json(item.group)))
         for item in stored
     )
-    return Task(groups, policy, known)
+    return SolveTask(groups, policy, known)
 
 
 def _calibrate_static_cameras(store: Store, dataset: DatasetHead) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import asdict
 from typing import Any
 
-from app.db.database_worker import Caller
+from app.db.database_worker import CallingServer
 from app.db.json_columns import Json
 from app.db.store import Store
 from app.features.jobs.runner import JobProgress, counting_progress, run_job_in_worker
@@ -15,7 +15,11 @@ from app.features.tracks.service import make_tracks
 
 
 def _make(
-    store: Store, dataset_id: int, matches: Collection[str] | None, actor: str, caller: Caller
+    store: Store,
+    dataset_id: int,
+    matches: Collection[str] | None,
+    actor: str,
+    caller: CallingServer,
 ) -> dict[str, Any]:
     """``make_tracks`` in a worker process."""
     return asdict(make_tracks(store, dataset_id, matches, actor, caller))

@@ -41,7 +41,7 @@ LONGEST = 2000
 
 
 @dataclass(frozen=True)
-class Address:
+class WebhookAddress:
     """What of an address decides whom it reaches."""
 
     scheme: str
@@ -49,14 +49,14 @@ class Address:
     port: int
     path: str
 
-    def is_below(self, other: Address) -> bool:
+    def is_below(self, other: WebhookAddress) -> bool:
         """Whether it is another one, or leads on from it."""
         same = (self.scheme, self.host, self.port) == (other.scheme, other.host, other.port)
         folder = other.path if other.path.endswith("/") else other.path + "/"
         return same and (self.path == other.path or self.path.startswith(folder))
 
 
-def read_address(text: str, pointer: str | None = None) -> Address:
+def read_address(text: str, pointer: str | None = None) -> WebhookAddress:
     """An address as it will be used.
 
     Raises:
@@ -72,7 +72,7 @@ def read_address(text: str, pointer: str | None = None) -> Address:
     host = (parts.hostname or "").removesuffix(".")
     if not all(host.split(".")):
         raise _address_error(text, pointer)
-    return Address(parts.scheme, host, port or _PORTS[parts.scheme], parts.path or "/")
+    return WebhookAddress(parts.scheme, host, port or _PORTS[parts.scheme], parts.path or "/")
 
 
 def require_allowed(text: str, allowed: Iterable[str], pointer: str | None = None) -> None:
@@ -147,7 +147,7 @@ GONE = 410
 
 
 @dataclass(frozen=True)
-class Attempt:
+class DeliveryAttempt:
     """What came of one try: ``problem`` is None where it arrived."""
 
     status: int | None
@@ -238,7 +238,7 @@ class WebhookSender:
                     self._save_attempt(session, row, answer)
         return len(answers)
 
-    async def _send_all_due(self, due: Sequence[Any]) -> list[tuple[Any, Attempt]]:
+    async def _send_all_due(self, due: Sequence[Any]) -> list[tuple[Any, DeliveryAttempt]]:
         async with httpx.AsyncClient(
             timeout=SECONDS, follow_redirects=False, trust_env=False, verify=_tls_context()
         ) as client:
@@ -282,24 +282,24 @@ class WebhookSender:
         seconds = (datetime.fromisoformat(due) - self._clock()).total_seconds()
         return min(max(seconds, 0.0), POLL_SECONDS)
 
-    async def _send_delivery(self, client: httpx.AsyncClient, row: DueDelivery) -> Attempt:
+    async def _send_delivery(self, client: httpx.AsyncClient, row: DueDelivery) -> DeliveryAttempt:
         """One try; whatever goes wrong with one address is its own answer."""
         try:
             async with asyncio.timeout(SECONDS):
                 status = await self._post_delivery(client, row)
         except ReviewError as error:
-            return Attempt(None, error.message)
+            return DeliveryAttempt(None, error.message)
         except (TimeoutError, httpx.TimeoutException):
-            return Attempt(None, f"no answer within {SECONDS:.0f} s")
+            return DeliveryAttempt(None, f"no answer within {SECONDS:.0f} s")
         except httpx.HTTPError as error:
-            return Attempt(None, f"it could not be reached: {error}"[:300])
+            return DeliveryAttempt(None, f"it could not be reached: {error}"[:300])
         except Exception as error:
             log.exception("a message could not be sent", webhook=row.webhook_id)
-            return Attempt(None, f"it could not be sent: {error}"[:300])
+            return DeliveryAttempt(None, f"it could not be sent: {error}"[:300])
         if 200 <= status < 300:
-            return Attempt(status, None)
+            return DeliveryAttempt(status, None)
         redirected = " (redirects are not followed)" if 300 <= status < 400 else ""
-        return Attempt(status, f"it answered {status}{redirected}")
+        return DeliveryAttempt(status, f"it answered {status}{redirected}")
 
     async def _post_delivery(self, client: httpx.AsyncClient, row: DueDelivery) -> int:
         settings = self._store.settings
@@ -311,7 +311,7 @@ class WebhookSender:
         async with client.stream("POST", row.url, content=row.body, headers=headers) as answer:
             return answer.status_code
 
-    def _save_attempt(self, session: Session, row: DueDelivery, answer: Attempt) -> None:
+    def _save_attempt(self, session: Session, row: DueDelivery, answer: DeliveryAttempt) -> None:
         now = self._clock()
         tried = {"attempts": row.attempts + 1, "tried": text_of(now), "status": answer.status}
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
@@ -325,7 +325,9 @@ class WebhookSender:
         if values.get("state") == FAILED:
             self._turn_off_if_failing(session, row, answer)
 
-    def _turn_off_if_failing(self, session: Session, row: DueDelivery, answer: Attempt) -> None:
+    def _turn_off_if_failing(
+        self, session: Session, row: DueDelivery, answer: DeliveryAttempt
+    ) -> None:
         """Tell nobody any more who wants nothing, or has taken nothing for as long as one tries."""
         if answer.status == GONE:
             update_webhook(

@@ -14,7 +14,13 @@ from app.errors import ConflictError, InputError, NotFoundError
 from app.features.audit.service import add_audit_event
 from app.features.datasets.queries import dataset_name
 from app.features.datasets.service import dataset_id
-from app.features.webhooks.messages import CHOSEN, Kind, new_salt, ping_message, webhook_secret
+from app.features.webhooks.messages import (
+    CHOSEN,
+    Kind,
+    new_salt,
+    ping_message,
+    webhook_secret,
+)
 from app.features.webhooks.queries import (
     DELIVERED,
     FAILED,

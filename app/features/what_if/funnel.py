@@ -17,7 +17,7 @@ from app.features.what_if.block_results import (
     map_in_threads,
     sum_counts,
 )
-from app.features.what_if.service import Block, Snapshot, YieldStore
+from app.features.what_if.service import TableBlock, TableSnapshot, YieldStore
 from app.features.what_if.table import JAC_STEPS
 from app.geometry.arrays import IntArray
 from app.soccer.policy import BOXES, CALIBRATION, PITCH, THRESHOLDS, Policy
@@ -107,7 +107,7 @@ def get_yield(
     unanswered = thresholds_that_need_solving(snapshot.policy, policy)
     same = all(item.value(policy) == item.value(snapshot.policy) for item in ANSWERED)
 
-    def count_block(block: Block) -> GroupCounts:
+    def count_block(block: TableBlock) -> GroupCounts:
         return block.count_present if same else block.count_under(policy)
 
     # Who tries another noise judges every group anew; else threads would wait for each other.
@@ -132,7 +132,7 @@ def _changed_policy(policy: Policy, values: Mapping[str, Any]) -> Policy:
 
 
 def _make_yield(
-    snapshot: Snapshot, policy: Policy, total: GroupCounts, unanswered: tuple[str, ...]
+    snapshot: TableSnapshot, policy: Policy, total: GroupCounts, unanswered: tuple[str, ...]
 ) -> Yield:
     return Yield(
         policy=policy,
@@ -158,7 +158,9 @@ def _make_yield(
     )
 
 
-def _funnel_steps(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tuple[FunnelStep, ...]:
+def _funnel_steps(
+    snapshot: TableSnapshot, dropped: IntArray, policy: Policy
+) -> tuple[FunnelStep, ...]:
     """Gates that the policy asks for, in order, after the groups that are not solved."""
     inactive = {
         "agreement": policy.min_agreement is None,
@@ -176,7 +178,7 @@ def _funnel_steps(snapshot: Snapshot, dropped: IntArray, policy: Policy) -> tupl
     return tuple(steps)
 
 
-def _yield_by_split(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
+def _yield_by_split(snapshot: TableSnapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
     everyone: Counter[str] = Counter()
     for (_, split), groups in snapshot.places.items():
         everyone[split] += groups
@@ -185,7 +187,7 @@ def _yield_by_split(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart,
     )
 
 
-def _yield_by_distance(snapshot: Snapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
+def _yield_by_distance(snapshot: TableSnapshot, total: GroupCounts) -> tuple[FunnelPart, ...]:
     """By distance of the ball; groups that have none under the policy stand apart, last."""
     groups, passing = total.distances.tolist()
     groups[-1] += snapshot.unsolved

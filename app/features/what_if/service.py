@@ -52,7 +52,7 @@ log = structlog.get_logger("touchline.yields")
 
 
 @dataclass(frozen=True)
-class Block:
+class TableBlock:
     """A block of a table, and what the present policy makes of it."""
 
     block: CachedBlock
@@ -88,7 +88,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class TableSnapshot:
     """A dataset's table with what is computed from it, all of one state.
 
     Attributes:
@@ -98,7 +98,7 @@ class Snapshot:
     """
 
     policy: Policy
-    blocks: tuple[Block, ...]
+    blocks: tuple[TableBlock, ...]
     bare: YieldTable
 
     @cached_property
@@ -138,7 +138,7 @@ class _YieldEntry:
     lock: threading.Lock = field(default_factory=threading.Lock)
     gathered: DatasetBlocks | None = None
     version: int | None = None
-    snapshot: Snapshot | None = None
+    snapshot: TableSnapshot | None = None
     read: tuple[int, int] = (0, 0)
     """How many groups are read, and how many are left: for who asks meanwhile."""
 
@@ -151,7 +151,7 @@ class YieldStore:
         self._lock = threading.Lock()
         self._kept: OrderedDict[int, _YieldEntry] = OrderedDict()
 
-    def snapshot(self, dataset_id: int) -> Snapshot:
+    def snapshot(self, dataset_id: int) -> TableSnapshot:
         """The table of a dataset as it is now; what has changed since the last look is read.
 
         Raises:
@@ -211,7 +211,9 @@ class YieldStore:
     def _folder(self, dataset_id: int) -> Path:
         return self._store.settings.yields / str(dataset_id)
 
-    def _try_refresh(self, dataset_id: int, kept: _YieldEntry, most: int | None) -> Snapshot | None:
+    def _try_refresh(
+        self, dataset_id: int, kept: _YieldEntry, most: int | None
+    ) -> TableSnapshot | None:
         try:
             return self._refresh_snapshot(dataset_id, kept, most)
         except NotFoundError:
@@ -222,7 +224,7 @@ class YieldStore:
 
     def _refresh_snapshot(
         self, dataset_id: int, kept: _YieldEntry, most: int | None
-    ) -> Snapshot | None:
+    ) -> TableSnapshot | None:
         """The snapshot as of now; None where more groups than ``most`` would have to be read."""
         while True:
             with self._store.read() as session:
@@ -269,19 +271,19 @@ class YieldStore:
         return known
 
     def _make_snapshot(
-        self, blocks: DatasetBlocks, policy: Policy, old: Snapshot | None
-    ) -> Snapshot:
+        self, blocks: DatasetBlocks, policy: Policy, old: TableSnapshot | None
+    ) -> TableSnapshot:
         """The snapshot of groups under a policy; what was judged before no longer is."""
         before = {id(part.table): part for part in old.blocks} if old is not None else {}
 
-        def judged_block(block: CachedBlock) -> Block:
+        def judged_block(block: CachedBlock) -> TableBlock:
             known = before.get(id(block.table))
             if known is not None and known.judged.policy.hash == policy.hash:
-                return known if known.block is block else Block(block, known.judged)
+                return known if known.block is block else TableBlock(block, known.judged)
             if known is None:
                 judged = cached_results(blocks.folder, block, policy)
                 if judged is not None:
-                    return Block(block, judged)
+                    return TableBlock(block, judged)
             table = block.table
             if known is not None:
                 judged = known.judged.judged_by(policy)
@@ -290,9 +292,11 @@ class YieldStore:
             if block.name:
                 judged.complete()
                 cache_results(blocks.folder, block, judged)
-            return Block(block, judged)
+            return TableBlock(block, judged)
 
-        return Snapshot(policy, tuple(map_in_threads(judged_block, blocks.blocks)), blocks.bare)
+        return TableSnapshot(
+            policy, tuple(map_in_threads(judged_block, blocks.blocks)), blocks.bare
+        )
 
     def _evict_snapshots(self) -> None:
         with self._lock:

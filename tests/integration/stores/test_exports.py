@@ -26,7 +26,7 @@ from app.errors import InputError, JobCancelled, NotFoundError, OverloadedError,
 from app.features.datasets.service import dataset_id
 from app.features.exports.jobs import ExportFolder, export_work
 from app.features.exports.service import export_dataset
-from app.features.imports.sources import Source, import_source
+from app.features.imports.sources import ImportSource, import_source
 from app.features.jobs import runner as job_run
 from app.features.jobs.runner import JobProgress
 from app.media.frames import Frames, SentPicture, make_picture
@@ -46,7 +46,7 @@ def imported(
     """A database with the dataset of the store."""
     settings = stored_settings(tmp_path_factory.mktemp("imported"), _server)
     with contextlib.closing(Store.open(settings)) as store:
-        source = Source("soccernet-v3", find_path(settings, filled_store))
+        source = ImportSource("soccernet-v3", find_path(settings, filled_store))
         done = import_source(store, "league", source, settings)
         assert done.complete
         again = import_source(store, "league", source, settings)

@@ -14,7 +14,7 @@ import pytest
 import structlog
 
 from app.db import database_worker as module
-from app.db.database_worker import Caller, run_in_worker, with_grace
+from app.db.database_worker import CallingServer, run_in_worker, with_grace
 from app.db.session import now
 from app.db.store import Store
 from app.errors import DamagedError, InputError, JobCancelled, NotFoundError
@@ -49,16 +49,16 @@ def run(
     )
 
 
-def name_process(own_store: Store, word: str, _caller: Caller) -> tuple[int, str, Path]:
+def name_process(own_store: Store, word: str, _caller: CallingServer) -> tuple[int, str, Path]:
     return os.getpid(), word, own_store.settings.home
 
 
-def count(_store: Store, last: int, caller: Caller) -> None:
+def count(_store: Store, last: int, caller: CallingServer) -> None:
     for number in range(1, last + 1):
         caller(number, last, "counting")
 
 
-def change_over(_store: Store, caller: Caller) -> None:
+def change_over(_store: Store, caller: CallingServer) -> None:
     caller(1, 9, "reading")
     caller(1, 9, "packing")
     caller(2, 9, "packing")
@@ -68,7 +68,7 @@ def log_a_word(*_: object) -> None:
     structlog.get_logger("touchline.tests").warning("seen")
 
 
-def count_slowly(_store: Store, mark: Path, caller: Caller) -> None:
+def count_slowly(_store: Store, mark: Path, caller: CallingServer) -> None:
     try:
         for number in range(10_000):
             caller(number)
@@ -77,25 +77,25 @@ def count_slowly(_store: Store, mark: Path, caller: Caller) -> None:
         mark.write_text("put away")
 
 
-def never_look_up(_store: Store, caller: Caller) -> None:
+def never_look_up(_store: Store, caller: CallingServer) -> None:
     caller(1)
     time.sleep(SECONDS)
 
 
-def take_turn(_store: Store, mark: Path, caller: Caller) -> None:
+def take_turn(_store: Store, mark: Path, caller: CallingServer) -> None:
     caller.__enter__()
     mark.write_text("taken")
     time.sleep(SECONDS)
 
 
-def ask(_store: Store, question: str, caller: Caller) -> str:
+def ask(_store: Store, question: str, caller: CallingServer) -> str:
     try:
         return f"answered {caller.ask(question)}"
     except NotFoundError as error:
         return f"refused: {error.message}"
 
 
-def write(own_store: Store, _caller: Caller) -> None:
+def write(own_store: Store, _caller: CallingServer) -> None:
     with own_store.write() as session:
         insert_dataset_row(session, "made apart", PAPER, now())
 

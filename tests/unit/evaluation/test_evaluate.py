@@ -5,7 +5,13 @@ from dataclasses import replace
 import pytest
 
 from app.evaluation.bootstrap import Resamples
-from app.evaluation.evaluate import Inputs, Options, boxes_figure, boxes_table, evaluate
+from app.evaluation.evaluate import (
+    EvaluationInputs,
+    EvaluationOptions,
+    boxes_figure,
+    boxes_table,
+    evaluate,
+)
 from app.evaluation.frame import Detection
 from app.evaluation.result import FrameRange
 from app.soccer.frames import Box
@@ -29,13 +35,17 @@ def found_in(frames, kind: str) -> dict[int, list[Detection]]:
 
 class TestEvaluate:
     def test_the_truth_itself_is_perfect(self, frames) -> None:
-        result = evaluate(frames, Inputs(found_in(frames, "optimized")), Options(resamples=50))
+        result = evaluate(
+            frames, EvaluationInputs(found_in(frames, "optimized")), EvaluationOptions(resamples=50)
+        )
         assert result.table("detection").cell("all", "ap_50").value == 1
         assert result.table("localization").cell("oracle", "mae_m").value == pytest.approx(0)
         assert result.table("localization").cell("oracle_all", "p_2m").value == 1
 
     def test_loose_boxes_are_found_and_misplaced(self, frames) -> None:
-        result = evaluate(frames, Inputs(found_in(frames, "annotated")), Options(resamples=50))
+        result = evaluate(
+            frames, EvaluationInputs(found_in(frames, "annotated")), EvaluationOptions(resamples=50)
+        )
         assert result.table("detection").cell("all", "ap_50").value == 1
         assert result.table("detection").cell("all", "ap").value < 0.5
         assert result.table("localization").cell("oracle", "mae_percent").value == pytest.approx(20)
@@ -46,7 +56,7 @@ class TestEvaluate:
         found[9] = [Detection(Box(5, 5, 9, 9), 0.99)]
         found[10] = [Detection(Box(5, 5, 9, 9), 0.99)] * 2
         del found[1]
-        counts = evaluate(frames, Inputs(found), Options(resamples=50)).counts
+        counts = evaluate(frames, EvaluationInputs(found), EvaluationOptions(resamples=50)).counts
         assert {name: counts[name] for name in ("frames", "judged", "balls", "without_ball")} == {
             "frames": 10, "judged": 9, "balls": 8, "without_ball": 1,
         }  # fmt: skip
@@ -56,22 +66,28 @@ class TestEvaluate:
     def test_what_is_found_without_a_ball_costs_precision(self, frames) -> None:
         found = found_in(frames, "optimized")
         found[9] = [Detection(Box(5, 5, 9, 9), 0.99)]
-        result = evaluate(frames, Inputs(found), Options(resamples=50))
+        result = evaluate(frames, EvaluationInputs(found), EvaluationOptions(resamples=50))
         assert result.table("detection").cell("all", "ap_50").value == pytest.approx(8 / 9)
 
     def test_the_same_seed_gives_the_same_intervals(self, frames) -> None:
-        found = Inputs(found_in(frames, "annotated"))
-        first, again = (evaluate(frames, found, Options(resamples=50, seed=7)) for _ in range(2))
+        found = EvaluationInputs(found_in(frames, "annotated"))
+        first, again = (
+            evaluate(frames, found, EvaluationOptions(resamples=50, seed=7)) for _ in range(2)
+        )
         assert first == again
 
     def test_only_what_the_inputs_allow_is_there(self, frames) -> None:
         careful = {frame.id: frame.boxes["exact"] for frame in frames if frame.boxes}
-        result = evaluate(frames, Inputs(careful=careful), Options(resamples=50))
+        result = evaluate(
+            frames, EvaluationInputs(careful=careful), EvaluationOptions(resamples=50)
+        )
         assert [table.name for table in result.tables] == ["boxes", "sensitivity"]
         assert [figure.name for figure in result.figures] == ["box_overlap", "sensitivity"]
         cameras = {frame.id: camera_at(50.0) for frame in frames}
         whole = evaluate(
-            frames, Inputs(found_in(frames, "exact"), careful, cameras), Options(resamples=50)
+            frames,
+            EvaluationInputs(found_in(frames, "exact"), careful, cameras),
+            EvaluationOptions(resamples=50),
         )
         assert {table.name for table in whole.tables} == {
             "detection", "localization", "detection_by_size", "detection_by_distance",
@@ -80,7 +96,9 @@ class TestEvaluate:
         assert len(whole.figures) == 8
 
     def test_rows_name_the_frames_behind_them(self, frames) -> None:
-        result = evaluate(frames, Inputs(found_in(frames, "optimized")), Options(resamples=50))
+        result = evaluate(
+            frames, EvaluationInputs(found_in(frames, "optimized")), EvaluationOptions(resamples=50)
+        )
         table = result.table("detection_by_distance")
         for row in table.rows:
             inside = [
@@ -125,7 +143,9 @@ class TestBoxesTable:
         bare = replace(bare, boxes={"annotated": bare.boxes["annotated"]})
         careful = {1: frame.boxes["exact"], 2: frame.boxes["exact"]}
         result = evaluate(
-            [frame, bare], Inputs(careful=careful), Options(boxes="annotated", resamples=20)
+            [frame, bare],
+            EvaluationInputs(careful=careful),
+            EvaluationOptions(boxes="annotated", resamples=20),
         )
         table = result.table("boxes")
         opening = {row.name: row.frames for row in table.rows if row.frames}
@@ -226,7 +246,11 @@ class TestBoxesFigure:
 
     def test_a_run_with_careful_boxes_has_it(self, make_frame) -> None:
         frame = make_frame(1)
-        result = evaluate([frame], Inputs(careful={1: frame.boxes["exact"]}), Options(resamples=20))
+        result = evaluate(
+            [frame],
+            EvaluationInputs(careful={1: frame.boxes["exact"]}),
+            EvaluationOptions(resamples=20),
+        )
         (figure,) = [figure for figure in result.figures if figure.name == "box_overlap"]
         assert [len(series.x) for series in figure.panels[0].series] == [1, 1, 1]
 

@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from app.features.people.visibility_queries import EVERYTHING, Visibility
-from app.features.queue.changes import Change
+from app.features.queue.changes import LoggedChange
 from app.http.events import Listener, _change_event, first_event
 
 
@@ -25,13 +25,13 @@ def test_who_comes_once_a_dataset_is_gone_is_told_of_it_only_if_they_see_everyth
 ) -> None:
     async def ask() -> bool:
         feed = Listener(None, 5, sight, began=10)
-        return feed.is_told(Change(entry, 3, None, "delete", "eve"))
+        return feed.is_told(LoggedChange(entry, 3, None, "delete", "eve"))
 
     assert asyncio.run(ask()) is told
 
 
 def test_who_annotates_blind_is_told_no_id_of_the_log() -> None:
-    told = [_change_event(Change(41, 3, "demo", "verdict", "eve", 7, "x")), first_event(41)]
+    told = [_change_event(LoggedChange(41, 3, "demo", "verdict", "eve", 7, "x")), first_event(41)]
 
     async def read(numbered: bool) -> bytes:
         feed = Listener(None, 5, EVERYTHING, began=10, numbered=numbered)

@@ -11,7 +11,7 @@ import pytest
 from fastapi import FastAPI
 
 from app.http.errors import install_handlers
-from app.http.pages import PAGES, Site, install_pages, script_hashes
+from app.http.pages import PAGES, BrowserSite, install_pages, script_hashes
 
 
 class TestPages:
@@ -57,7 +57,7 @@ class TestPages:
     ) -> None:
         (static_folder / "index.html").write_text('<html lang="en"><p>')
         now = ["12-3"]
-        install_pages(plain_app, Site(static_folder), lambda: now[0])
+        install_pages(plain_app, BrowserSite(static_folder), lambda: now[0])
         client = client_of(plain_app)
         first = client.get("/")
         assert first.text == '<html data-moment="12-3" lang="en"><p>'
@@ -72,7 +72,7 @@ class TestPages:
     ) -> None:
         (static_folder / "index.html").write_text('<html lang="en"><p>')
         banner = ['{"text":"<b> \'""}']
-        install_pages(plain_app, Site(static_folder), lambda: "1-2", lambda: banner[0])
+        install_pages(plain_app, BrowserSite(static_folder), lambda: "1-2", lambda: banner[0])
         client = client_of(plain_app)
         first = client.get("/")
         (told,) = re.findall('data-banner="([^"]*)" ', first.text)
@@ -142,6 +142,6 @@ class TestPages:
         self, plain_app: FastAPI, client_of, tmp_path: Path
     ) -> None:
         install_handlers(plain_app)
-        install_pages(plain_app, Site(tmp_path / "none"))
+        install_pages(plain_app, BrowserSite(tmp_path / "none"))
         assert client_of(plain_app).get("/").status_code == 404
         assert client_of(plain_app).get("/static/main.js").status_code == 404

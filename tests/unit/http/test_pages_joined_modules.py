@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.http.pages import FOLDER, STATIC, JoinedModules, Site, digest
+from app.http.pages import FOLDER, STATIC, BrowserSite, JoinedModules, digest
 
 PAGE = b"""<html><head>
 \t<script type="module" async src="/static/ahead.js"></script>
@@ -43,7 +43,7 @@ def join(folder: Path) -> None:
 
 def asked_for(folder: Path) -> list[str]:
     """The modules that the page of a folder asks for."""
-    page = Site(folder).index()
+    page = BrowserSite(folder).index()
     assert page is not None
     return re.findall(r'(?:src|href)="/assets/\w+/([^"]+)"', page.html.decode())
 
@@ -51,7 +51,7 @@ def asked_for(folder: Path) -> list[str]:
 class TestJoinedModules:
     def test_the_page_asks_for_the_joined_files_and_for_nothing_else(self, folder) -> None:
         assert asked_for(folder) == ["built/ahead.js", "built/main.js", "built/chunk-1.js"]
-        page = Site(folder).index()
+        page = BrowserSite(folder).index()
         assert page is not None
         assert page.modules == ("built/ahead.js", "built/main.js", "built/chunk-1.js")
 
@@ -69,7 +69,7 @@ class TestJoinedModules:
     def test_who_changes_a_module_gets_the_modules_until_they_are_joined_again(
         self, folder, change
     ) -> None:
-        site = Site(folder)
+        site = BrowserSite(folder)
         change(folder)
         assert site.index().modules == ("ahead.js", "lib/a.js", "main.js", "lib/b.js")
         join(folder)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from app.features.groups.suggested_edits import (
-    Guide,
+    FixGuide,
     condition_sentence,
     edit_of_fix,
     guide_of_finding,
@@ -118,15 +118,15 @@ class TestOffers:
 
 class TestGuide:
     def test_says_which_marking_to_draw(self):
-        assert guide_of_fix(Fix("draw_marking", "a", MARKING)) == Guide("Draw it", draws=MARKING)
+        assert guide_of_fix(Fix("draw_marking", "a", MARKING)) == FixGuide("Draw it", draws=MARKING)
 
     def test_says_where_to_look_for_the_ball(self):
         place = ImagePoint(5.0, 6.0)
         found = guide_of_fix(Fix("look_ball", "a", to="b"), place)
-        assert found == Guide("Show the place", "is the ball here?", looks=place)
+        assert found == FixGuide("Show the place", "is the ball here?", looks=place)
 
     def test_says_that_the_picture_is_to_be_read(self):
-        assert guide_of_fix(Fix("read_paint", "a")) == Guide("Read its paint", reads=True)
+        assert guide_of_fix(Fix("read_paint", "a")) == FixGuide("Read its paint", reads=True)
 
     def test_where_an_edit_mends_nobody_is_led_anywhere(self):
         assert guide_of_fix(Fix("swap_sides", "a")) is None

@@ -15,7 +15,7 @@ from app.features.groups.state_snapshot import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import ingest
-from app.features.imports.sources import Source, import_source
+from app.features.imports.sources import ImportSource, import_source
 from app.features.solutions.service import solve_dataset, stale_groups
 from app.features.stations.service import load_station, submit_station
 from app.formats.camera_json import covariance_to_json
@@ -77,7 +77,7 @@ class TestIngestCameras:
         for sigma in (1e-3, 1.0):
             known = row_by_row(np.diag([1e-6] * 3 + [sigma**2] * 3 + [1e-6] * 2))
             (tmp_path / "camera_7_1.json").write_text(camera_file_text(camera, known, view.size))
-            source = Source("cameras", tmp_path)
+            source = ImportSource("cameras", tmp_path)
             assert import_source(store, "demo", source, store.settings).result.changed == 1
             again = import_source(store, "demo", source, store.settings).result
             assert (again.changed, again.unchanged) == (0, 1)

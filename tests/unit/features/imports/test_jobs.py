@@ -17,7 +17,7 @@ from app.errors import DamagedError, JobCancelled, TooLargeError
 from app.features.datasets.service import list_datasets
 from app.features.imports import jobs as imports
 from app.features.imports.jobs import ImportOutcome, import_in_worker
-from app.features.imports.sources import Source, import_source
+from app.features.imports.sources import ImportSource, import_source
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.progress import ReportProgress
 from app.soccer.group import Group
@@ -38,7 +38,7 @@ def apart(
     progress: ReportProgress = lambda *told: None,
     stop: Callable[[], None] = wanted,
 ) -> ImportOutcome:
-    source = Source("soccernet-v3", path, name="data")
+    source = ImportSource("soccernet-v3", path, name="data")
     return import_in_worker(
         store, dataset, source, actor="ann", dry_run=dry_run, progress=progress, stop=stop
     )
@@ -89,7 +89,7 @@ class TestImportInWorker:
         done: list[tuple[int, int | None, str]] = []
         outcome = apart(store, tree, progress=lambda *told: done.append(told))
         here = import_source(
-            store, "here", Source("soccernet-v3", tree, name="data"), store.settings
+            store, "here", ImportSource("soccernet-v3", tree, name="data"), store.settings
         )
         assert outcome == ImportOutcome(here.values(), True, None)
         assert done == [(1, None, "")]

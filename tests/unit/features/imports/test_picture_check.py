@@ -16,7 +16,7 @@ from app.db.store import Store
 from app.errors import JobCancelled
 from app.features.findings.queries import import_findings
 from app.features.imports.picture_check import NAMED, PictureCheck
-from app.features.imports.sources import Source, import_source
+from app.features.imports.sources import ImportSource, import_source
 from app.features.queue.tables import QueueModel
 from app.formats.report import Report
 from app.media import video as video_index
@@ -195,7 +195,7 @@ class TestImport:
         image = {"id": 1, "width": 72, "height": 128, "file_name": "7.jpg"}
         value = {"images": [image], "annotations": [], "categories": []}
         (tmp_path / "instances_default.json").write_text(json.dumps(value))
-        imported = import_source(store, "demo", Source("coco", tmp_path), store.settings)
+        imported = import_source(store, "demo", ImportSource("coco", tmp_path), store.settings)
         (remark,) = imported.values()["remarks"]
         assert "72 x 128 declared, the picture is 128 x 72" in remark
 
@@ -204,7 +204,7 @@ class TestImport:
     ) -> None:
         """Else a group whose gates pass would look as sound as any other."""
         write(tmp_path / "7.jpg", 128, 72)
-        source = Source("coco", tmp_path)
+        source = ImportSource("coco", tmp_path)
 
         def brought(width: int, height: int, dry_run: bool = False) -> tuple[int, list[str]]:
             image = {"id": 1, "width": width, "height": height, "file_name": "7.jpg"}

@@ -25,7 +25,7 @@ from app.features.imports.ingest import (
     ingest_unassigned,
     unassigned_frames,
 )
-from app.features.imports.sources import FORMATS, USERS, Source, import_source
+from app.features.imports.sources import FORMATS, USERS, ImportSource, import_source
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.formats import issia
@@ -60,7 +60,7 @@ def there_and_back(store: Store, form: str, out: Path, **options: object) -> dic
     """Export "demo" and import what was written as "again"."""
     export_dataset(store, "demo", form, out, everything=True)
     size = SIZE if form in USERS["size"] else None
-    source = Source(form, out, size=size, **options)  # type: ignore[arg-type]
+    source = ImportSource(form, out, size=size, **options)  # type: ignore[arg-type]
     imported = import_source(store, "again", source, store.settings)
     assert imported.report.problems == []
     return groups_of(store, "again")
@@ -121,7 +121,9 @@ class TestThereAndBack:
         there_and_back(store, form, tmp_path / "first")
         solve_dataset(store, "again")
         export_dataset(store, "again", form, tmp_path / "second", everything=True)
-        again = Source(form, tmp_path / "second", size=SIZE if form in USERS["size"] else None)
+        again = ImportSource(
+            form, tmp_path / "second", size=SIZE if form in USERS["size"] else None
+        )
         imported = import_source(store, "third", again, store.settings)
         assert imported.result.new == len(groups_of(store, "again"))
         assert hashes(store, "third") == hashes(store, "again")
@@ -139,7 +141,7 @@ class TestThereAndBack:
             (tmp_path / f"{name}.json").write_text(json.dumps(text))
         info = {"00002.jpg": {"league": "l", "season": "s", "match": "m", "ms_time": 7}}
         (tmp_path / "match_info.json").write_text(json.dumps(info))
-        source = Source("sn-calibration", tmp_path, size=SIZE)
+        source = ImportSource("sn-calibration", tmp_path, size=SIZE)
         import_source(store, "demo", source, store.settings)
         again = there_and_back(store, "sn-calibration", tmp_path / "out")
         assert hashes(store, "again") == hashes(store, "demo")
@@ -182,7 +184,7 @@ class TestThereAndBack:
         ]
         store_groups = [replace(make_group(7), views=tuple(views))]
         ingest(store, "again", store_groups, source="test", actor="ann")
-        source = Source("cameras", tmp_path / "out")
+        source = ImportSource("cameras", tmp_path / "out")
         imported = import_source(store, "again", source, store.settings)
         assert (imported.result.changed, imported.result.problems) == (2, [])
         (again,), (group,) = (groups_of(store, name).values() for name in ("again", "demo"))
@@ -197,7 +199,7 @@ class TestImportSource:
         for form in FORMATS:
             if form in ("cameras", "sn-calibration"):
                 continue
-            imported = import_source(store, "demo", Source(form, tmp_path), store.settings)
+            imported = import_source(store, "demo", ImportSource(form, tmp_path), store.settings)
             assert len(imported.report.problems) == 1, form
             assert not imported.imported_anything
         assert list_datasets(store) == []
@@ -222,7 +224,7 @@ class TestImportSource:
             if form == "cameras" or (form == "frames" and name == "still.jpg"):
                 continue
             for path in (tmp_path, tmp_path / name):
-                imported = import_source(store, "demo", Source(form, path), store.settings)
+                imported = import_source(store, "demo", ImportSource(form, path), store.settings)
                 sentence, advice = imported.nothing_read_error()
                 assert sentence == f"nothing could be imported: {path} {problem}", form
                 assert advice.startswith(hint)
@@ -233,14 +235,14 @@ class TestImportSource:
     def test_pictures_become_groups_of_one_view(self, store, tmp_path) -> None:
         for name in ("a.jpg", "b.jpg"):
             Image.new("RGB", (128, 72)).save(tmp_path / name)
-        imported = import_source(store, "demo", Source("frames", tmp_path), store.settings)
+        imported = import_source(store, "demo", ImportSource("frames", tmp_path), store.settings)
         assert (imported.complete, imported.result.new) == (True, 2)
         found = groups_of(store, "demo")
         assert {key: group.views[0].size for key, group in found.items()} == {
             "a.jpg": ImageSize(128, 72),
             "b.jpg": ImageSize(128, 72),
         }
-        again = import_source(store, "demo", Source("frames", tmp_path), store.settings)
+        again = import_source(store, "demo", ImportSource("frames", tmp_path), store.settings)
         assert (again.result.new, again.result.unchanged) == (0, 2)
 
     def test_an_import_that_was_killed_ends_in_the_same_state(
@@ -252,7 +254,7 @@ class TestImportSource:
         def kill(done: int) -> None:
             raise KeyboardInterrupt
 
-        source = Source("soccernet-v3", tmp_path)
+        source = ImportSource("soccernet-v3", tmp_path)
         with pytest.raises(KeyboardInterrupt):
             import_source(store, "demo", source, store.settings, kill)
         assert get_dataset(store, "demo").groups == 2
@@ -267,7 +269,7 @@ class TestImportSource:
         dense = [{"x": place / 2000, "y": 0.5} for place in range(2000)]
         lines = {"Middle line": dense, "Side line top": dense[:2]}
         (tmp_path / "00002.json").write_text(json.dumps(lines))
-        source = Source("sn-calibration", tmp_path, size=SIZE)
+        source = ImportSource("sn-calibration", tmp_path, size=SIZE)
         imported = import_source(store, "demo", source, store.settings)
         values = imported.values()
         assert (values["new"], values["outcome"]) == (1, "partial")
@@ -281,7 +283,7 @@ class TestImportSource:
 class TestDryRun:
     def test_says_what_would_happen_and_keeps_nothing(self, store, make_group, tmp_path) -> None:
         _write_labels(store, make_group, tmp_path)
-        source = Source("soccernet-v3", tmp_path)
+        source = ImportSource("soccernet-v3", tmp_path)
         dry = import_source(store, "demo", source, store.settings, dry_run=True)
         assert list_datasets(store) == []
         assert _log_size(store) == 0
@@ -292,7 +294,7 @@ class TestDryRun:
         self, store, make_group, tmp_path
     ) -> None:
         root = _write_labels(store, make_group, tmp_path)
-        source = Source("soccernet-v3", tmp_path)
+        source = ImportSource("soccernet-v3", tmp_path)
         import_source(store, "demo", source, store.settings)
         first = list_groups(store, get_dataset(store, "demo").id, limit=1).items[0].id
         ball = BallAnnotation(box=Box(500.0, 300.0, 14.0, 14.0))
@@ -316,8 +318,8 @@ class TestDryRun:
         monkeypatch.setattr("app.features.imports.ingest.BATCH", 1)
         fill(make_static(1), make_static(2), make_static(3), solved=False)
         export_dataset(store, "demo", "issia-3d", tmp_path, everything=True)
-        import_source(store, "again", Source("issia-3d", tmp_path), store.settings)
-        wider = Source("issia-3d", tmp_path, size=ImageSize(1921, 1080))
+        import_source(store, "again", ImportSource("issia-3d", tmp_path), store.settings)
+        wider = ImportSource("issia-3d", tmp_path, size=ImageSize(1921, 1080))
         dry = import_source(store, "again", wider, store.settings, dry_run=True)
         assert (dry.result.changed, dry.result.unchanged) == (3, 3)
         done = import_source(store, "again", wider, store.settings)
@@ -328,7 +330,7 @@ class TestDryRun:
         write_cameras(tmp_path, {"7": opposite})
         before = groups_of(store, "demo")
         dry = import_source(
-            store, "demo", Source("cameras", tmp_path), store.settings, dry_run=True
+            store, "demo", ImportSource("cameras", tmp_path), store.settings, dry_run=True
         )
         assert dry.result.changed == 1
         assert groups_of(store, "demo") == before
@@ -337,7 +339,7 @@ class TestDryRun:
 class TestSource:
     def test_a_source_with_a_name_does_not_tell_where_it_lies(self, store, tmp_path) -> None:
         (tmp_path / "Labels-v3.json").write_text("{")
-        source = Source("soccernet-v3", tmp_path, name="mine")
+        source = ImportSource("soccernet-v3", tmp_path, name="mine")
         imported = import_source(store, "demo", source, store.settings)
         text = json.dumps(imported.values())
         assert str(tmp_path) not in text
@@ -363,7 +365,7 @@ class TestRemarks:
         box = {"class": "Player team left", "points": {"x1": 1, "y1": 2, "x2": 3, "y2": 4}}
         image = {"imageMetadata": {"width": 1280, "height": 720}, "bboxes": [box], "lines": []}
         (tmp_path / "Labels-v3.json").write_text(json.dumps({"actions": {"7.png": image}}))
-        imported = import_source(store, "x", Source("soccernet-v3", tmp_path), store.settings)
+        imported = import_source(store, "x", ImportSource("soccernet-v3", tmp_path), store.settings)
         assert imported.values()["remarks"][0] == (
             'no ball was read from the 1 group; its boxes are of "Player team left" (1)'
         )
@@ -377,7 +379,7 @@ class TestRemarks:
             "categories": [{"id": 7, "name": "thing"}],
         }
         (tmp_path / "x.json").write_text(json.dumps(value))
-        plain = Source("coco", tmp_path, name="up.zip")
+        plain = ImportSource("coco", tmp_path, name="up.zip")
         dry = import_source(store, "x", plain, store.settings, dry_run=True).values()
         assert (dry["outcome"], dry["skipped"][0]["field"]) == ("partial", "categories")
         named = replace(plain, ball_category="Thing")
@@ -390,7 +392,7 @@ class TestRemarks:
         self, store: Store, tmp_path: Path
     ) -> None:
         (tmp_path / "a.json").write_text(json.dumps({"shapes": [], "imagePath": "a.jpg"}))
-        imported = import_source(store, "x", Source("coco", tmp_path), store.settings)
+        imported = import_source(store, "x", ImportSource("coco", tmp_path), store.settings)
         assert imported.nothing_read_error()[1].startswith("It looks like LabelMe")
 
     @pytest.mark.parametrize(
@@ -408,7 +410,9 @@ class TestRemarks:
         self, store: Store, tmp_path: Path, value: object, advice: str
     ) -> None:
         (tmp_path / "x.json").write_text(json.dumps(value))
-        imported = import_source(store, "x", Source("sn-calibration", tmp_path), store.settings)
+        imported = import_source(
+            store, "x", ImportSource("sn-calibration", tmp_path), store.settings
+        )
         sentence, hint = imported.nothing_read_error()
         assert (advice in sentence, "looks like" in hint) == (True, False)
 
@@ -431,7 +435,7 @@ class TestCheck:
     def test_an_option_that_a_format_does_not_use_is_refused(
         self, form: str, name: str, value: object, typed: str
     ) -> None:
-        source = replace(Source(form, Path("x")), **{name: value})  # type: ignore[arg-type]
+        source = replace(ImportSource(form, Path("x")), **{name: value})  # type: ignore[arg-type]
         if form in USERS[name]:
             source.check()
             return
@@ -442,7 +446,7 @@ class TestCheck:
     @pytest.mark.parametrize("form", ["cameras", "touchline"])
     def test_what_makes_no_dataset_takes_no_policy(self, form: str) -> None:
         with pytest.raises(InputError, match="does not use --policy"):
-            Source(form, Path("x")).check(policy=True)
+            ImportSource(form, Path("x")).check(policy=True)
 
     def test_the_browser_offers_the_options_that_a_format_uses(self) -> None:
         text = Path("static/state/import_formats.js").read_text(encoding="utf-8")
@@ -459,7 +463,7 @@ class TestCheck:
             assert found == {name for name in USERS if form in USERS[name]} - {"frames", "policy"}
 
     def test_nothing_is_imported_then(self, store: Store, tmp_path: Path) -> None:
-        source = Source("coco", tmp_path, size=SIZE)
+        source = ImportSource("coco", tmp_path, size=SIZE)
         with pytest.raises(InputError, match="coco does not use --size"):
             import_source(store, "new", source, store.settings)
         assert list_datasets(store) == []
@@ -469,7 +473,7 @@ class TestLinesOfAnotherDay:
     """Lines of static cameras that do not fit the cameras that were given."""
 
     @pytest.fixture
-    def source(self, tmp_path: Path) -> Source:
+    def source(self, tmp_path: Path) -> ImportSource:
         """Two cameras, both given, and lines that were drawn before they were moved."""
         folder, lines = issia_folder(tmp_path / "issia"), tmp_path / "lines"
         lines.mkdir()
@@ -477,10 +481,10 @@ class TestLinesOfAnotherDay:
             points = [{"x": 100.0 + 90 * n, "y": 900.0 - 7 * n * n} for n in range(9)]
             drawn = {"Middle line": points[:4], "Side line top": points[4:]}
             (lines / f"{name}.json").write_text(json.dumps(drawn))
-        return Source("issia", folder, lines=lines)
+        return ImportSource("issia", folder, lines=lines)
 
     def test_import_and_solve_say_what_does_not_pass_and_how_to_take_the_given(
-        self, store: Store, source: Source
+        self, store: Store, source: ImportSource
     ) -> None:
         imported = import_source(store, "old", source, store.settings)
         (told,) = [text for text in imported.report.remarks if "do not fit" in text]
@@ -501,7 +505,7 @@ class TestLinesOfAnotherDay:
         assert "importing the files again with `--calibration given`" in solved.sentence
 
     def test_given_asked_for_leaves_them_aside_also_those_of_before(
-        self, store: Store, source: Source
+        self, store: Store, source: ImportSource
     ) -> None:
         import_source(store, "old", source, store.settings)
         given = replace(source, calibration="given")
@@ -516,7 +520,7 @@ class TestLinesOfAnotherDay:
             ]  # fmt: skip
 
     def test_without_the_option_lines_of_an_earlier_import_stay(
-        self, store: Store, source: Source
+        self, store: Store, source: ImportSource
     ) -> None:
         import_source(store, "old", source, store.settings)
         import_source(store, "old", replace(source, lines=None), store.settings)
@@ -530,7 +534,7 @@ class TestMirroredPeople:
     def test_importing_again_mends_a_dataset_of_before_and_turns_nobody_twice(
         self, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        source = Source("issia", issia_folder(tmp_path / "issia"))
+        source = ImportSource("issia", issia_folder(tmp_path / "issia"))
 
         def people() -> list[list[float]]:
             (group,) = groups_of(store, "old").values()

@@ -20,7 +20,7 @@ from app.features.independent_annotations.gold import (
     unmark_group,
     wilson,
 )
-from app.features.independent_annotations.known_truth import Terms, begin_next
+from app.features.independent_annotations.known_truth import BatchTerms, begin_next
 from app.features.independent_annotations.queries import gold_truth
 from app.features.independent_annotations.service import submit_annotation
 from app.features.verdicts.service import set_verdict
@@ -38,13 +38,13 @@ def change(store, group_id, edit, actor):
 
 
 @pytest.fixture
-def terms(store, fill, make_group) -> Terms:
+def terms(store, fill, make_group) -> BatchTerms:
     """A batch of two groups of three; the third one is gold."""
     groups = fill(*(make_group(number) for number in (1, 2, 3)))
     judge(store, groups[2])
     mark_group(store, groups[2], "imported", actor="lea")
     dataset_id = load(store, groups[0]).dataset_id
-    return Terms(4, dataset_id, groups[:2], 2, True, "2000", gold_every=2)
+    return BatchTerms(4, dataset_id, groups[:2], 2, True, "2000", gold_every=2)
 
 
 class TestMark:

@@ -21,8 +21,8 @@ from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.independent_annotations.gold import TruthSource, read_report, start_with
 from app.features.independent_annotations.known_truth import (
+    BatchTerms,
     GoldChoice,
-    Terms,
     begin_next,
     mark_known,
 )
@@ -93,7 +93,7 @@ class TestSample:
     def test_errors_are_those_against_the_true_cameras_and_ball(self, store, scenes) -> None:
         chosen = mark_known(store, "demo", SAMPLE, actor="lea")
         assert (len(chosen.groups), chosen.left_out) == (3, 1)
-        terms = Terms(4, load(store, 1).dataset_id, [4], 1, True, "2000", gold_every=1)
+        terms = BatchTerms(4, load(store, 1).dataset_id, [4], 1, True, "2000", gold_every=1)
         take = begin_next(store, terms, person="ann")
         assert take is not None and take.kind == "gold"
         scene = scenes[take.group_id - 1]

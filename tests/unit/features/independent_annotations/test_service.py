@@ -18,7 +18,7 @@ from app.features.groups.submit import load, solve_and_keep, submit
 from app.features.independent_annotations.adopt import adopt_annotation, return_annotation
 from app.features.independent_annotations.gold import mark_group
 from app.features.independent_annotations.known_truth import (
-    Terms,
+    BatchTerms,
     begin_next,
     count_gold_left,
     is_gold_turn,
@@ -207,7 +207,7 @@ class TestStart:
         for group, start in zip(groups[3:], starts, strict=True):
             judge(store, group, actor="lea")
             mark_group(store, group, start, actor="lea")
-        terms = Terms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
+        terms = BatchTerms(7, load(store, groups[0]).dataset_id, groups[:3], 1, True, "2000", 2)
         kinds = []
         while (take := begin_next(store, terms, person="ann", chance=Random(3))) is not None:
             kinds.append(take.kind)
@@ -407,7 +407,7 @@ class TestBeginNext:
         groups = fill(make_group(1), make_group(2), make_group(3))
         dataset = load(store, groups[0]).dataset_id
         batch = make_batch(store, dataset, NewBatch("a", verdicts=2), actor="lea")
-        terms = Terms(batch.id, dataset, groups, 2, True, batch.created)
+        terms = BatchTerms(batch.id, dataset, groups, 2, True, batch.created)
 
         def left(person: str) -> int:
             with store.read() as session:
@@ -423,7 +423,7 @@ class TestBeginNext:
 
     def test_each_group_as_often_as_the_batch_asks(self, store, fill, make_group) -> None:
         groups = fill(make_group(1), make_group(2))
-        terms = Terms(5, load(store, groups[0]).dataset_id, groups, 2, True, "2000")
+        terms = BatchTerms(5, load(store, groups[0]).dataset_id, groups, 2, True, "2000")
         had = []
         for person in ("ann", "ben", "cleo"):
             while (take := begin_next(store, terms, person=person)) is not None:

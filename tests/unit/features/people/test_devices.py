@@ -8,13 +8,13 @@ from sqlalchemy import text
 
 from app.db.store import Store
 from app.features.people.devices import CHALLENGE_LASTS as LASTS
-from app.features.people.devices import Attempts, Challenges, StoredPending
+from app.features.people.devices import AttemptWindow, Challenges, StoredPending
 
 
 class TestAttempts:
     def test_tries_of_all_processes_count_in_one_moving_window(self, store: Store) -> None:
         at = [1000.0]
-        one, other = Attempts(store, lambda: at[0]), Attempts(store, lambda: at[0])
+        one, other = AttemptWindow(store, lambda: at[0]), AttemptWindow(store, lambda: at[0])
         assert [one.hit("ann", 3, 60.0), other.hit("ann", 3, 60.0)] == [None, None]
         at[0] = 1030.0
         assert one.hit("ann", 3, 60.0) is None
@@ -24,7 +24,7 @@ class TestAttempts:
         assert other.hit("ann", 3, 60.0) is None
 
     def test_who_is_refused_waits_for_no_writer(self, store: Store) -> None:
-        attempts = Attempts(store)
+        attempts = AttemptWindow(store)
         attempts.hit("ann", 1, 60.0)
         with store.write():
             # A write of its own would wait for this one, and be refused itself.

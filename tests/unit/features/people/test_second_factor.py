@@ -18,7 +18,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people import links
 from app.features.people import links as passwords
-from app.features.people.devices import Attempts
+from app.features.people.devices import AttemptWindow
 from app.features.people.logins import Login, Logins
 from app.features.people.roles import Role
 from app.features.people.second_factor import SecondFactors
@@ -134,7 +134,7 @@ class TestLogin:
         self, desk: Desk
     ) -> None:
         desk.enrol()
-        attempts = Attempts(desk.store)
+        attempts = AttemptWindow(desk.store)
 
         def count() -> None:
             assert attempts.hit("code/anna", 1, 3600.0) is None

@@ -13,7 +13,7 @@ from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
 from app.features.policies.service import change_policy
 from app.features.queue import changes as module
-from app.features.queue.changes import Change, read_changes, read_solved, read_solved_since
+from app.features.queue.changes import LoggedChange, read_changes, read_solved, read_solved_since
 from app.features.solutions.queries import newest_solution
 from app.features.solutions.service import solve_dataset
 from app.features.stations.service import load_station, submit_station
@@ -21,7 +21,7 @@ from app.features.verdicts.service import set_verdict
 from app.soccer.policy import STRICT
 
 
-def since(store: Store, after: int) -> list[Change]:
+def since(store: Store, after: int) -> list[LoggedChange]:
     with store.read() as session:
         return read_changes(session, after)
 
@@ -41,7 +41,7 @@ class TestReadChanges:
         judged = set_verdict(store, one, "deferred", if_match=edited.etag, actor="bob")
         found = get_dataset(store, "demo").id
         assert since(store, before) == [
-            Change(before + 2, found, "demo", "verdict", "bob", one, judged.etag)
+            LoggedChange(before + 2, found, "demo", "verdict", "bob", one, judged.etag)
         ]
         assert since(store, before + 2) == []
 

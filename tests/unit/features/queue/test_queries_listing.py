@@ -15,7 +15,7 @@ from app.db.store import Store
 from app.features.datasets.tables import GroupModel
 from app.features.queue.queries import (
     Listing,
-    Order,
+    RowOrder,
     compare_condition,
     count_states,
     find_place,
@@ -50,7 +50,7 @@ def session(listed: Store):
 
 
 OPEN = [compare_condition("status", "=", "unreviewed")]
-BY_SIGMA = Order("sigma_m", descending=True)
+BY_SIGMA = RowOrder("sigma_m", descending=True)
 
 
 class TestCounts:
@@ -103,7 +103,7 @@ class TestOrder:
 
     @pytest.mark.parametrize("column", ["number", "changed", "gate", "findings", "label"])
     def test_no_two_groups_have_the_same_keys(self, session: Session, column: str) -> None:
-        order = Order(column)
+        order = RowOrder(column)
         rows = read_rows(session, [1, 2, 3, 4], order)
         keys = [tuple(order.keys_of(row)) for row in rows]
         assert len(set(keys)) == 4
