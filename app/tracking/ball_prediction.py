@@ -27,19 +27,24 @@ def left_out(knots: Knots, fitted: Fitted, noise: FloatArray, known: BoolArray) 
         known: Whether the track holds there, by knot, shape (K,).
     """
     px = np.full(len(knots.rows), np.nan)
-    for knot in np.unique(knots.at[known[knots.at]]):
-        rays = np.arange(knots.starts[knot], knots.starts[knot + 1])
-        root = np.sqrt(fitted.weight[rays])[:, None]
-        miss = (root * fitted.miss[rays]).ravel()
-        slope = (root[:, :, None] * fitted.slope[rays]).reshape(-1, 3)
-        spread = fitted.covariance[knot, :3, :3]
-        lever = slope @ spread @ slope.T
-        if np.linalg.eigvalsh(lever)[-1] > _MOST:
-            continue
+    count = np.diff(knots.starts)
+    for rays_each in np.unique(count[known & (count > 0)]):
+        # All instants with as many rays at once.
+        at = np.flatnonzero(known & (count == rays_each))
+        rays = knots.starts[at, None] + np.arange(rays_each)
+        root = np.sqrt(fitted.weight[rays])[:, :, None]
+        miss = (root * fitted.miss[rays]).reshape(len(at), -1)
+        slope = (root[:, :, :, None] * fitted.slope[rays]).reshape(len(at), -1, 3)
+        spread = fitted.covariance[at, :3, :3]
+        back = spread @ slope.transpose(0, 2, 1)
+        lever = slope @ back
+        held = np.linalg.eigvalsh(lever)[:, -1] <= _MOST
+        rays, miss, lever, back = rays[held], miss[held], lever[held], back[held]
         # The ball goes where the others put it.
-        moved = spread @ slope.T @ np.linalg.solve(np.eye(len(miss)) - lever, miss)
-        alone = fitted.miss[rays] + fitted.slope[rays] @ moved
-        px[rays] = np.linalg.norm(alone, axis=1) * noise[rays] * knots.scale[rays]
+        push = np.linalg.solve(np.eye(miss.shape[1]) - lever, miss[:, :, None])
+        moved = (back @ push)[:, None, :, 0]
+        alone = fitted.miss[rays] + (fitted.slope[rays] @ moved[..., None])[..., 0]
+        px[rays] = np.linalg.norm(alone, axis=2) * noise[rays] * knots.scale[rays]
     return px
 
 

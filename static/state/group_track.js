@@ -62,12 +62,12 @@ export function startGroupTrack() {
 			if (since !== undefined && performance.now() - since < FRESH) return undefined;
 			const stop = new AbortController();
 			const edited = found.peek()?.group === id;
-			const timer = setTimeout(() => {
-				read(id, etag, `${at.dataset.id} ${match}`, stop.signal).catch((error) => {
-					// It is asked about again with the next change.
-					if (!stop.signal.aborted && !(error instanceof ApiError)) throw error;
-				});
-			}, edited ? 0 : PAUSE);
+			const ask = () => read(id, etag, `${at.dataset.id} ${match}`, stop.signal).catch((error) => {
+				// It is asked about again with the next change.
+				if (!stop.signal.aborted && !(error instanceof ApiError)) throw error;
+			});
+			// The page is drawn anew behind this: what was edited is asked about before that.
+			const timer = edited ? void ask() : setTimeout(ask, PAUSE);
 			return () => { clearTimeout(timer); stop.abort(); };
 		});
 	});

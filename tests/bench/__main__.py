@@ -38,6 +38,7 @@ from tests.bench.rigs import bench_rigs
 from tests.bench.shipped import bench_shipped
 from tests.bench.shots import bench_shots
 from tests.bench.track import bench_track
+from tests.bench.track_edits import bench_track_edits
 from tests.bench.truth import bench_truth
 
 REAL_DATA = Path(
@@ -81,6 +82,7 @@ def main() -> None:
     bench_requests()
     bench_listeners()
     bench_browser()
+    bench_track_edits(REAL_DATA)
     bench_page_loads()
 
 

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -113,6 +114,7 @@ class StoredStretch(Protocol):
 Stored = TypeVar("Stored", bound=StoredStretch)
 
 
+@lru_cache(maxsize=2**16)
 def frame_of(key: str) -> int | None:
     """The number of a group's frame, which ends its key; None where none does."""
     number = _NUMBER.fullmatch(key)
