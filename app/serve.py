@@ -105,7 +105,7 @@ def _require_safe(settings: Settings) -> None:
 def _make_sample(settings: Settings) -> None:
     """The dataset ``sample``, where it is missing or not complete."""
     from app.features.practice.service import SAMPLE, make_sample_dataset
-    from app.sample.order import SampleOrder
+    from app.sample import SampleOrder
     from app.workers.executors import executor_of
 
     folder, pool = settings.home / SAMPLE, partial(executor_of, settings)

@@ -24,6 +24,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.progress import ReportProgress
+from app.sample import RECORDING_SECONDS, SEED, SHORTEST_RECORDING
 from app.sample.cameras import HEIGHT, WIDTH, is_inside_image
 from app.sample.film import (
     Backdrop,
@@ -34,7 +35,6 @@ from app.sample.film import (
     render_picture,
 )
 from app.sample.fixture import make_fixture
-from app.sample.order import RECORDING_SECONDS, SEED, SHORTEST_RECORDING
 from app.sample.play import BALL_DIAMETER, TEAM, Play, make_play, shirt_numbers
 from app.sample.props import Image, draw_scoreboard
 

@@ -22,8 +22,8 @@ from app.formats.soccernet_v3 import ARCHIVE
 from app.formats.soccernet_v3_writer import write_soccernet_v3
 from app.json_text import json_text
 from app.progress import ReportProgress
+from app.sample import GROUPS, SEED
 from app.sample.fixture import group_counts, make_fixture
-from app.sample.order import GROUPS, SEED
 from app.sample.render import render
 from app.sample.scene import TRUTH, TruthWriter, truth_to_json
 from app.sample.scenes import make_match

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from app.sample.order import RECORDING_SECONDS
+from app.sample import RECORDING_SECONDS
 from app.sample.recording import write_recording
 from app.tracking.ball_follow import follow_ball
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall, FollowHints

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.geometry.camera import Camera
-from app.sample.order import SEED
+from app.sample import SEED
 from app.soccer.policy import PAPER
 from app.solving.solve import solve
 from tests.bench.paint import WORSE_PX, Shot, field_error, shots_of

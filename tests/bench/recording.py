@@ -19,7 +19,7 @@ from app.config import Settings
 from app.formats.camera_json import camera_from_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.sample.order import RECORDING_SECONDS
+from app.sample import RECORDING_SECONDS
 from app.sample.recording import write_recording
 from app.tracking.ball_rays import BallRays, ball_rays
 from app.tracking.clip import Clip

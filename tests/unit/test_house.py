@@ -19,7 +19,6 @@ BELOW = {
 }
 """What modules of each kind import, in their own feature and in others."""
 VALUES = {
-    "groups.digest",
     "imports.upload_quota",
     "solutions.codec",
 }

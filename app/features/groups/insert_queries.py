@@ -13,9 +13,9 @@ from app.db.dialects.dialect import larger_of
 from app.db.json_columns import pack
 from app.db.session import Session, UsedIdModel
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
-from app.features.groups.digest import group_inputs_hash, station_digest, view_digest
 from app.json_text import canonical
 from app.soccer import codec
+from app.soccer.codec import group_inputs_hash, station_digest, view_digest
 from app.soccer.group import Group, Station, View
 
 

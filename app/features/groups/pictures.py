@@ -16,7 +16,6 @@ from app.errors import (
     StorageError,
     TooLargeError,
 )
-from app.features.groups.digest import digest
 from app.features.paint.proposal_queries import Proposal
 from app.geometry.camera import Camera
 from app.media.files import read_pixels
@@ -25,6 +24,7 @@ from app.paint.evidence import Image
 from app.paint.view_paint import hiding_boxes, read_paint_of_image, why_unreadable
 from app.paint.view_proposal import ViewProposal, keep_undrawn_markings, propose_lines_in_image
 from app.soccer.annotation import Lines
+from app.soccer.codec import digest
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Media, View
 from app.soccer.paint_evidence import (

@@ -8,14 +8,19 @@ from dataclasses import dataclass, replace
 from app.db.log import Entry, append, station_entries
 from app.db.session import Session, now
 from app.features.findings.queries import replace_station_finding, station_finding
-from app.features.groups.digest import station_digest, view_digest
 from app.features.groups.insert_queries import NewRows
 from app.features.groups.queries import StoredGroup
 from app.features.groups.revision_queries import keeps_station, refresh_inputs_hashes
 from app.features.groups.view_queries import StoredStation, groups_of_station, save_station
 from app.features.imports.queries import shared_stations
 from app.features.queue.refresh_queries import refresh_queue
-from app.soccer.codec import camera_of_log_entry, station_from_json, station_to_json
+from app.soccer.codec import (
+    camera_of_log_entry,
+    station_digest,
+    station_from_json,
+    station_to_json,
+    view_digest,
+)
 from app.soccer.group import Group, Station, View
 
 KIND = "upstream_changed"

@@ -12,7 +12,6 @@ from app.db.log import LogEntry, read_log, verify_chain
 from app.db.session import Session
 from app.db.store import Store
 from app.features.findings.queries import DISMISSAL
-from app.features.groups.digest import station_digest, view_digest
 from app.features.groups.edit_codec import edit_from_json, station_edit_from_json
 from app.features.groups.insert_queries import group_values, station_values, view_values
 from app.features.groups.projection_queries import replace_all_rows
@@ -33,7 +32,9 @@ from app.soccer.codec import (
     extras_from_json,
     policy_from_json,
     positions_from_json,
+    station_digest,
     station_from_json,
+    view_digest,
     view_from_json,
 )
 from app.soccer.group import Group, Station

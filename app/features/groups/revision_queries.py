@@ -20,7 +20,6 @@ from app.features.datasets.tables import (
     ViewModel,
 )
 from app.features.findings.queries import DismissalModel
-from app.features.groups.digest import inputs_hash, station_digest, view_digest
 from app.features.groups.insert_queries import (
     NewRows,
     group_values,
@@ -35,6 +34,7 @@ from app.features.paint.queries import paint_digests
 from app.features.solutions.queries import SolutionModel, is_current
 from app.features.verdicts.tables import VerdictModel
 from app.soccer import codec
+from app.soccer.codec import inputs_hash, station_digest, view_digest
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 

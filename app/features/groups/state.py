@@ -17,7 +17,6 @@ from app.features.findings.queries import (
     import_findings,
     read_import_findings,
 )
-from app.features.groups.digest import digest
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.revision_queries import find_etag_row, read_etag_rows
 from app.features.groups.undo_stacks import UndoStacks, read_stacks
@@ -25,6 +24,7 @@ from app.features.groups.view_queries import StoredStation
 from app.features.people.visibility_queries import COPIES
 from app.features.solutions.queries import SolutionKey, read_solutions
 from app.features.verdicts.queries import StoredVerdict, is_fixed, read_last_verdicts
+from app.soccer.codec import digest
 from app.soccer.finding import Dismissal, Finding
 from app.soccer.group import Group
 from app.soccer.policy import Policy

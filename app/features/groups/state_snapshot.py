@@ -11,7 +11,6 @@ from typing import Any
 from app.db.json_columns import unpack
 from app.db.session import Session
 from app.features.datasets.queries import dataset_rows, policy_from_row
-from app.features.groups.digest import group_inputs_hash
 from app.features.groups.projection_queries import (
     all_dismissals,
     all_groups,
@@ -22,7 +21,7 @@ from app.features.groups.projection_queries import (
 )
 from app.features.groups.queries import StoredGroup
 from app.soccer.annotation import Extras
-from app.soccer.codec import extras_from_json, paint_to_json
+from app.soccer.codec import extras_from_json, group_inputs_hash, paint_to_json
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy

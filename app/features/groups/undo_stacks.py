@@ -19,7 +19,6 @@ from app.db.log import (
 )
 from app.db.session import Session
 from app.errors import ConflictError
-from app.features.groups.digest import digest, station_digest, view_digest
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
 from app.features.groups.state_snapshot import StateSnapshot, StationRecord
@@ -27,8 +26,11 @@ from app.features.groups.view_queries import StoredStation
 from app.features.imports.queries import shared_stations
 from app.soccer.codec import (
     camera_of_log_entry,
+    digest,
     group_without_views_to_json,
+    station_digest,
     station_from_json,
+    view_digest,
     view_from_json,
 )
 from app.soccer.group import Group, Station, View

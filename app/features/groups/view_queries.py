@@ -12,14 +12,13 @@ from sqlalchemy import ColumnElement, select, update
 from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
-from app.features.groups.digest import station_digest
 from app.features.groups.insert_queries import station_values
 from app.features.queue.queries import Condition
 from app.features.queue.tables import QueueModel
 from app.geometry.camera import Camera
 from app.soccer import codec
 from app.soccer.annotation import BallAnnotation, Lines
-from app.soccer.codec import ball_from_json
+from app.soccer.codec import ball_from_json, station_digest
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media, Station
 from app.soccer.picture import PictureGeometry

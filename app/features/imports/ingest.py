@@ -21,7 +21,6 @@ from app.features.findings.queries import (
     groups_with_finding,
     replace_group_findings,
 )
-from app.features.groups.digest import source_hash
 from app.features.groups.edit import SetPaint, SetPositions
 from app.features.groups.insert_queries import NewRows
 from app.features.groups.pictures import mark_outdated_where_people_moved
@@ -55,7 +54,7 @@ from app.formats.report import Report
 from app.object_store.path import is_address
 from app.progress import ReportProgress
 from app.soccer.annotation import Extras
-from app.soccer.codec import extras_from_json
+from app.soccer.codec import extras_from_json, source_hash
 from app.soccer.group import Group, View
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, Policy

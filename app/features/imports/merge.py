@@ -15,7 +15,6 @@ from app.errors import DatasetFormatError, InputError
 from app.features.datasets.queries import find_dataset
 from app.features.datasets.service import insert_dataset
 from app.features.findings.queries import replace_station_finding, station_finding
-from app.features.groups.digest import station_digest
 from app.features.groups.queries import read_groups
 from app.features.groups.reimport import KIND, SharedStations
 from app.features.groups.revision_queries import refresh_inputs_hashes
@@ -61,7 +60,7 @@ from app.formats.file_tree import FileTree, Limits, Root
 from app.formats.report import Report
 from app.formats.trees import opened_tree
 from app.progress import ReportProgress
-from app.soccer.codec import station_to_json
+from app.soccer.codec import station_digest, station_to_json
 from app.soccer.group import Group, Station
 
 

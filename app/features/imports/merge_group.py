@@ -9,7 +9,6 @@ from typing import Any
 from app.db.log import Entry, append
 from app.db.session import Session, now
 from app.features.findings.queries import dismissals_to_merge, group_findings, insert_dismissal
-from app.features.groups.digest import station_digest, view_digest
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.reimport import KeptEdit
 from app.features.groups.revision_queries import save_group
@@ -20,6 +19,7 @@ from app.features.imports.merge_parse import MergeGroup
 from app.features.imports.queries import VERDICT, group_verdicts
 from app.features.pitches.service import give_pitch
 from app.features.verdicts.queries import StoredVerdict, insert_verdicts, next_verdict_id
+from app.soccer.codec import station_digest, view_digest
 from app.soccer.finding import Dismissal
 from app.soccer.group import Group, View
 

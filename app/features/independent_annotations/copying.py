@@ -11,7 +11,6 @@ from app.db.log import LogEntry, group_entries
 from app.db.session import Session
 from app.features.datasets.queries import find_dataset, policy_from_row
 from app.features.datasets.service import insert_dataset, save_policy
-from app.features.groups.digest import source_hash
 from app.features.groups.edit import SetPaint
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
@@ -26,7 +25,7 @@ from app.features.independent_annotations.queries import (
     gold_start,
 )
 from app.features.paint.queries import PAINT, insert_readings, read_readings
-from app.soccer.codec import view_from_json
+from app.soccer.codec import source_hash, view_from_json
 from app.soccer.group import Group, Station, View
 
 SOURCE = "copy"

@@ -28,7 +28,6 @@ from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.features.comments.service import examine_threads
 from app.features.datasets.queries import unread_uploads, unused_calibrations, unused_frames
 from app.features.datasets.service import list_datasets
-from app.features.groups.digest import group_inputs_hash, station_digest, view_digest
 from app.features.groups.projection_queries import all_groups, all_stations
 from app.features.groups.replay import replay_log
 from app.features.groups.state_snapshot import StateSnapshot, read_state_snapshot
@@ -47,7 +46,7 @@ from app.features.solutions.service import stale_groups
 from app.features.what_if.service import examine_yields
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
-from app.soccer.codec import paint_to_json
+from app.soccer.codec import group_inputs_hash, paint_to_json, station_digest, view_digest
 from app.wording import plural
 
 

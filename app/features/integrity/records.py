@@ -15,7 +15,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.datasets.queries import policy_from_row
-from app.features.groups.digest import group_inputs_hash
 from app.features.groups.queries import read_groups
 from app.features.people.queries import all_dataset_roles, all_people
 from app.features.people.roles import PERSON
@@ -42,7 +41,7 @@ from app.features.versions.frozen_queries import (
 )
 from app.features.versions.queries import VersionRow, all_versions, annotation_rows
 from app.features.versions.service import calibration_names, version_hash
-from app.soccer.codec import paint_to_json, policy_from_json
+from app.soccer.codec import group_inputs_hash, paint_to_json, policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution

@@ -18,7 +18,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import DatasetHead, read_dataset_head
-from app.features.groups.digest import digest
 from app.features.groups.edit import Edit, SetPositions
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.group_edits import edit_groups
@@ -33,6 +32,7 @@ from app.features.match_estimates.queries import (
 )
 from app.features.solutions.queries import read_calibrations
 from app.progress import ReportProgress
+from app.soccer.codec import digest
 from app.soccer.group import Group, SharedPosition, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy

@@ -13,9 +13,8 @@ from app.db.json_columns import Json, as_written, parse
 from app.db.log import LogEntry, LogModel, read_entries
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
-from app.features.groups.digest import digest
 from app.json_text import canonical
-from app.soccer.codec import picture_from_json, positions_from_json
+from app.soccer.codec import digest, picture_from_json, positions_from_json
 from app.soccer.group import SharedPosition
 from app.soccer.picture import PictureGeometry
 

@@ -13,7 +13,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError
 from app.features.datasets.service import DatasetHead, need_dataset, read_dataset_head
-from app.features.groups.digest import digest
 from app.features.groups.edit import SetStationCamera
 from app.features.groups.queries import read_groups
 from app.features.groups.undo_stacks import read_station_stacks
@@ -23,7 +22,7 @@ from app.features.stations.service import StationState, load_station, submit_sta
 from app.formats.report import Report
 from app.formats.sn_calibration_reader import read_line_files
 from app.soccer.annotation import Lines
-from app.soccer.codec import lines_to_json
+from app.soccer.codec import digest, lines_to_json
 from app.soccer.frames import ImagePoint
 from app.soccer.group import View
 from app.soccer.pitch import Pitch

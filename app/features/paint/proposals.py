@@ -15,7 +15,6 @@ from typing import Any
 from app.db.store import Store
 from app.errors import ImageError, NotFoundError, TooLargeError
 from app.features.datasets.service import DatasetHead, need_dataset, require_matches
-from app.features.groups.digest import digest, station_digest
 from app.features.groups.pictures import UNREADABLE, PictureTask, ProposalTask, read_proposal
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.groups.state import read_group_head
@@ -33,7 +32,7 @@ from app.features.paint.proposal_queries import Proposal as Proposal
 from app.media.frames import VideoIndexer
 from app.paint.propose import SEARCH_VERSION
 from app.progress import ReportProgress
-from app.soccer.codec import camera_to_json
+from app.soccer.codec import camera_to_json, digest, station_digest
 from app.worker_pool import WorkerPool
 from app.worker_process import COUNTS, WorkerLimits
 

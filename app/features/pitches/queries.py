@@ -14,9 +14,8 @@ from app.db.json_columns import parse
 from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Base, Session
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
-from app.features.groups.digest import digest
 from app.soccer.annotation import Lines
-from app.soccer.codec import lines_from_json, picture_from_json
+from app.soccer.codec import digest, lines_from_json, picture_from_json
 from app.soccer.finding import PITCH_SIZE
 from app.soccer.frames import ImageSize
 from app.soccer.pitch import Pitch

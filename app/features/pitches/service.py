@@ -17,7 +17,6 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import GeometryError, InputError
 from app.features.datasets.service import need_match, read_dataset_head
-from app.features.groups.digest import digest
 from app.features.groups.edit import SetPitch
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.group_edits import edit_groups
@@ -36,6 +35,7 @@ from app.features.pitches.queries import (
 )
 from app.features.queue.refresh_queries import refresh_queue
 from app.progress import ReportProgress
+from app.soccer.codec import digest
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy, digested_calibration
 from app.soccer.solution import SOLVER_VERSION

@@ -16,9 +16,9 @@ from app.db.session import Session
 from app.db.store import Store
 from app.errors import InputError
 from app.features.datasets.service import read_dataset_head, save_policy
-from app.features.groups.digest import digest
 from app.features.groups.state import require_etag
 from app.features.policies.queries import PolicyVersion, policy_history
+from app.soccer.codec import digest
 from app.soccer.group import Group
 from app.soccer.policy import (
     CALIBRATION,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from app.durable import keep_private
-from app.sample.order import GROUPS, RECORDING_SECONDS, SEED, SHORTEST_RECORDING, SampleOrder
+from app.sample import GROUPS, RECORDING_SECONDS, SEED, SHORTEST_RECORDING, SampleOrder
 from app.terminal.options import Json, Workers, current_actor, read_settings
 from app.terminal.server import opened_store
 from app.terminal.terminal import print_values, show_progress

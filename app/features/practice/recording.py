@@ -36,7 +36,7 @@ from app.features.recordings.links import list_links
 from app.features.recordings.service import Recording, add_recording, list_recordings
 from app.features.recordings.shots import Shot, get_shots, put_shots
 from app.progress import ReportProgress, partial_progress
-from app.sample.order import SEED
+from app.sample import SEED
 from app.soccer.policy import TOUCHLINE
 
 DATASET = "recording practice"

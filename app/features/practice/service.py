@@ -36,7 +36,7 @@ from app.features.practice.recording import recording_practice_work, require_own
 from app.features.solutions.service import solve_dataset
 from app.formats.soccernet_v3 import ARCHIVE
 from app.progress import ReportProgress, partial_progress
-from app.sample.order import SampleOrder
+from app.sample import SampleOrder
 from app.sample.scene import TRUTH, SceneTruth, read_truth
 from app.sample.write import SampleReport, write_sample
 from app.soccer.policy import PAPER

@@ -33,7 +33,6 @@ from app.evaluation.result import (
 from app.evaluation.track_scores import TrueTrack, evaluate_tracks
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import DatasetHead, read_dataset_head
-from app.features.groups.digest import digest
 from app.features.predictions import queries as frame_rows
 from app.features.predictions.frames import truth_pins
 from app.features.predictions.queries import (
@@ -54,6 +53,7 @@ from app.features.versions.service import Version
 from app.formats.safe_path import resolve_inside
 from app.formats.tracks_writer import folder_name
 from app.json_text import json_text
+from app.soccer.codec import digest
 from app.soccer.solution import SOLVER_VERSION
 
 MAX_PAGE = 500

@@ -11,7 +11,6 @@ from app.db.session import Session
 from app.errors import ConflictError, InputError
 from app.evaluation.frame import Frame
 from app.features.datasets.service import DatasetHead
-from app.features.groups.digest import digest
 from app.features.groups.state import read_states
 from app.features.groups.view_queries import present_ids
 from app.features.versions.membership import read_candidates, require_solved
@@ -21,7 +20,7 @@ from app.formats.manifest import software_version
 from app.json_text import quoted
 from app.soccer.ball_boxes import ball_boxes, has_ball_3d
 from app.soccer.choices import LiveRule
-from app.soccer.codec import policy_to_json
+from app.soccer.codec import digest, policy_to_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION, Solution

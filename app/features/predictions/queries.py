@@ -13,7 +13,6 @@ from app.db.json_columns import Json, as_written, pack, parse, unpack
 from app.db.session import Session
 from app.evaluation.prediction_run import PredictedTrack
 from app.features.datasets.tables import DatasetModel, ViewModel
-from app.features.groups.digest import digest
 from app.features.groups.insert_queries import next_id
 from app.features.people.visibility_queries import columns_shown
 from app.features.predictions.tables import (
@@ -26,7 +25,7 @@ from app.features.predictions.tables import (
 )
 from app.geometry.camera import Camera
 from app.json_text import canonical
-from app.soccer.codec import camera_from_json, camera_to_json
+from app.soccer.codec import camera_from_json, camera_to_json, digest
 
 _BATCH = 5000
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from app.db.json_columns import Json, as_written, pack, parse, unpack
-from app.features.groups.digest import digest
+from app.soccer.codec import digest
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 
 _COLUMNS = {"x": 3, "y": 3, "diameter": 3, "sigma_px": 3, "confidence": 3}

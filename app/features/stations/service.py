@@ -12,7 +12,6 @@ from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.queries import dataset_name
-from app.features.groups.digest import group_inputs_hash
 from app.features.groups.edit import SetStationLines, StationEdit, with_station
 from app.features.groups.edit_codec import (
     edit_and_inverse_to_json,
@@ -38,6 +37,7 @@ from app.features.groups.view_queries import (
 from app.features.queue.refresh_queries import refresh_queue
 from app.features.solutions.queries import EncodedSolution, SolutionKey, insert_solutions
 from app.features.solutions.service import known_calibrations, solve_encoded
+from app.soccer.codec import group_inputs_hash
 from app.soccer.group import Group, Station
 from app.soccer.solution import Calibration
 

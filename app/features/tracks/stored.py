@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 
 from app.db.json_columns import as_written, parse
-from app.features.groups.digest import digest
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
 from app.features.tracks.queries import TrackGroup
 from app.features.tracks.run_measurements import FollowedRun, followed_states
 from app.features.tracks.stretches import StoredStretch, frame_of
+from app.soccer.codec import digest
 from app.soccer.policy import Policy
 from app.soccer.solution import SOLVER_VERSION
 from app.tracking.ball_track import BallTrack, Correction

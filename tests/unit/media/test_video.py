@@ -13,8 +13,7 @@ from app.errors import ImageError, NotFoundError, TooLargeError
 from app.media import files as media_module
 from app.media import video as video_index
 from app.media.files import decode_frame, has_index, read_frame, video_times
-from app.media.frames import Frames
-from app.media.neighbours import neighbouring_frames
+from app.media.frames import Frames, neighbouring_frames
 from app.soccer.group import Media
 from tests.videos import delay_start, number_of, vary_times, write_video
 

@@ -11,7 +11,7 @@ import pytest
 
 from app.errors import InputError
 from app.formats.camera_json import camera_from_json
-from app.sample.order import RECORDING_SECONDS
+from app.sample import RECORDING_SECONDS
 from app.sample.recording import FPS, PARTS, ShotPlan, draw_logo, plan_shots, write_recording
 from tests.bench.shots import read_clip
 

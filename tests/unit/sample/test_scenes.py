@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from app.sample import SEED
 from app.sample.cameras import MIN_PARALLAX, PITCH, parallax_angle_at_ball
-from app.sample.order import SEED
 from app.sample.scene import Scene
 from app.sample.scenes import BOX_EXCESS, loose_box, make_match, true_ball_box, visible_paths
 from app.soccer.frames import Box

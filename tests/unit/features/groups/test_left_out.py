@@ -8,7 +8,6 @@ import pytest
 
 from app.errors import InputError
 from app.features.exports.service import export_dataset
-from app.features.groups.digest import group_inputs_hash, source_hash
 from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.history import redo, undo
@@ -27,6 +26,7 @@ from app.features.versions.verify import verify
 from app.formats.file_tree import DEFAULT_LIMITS
 from app.formats.report import Report
 from app.soccer.annotation import BallAnnotation, make_lines
+from app.soccer.codec import group_inputs_hash, source_hash
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group, LeftOut, Station, View
 from tests.balls import seen

@@ -15,7 +15,6 @@ from app.db.log import verify_chain
 from app.db.store import Store
 from app.errors import InputError, JobCancelled, NotFoundError
 from app.features.groups import pictures as proposal_reading
-from app.features.groups.digest import station_digest
 from app.features.groups.edit import SetLines
 from app.features.groups.history import read_history, undo
 from app.features.groups.pictures import MISSING
@@ -37,6 +36,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.versions.frozen_queries import freeze_annotations, thaw_group
 from app.media.files import has_index
 from app.paint.view_proposal import ViewProposal
+from app.soccer.codec import station_digest
 from app.soccer.group import Group, Media, Station, View
 from tests.cameras import SIZE
 from tests.unit.applications import lines_of

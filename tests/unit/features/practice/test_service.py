@@ -11,7 +11,7 @@ from app.db.store import Store
 from app.errors import JobCancelled
 from app.features.datasets.service import get_dataset, list_datasets
 from app.features.practice.service import SampleDataset, make_sample_dataset
-from app.sample.order import SampleOrder
+from app.sample import SampleOrder
 from app.sample.scene import read_truth
 from app.sample.write import SampleReport
 
