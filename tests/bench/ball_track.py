@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,7 @@ def bench_ball_track(data: Path = DATA, seeds: int = 3) -> None:
         rigs = {"ISSIA's cameras": bundled}
         _print_left_out(clicks, {"given": given, "bundled": bundled})
         _print_jumps(clicks, given, bundled)
+        _print_neighbours(clicks, {"given": given, "bundled": bundled})
     rows = []
     for name, cameras in rigs.items():
         for noise, missing in ((0.0, 0.0), (0.0, 0.3), (0.5, 0.3)):
@@ -368,6 +370,35 @@ def _print_left_out(clicks: Sequence[Click], rigs: Mapping[str, Mapping[str, Cam
     header = ("ISSIA, frames left out in all cameras", "clicks", "predicted", "px, median", "p95")
     header += ("interpolated", "contradicted", "CPU s")
     print_table("Does the ball's track predict what it was made without?", header, rows)
+
+
+def _print_neighbours(clicks: Sequence[Click], rigs: Mapping[str, Mapping[str, Camera]]) -> None:
+    """How far apart two cameras of one side put a ball on the grass, each by its own ray."""
+    by_frame: dict[int, dict[str, tuple[float, float]]] = {}
+    for click in clicks:
+        by_frame.setdefault(click.frame, {})[click.view] = click.pixel
+    rows = []
+    for name, cameras in rigs.items():
+        for one, other in combinations(sorted(cameras), 2):
+            if cameras[one].position[1] * cameras[other].position[1] < 0:
+                continue
+            seen = [views for views in by_frame.values() if one in views and other in views]
+            if not seen:
+                continue
+            places = [
+                cameras[view].on_ground(np.array([[*views[view]] for views in seen]))
+                for view in (one, other)
+            ]
+            apart = places[0] - places[1]
+            # Along their rays a ball in the air is elsewhere for both.
+            low = np.abs(apart[:, 1]) < 1.5
+            if low.sum() < 10:
+                continue
+            median, spread = np.median(apart[low], axis=0), apart[low].std(axis=0)
+            rows.append([f"{name} cameras, {one} and {other}", int(low.sum()), *median, *spread])
+    header = ("ISSIA, cameras of one side", "frames on the grass", "m apart along the pitch")
+    header += ("across", "their spread", "across")
+    print_table("Where do neighbours put a ball that rolls?", header, rows)
 
 
 def _print_jumps(
