@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from datetime import date, datetime
+from datetime import datetime
 from threading import Lock
 from typing import Annotated, Any
 
@@ -48,26 +48,19 @@ MAX_ID = 2**63 - 1
 class _TimeFormat:
     """How a time of a value that is served is told; the value itself keeps the text of the database."""
 
-    def __init__(self, kind: type[date]):
-        self._kind = kind
-
     def __get_pydantic_core_schema__(self, _source: Any, _handler: Any) -> Any:
         # What starts fast, such as the command line, does not import pydantic.
         from pydantic_core import core_schema
 
-        told = (
-            core_schema.datetime_schema() if self._kind is datetime else core_schema.date_schema()
-        )
+        told = core_schema.datetime_schema()
         written = core_schema.plain_serializer_function_ser_schema(
-            self._kind.fromisoformat, return_schema=told, when_used="json"
+            datetime.fromisoformat, return_schema=told, when_used="json"
         )
         return {**told, "serialization": written}
 
 
-Moment = Annotated[str, _TimeFormat(datetime)]
+Moment = Annotated[str, _TimeFormat()]
 """A time as ``text_of`` writes it; RFC 3339 where it is served."""
-Day = Annotated[str, _TimeFormat(date)]
-"""A day, ISO 8601."""
 
 
 def finite(value: Any) -> Any:

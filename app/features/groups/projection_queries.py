@@ -59,15 +59,15 @@ def _all_rows(
         yield dict(row._mapping)
 
 
-def all_unassigned(session: Session) -> Iterator[Any]:
+def all_unassigned(session: Session) -> Sequence[UnassignedFrameModel]:
     """The row of every unassigned frame."""
-    return iter(session.execute(select(*UnassignedFrameModel.__table__.columns)))
+    return session.rows(UnassignedFrameModel, select(*UnassignedFrameModel.__table__.columns))
 
 
-def all_import_findings(session: Session) -> Iterator[Any]:
+def all_import_findings(session: Session) -> Sequence[ImportFindingModel]:
     """The row of everything that imports noticed; what was computed or seen of pictures is not among it."""
     statement = select(*ImportFindingModel.__table__.columns)
-    return iter(session.execute(statement.where(ImportFindingModel.kind.not_in(SEEN))))
+    return session.rows(ImportFindingModel, statement.where(ImportFindingModel.kind.not_in(SEEN)))
 
 
 def replace_all_rows(

@@ -123,8 +123,8 @@ def read_state_snapshot(session: Session) -> StateSnapshot:
     for unassigned in all_unassigned(session):
         place = (unassigned.dataset_id, unassigned.camera, unassigned.frame)
         snapshot.unassigned[place] = extras_from_json(unpack(unassigned.extras))
-    for row in all_import_findings(session):
-        snapshot.noticed.add((row.group_id, row.station_id, row.view, row.sentence))
+    for noticed in all_import_findings(session):
+        snapshot.noticed.add((noticed.group_id, noticed.station_id, noticed.view, noticed.sentence))
     return snapshot
 
 

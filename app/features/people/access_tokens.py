@@ -21,6 +21,7 @@ from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError, NotLoggedInError
 from app.features.people.links import token_hash
 from app.features.people.login_queries import (
+    TokenRow,
     access_tokens,
     delete_access_token,
     delete_expired_token,
@@ -219,7 +220,7 @@ class AccessTokens:
             )
             return self._token_from_row(row)
 
-    def _token_from_row(self, row: Any) -> AccessToken:
+    def _token_from_row(self, row: TokenRow) -> AccessToken:
         names = ("id", "person", "name", "start", "dataset", "created", "expires", "used")
         values = {name: getattr(row, name) for name in names}
         expired = row.expires <= text_of(self._clock())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from functools import cache
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from sqlalchemy import (
     Index,
@@ -283,6 +283,23 @@ def count_linked(session: Session, issuer: str, people: list[int]) -> int:
     return len(session.scalars(statement).all())
 
 
+class TokenRow(NamedTuple):
+    """A token of a script with the name and role of its person, and the name of its ``dataset``."""
+
+    id: int
+    person_id: int
+    dataset_id: int | None
+    name: str
+    start: str
+    scopes: str
+    created: str
+    expires: str
+    used: str | None
+    person: str
+    role: str
+    dataset: str | None
+
+
 _ALL_TOKENS = (
     select(
         *(column for column in AccessTokenModel.__table__.c if column.name != "token_hash"),
@@ -319,11 +336,11 @@ def _access_token_statement(leading: tuple[str, ...]) -> Select[*tuple[Any, ...]
     )
 
 
-def access_tokens(session: Session, person_id: int | None = None) -> Sequence[Any]:
+def access_tokens(session: Session, person_id: int | None = None) -> Sequence[TokenRow]:
     """The tokens of a person, or of everybody, expired ones too; the newest of each first."""
     statement = _ALL_TOKENS.order_by(PersonModel.name, AccessTokenModel.id.desc())
     mine = AccessTokenModel.person_id == person_id
-    return session.execute(statement if person_id is None else statement.where(mine)).all()
+    return session.rows(TokenRow, statement if person_id is None else statement.where(mine))
 
 
 def count_access_tokens(session: Session) -> dict[int, int]:

@@ -12,7 +12,7 @@ from app.features.groups.solution_schemas import FailingGate
 from app.features.policies.schemas import PolicyDocument
 from app.features.predictions.evaluation_routes import FrameList
 from app.http.documents import Document, json_of
-from app.json_text import Day, Moment
+from app.json_text import Moment
 from app.soccer.policy import PAPER
 from app.soccer.solution import Gate
 
@@ -49,17 +49,15 @@ class Match:
     """A frozen value as it is served."""
 
     begins: Moment
-    day: Day
     ended: Moment | None = None
     length_m: float = float("nan")
 
 
 class TestJsonOf:
-    def test_a_value_tells_times_in_utc_with_a_z_and_days_as_they_are(self) -> None:
-        match = Match("2026-11-28T21:00:00.000000+00:00", "2026-11-28")
+    def test_a_value_tells_times_in_utc_with_a_z(self) -> None:
+        match = Match("2026-11-28T21:00:00.000000+00:00")
         assert json.loads(json_of(match)) == {
             "begins": "2026-11-28T21:00:00Z",
-            "day": "2026-11-28",
             "ended": None,
             "length_m": None,
         }
@@ -68,12 +66,12 @@ class TestJsonOf:
         class Page(Document):
             match: Match
 
-        match = Match("2026-11-28T21:00:00.250000+00:00", "2026-11-28")
+        match = Match("2026-11-28T21:00:00.250000+00:00")
         assert json.loads(json_of(Page(match=match)))["match"] == json.loads(json_of(match))
 
     @pytest.mark.parametrize("bad", [float("inf"), float("-inf")])
     def test_a_number_that_is_not_finite_is_null(self, bad: float) -> None:
-        match = Match("2026-11-28T21:00:00+00:00", "2026-11-28", length_m=bad)
+        match = Match("2026-11-28T21:00:00+00:00", length_m=bad)
         assert json.loads(json_of(match))["length_m"] is None
 
 

@@ -161,7 +161,7 @@ class TestUsers:
         again = run("users", "adopt", "bob")
         assert isinstance(again.exception, ConflictError)
         assert "what was done as local is shown as anna's" in str(again.exception)
-        assert str(run("users", "adopt", "carl").exception) == "there is no carl"
+        assert str(run("users", "adopt", "carl").exception) == "there is no user carl"
 
     def test_a_second_factor_is_required_and_taken_away(self, store: Store) -> None:
         links.use_link(store, token_in(run("users", "add", "anna").stdout), SECRET)
