@@ -102,7 +102,7 @@ WHEN_ALL = ON_BOTH | {
     "features/datasets/test_queries_datasets.py",
     "features/groups/test_revision_queries_etags.py",
     "features/jobs/test_queries.py",
-    "features/groups/test_projection_queries.py",
+    "features/groups/test_state_snapshot_queries.py",
     "features/datasets/test_queries_removal.py",
     "features/solutions/test_queries.py",
     "features/groups/test_view_queries_views.py",

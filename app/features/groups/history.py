@@ -16,7 +16,7 @@ from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
 from app.features.groups.state import GroupState, GroupWithoutSolution, need_group
-from app.features.groups.state_snapshot import StateSnapshot, StationRecord
+from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
 from app.features.groups.submit import EditOptions, GroupChange, Plan, submit_change
 from app.features.groups.undo_stacks import undo_entry_body
 from app.features.people.visibility_queries import reads_blind, shown_entries

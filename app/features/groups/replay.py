@@ -14,13 +14,13 @@ from app.db.store import Store
 from app.features.findings.queries import DISMISSAL
 from app.features.groups.edit_codec import edit_from_json, station_edit_from_json
 from app.features.groups.insert_queries import group_values, station_values, view_values
-from app.features.groups.projection_queries import replace_all_rows
 from app.features.groups.reimport import KIND
-from app.features.groups.state_snapshot import (
+from app.features.groups.state_snapshot_queries import (
     GroupRecord,
     StateSnapshot,
     StationRecord,
     ViewRecord,
+    replace_all_rows,
     without_station,
 )
 from app.features.match_estimates.queries import NOISE, POSITION
@@ -346,20 +346,20 @@ _STEPS: dict[str, Callable[[StateSnapshot, LogEntry], None]] = {
     DISMISSAL: _replay_dismissal,
     "spare": _replay_unassigned,
     # What a batch did stands in the verdicts themselves.
-    "verdict_batch": lambda _ledger, _entry: None,
-    "verdict_batch_undo": lambda _ledger, _entry: None,
+    "verdict_batch": lambda _snapshot, _entry: None,
+    "verdict_batch_undo": lambda _snapshot, _entry: None,
     # Versions have tables of their own, which nothing rebuilds and nothing changes.
-    "freeze": lambda _ledger, _entry: None,
+    "freeze": lambda _snapshot, _entry: None,
     # What was taken over from a person's own annotation stands in the edits and the verdict.
-    "take": lambda _ledger, _entry: None,
-    "agreement": lambda _ledger, _entry: None,
+    "take": lambda _snapshot, _entry: None,
+    "agreement": lambda _snapshot, _entry: None,
     # Gold groups, guidelines, comments, accounts and work that is given out have tables of their own.
-    "gold": lambda _ledger, _entry: None,
-    "guideline": lambda _ledger, _entry: None,
-    "comment": lambda _ledger, _entry: None,
+    "gold": lambda _snapshot, _entry: None,
+    "guideline": lambda _snapshot, _entry: None,
+    "comment": lambda _snapshot, _entry: None,
     # Jobs and other deeds change nothing that was said.
-    "job": lambda _ledger, _entry: None,
-    "deed": lambda _ledger, _entry: None,
-    "person": lambda _ledger, _entry: None,
-    "work": lambda _ledger, _entry: None,
+    "job": lambda _snapshot, _entry: None,
+    "deed": lambda _snapshot, _entry: None,
+    "person": lambda _snapshot, _entry: None,
+    "work": lambda _snapshot, _entry: None,
 }

@@ -21,7 +21,7 @@ from app.db.session import Session
 from app.errors import ConflictError
 from app.features.groups.queries import StoredGroup
 from app.features.groups.replay import apply_entry
-from app.features.groups.state_snapshot import StateSnapshot, StationRecord
+from app.features.groups.state_snapshot_queries import StateSnapshot, StationRecord
 from app.features.groups.view_queries import StoredStation
 from app.features.imports.queries import shared_stations
 from app.soccer.codec import (

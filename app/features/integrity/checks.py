@@ -28,9 +28,13 @@ from app.errors import ConflictError, InputError, ReviewError, StorageError
 from app.features.comments.service import examine_threads
 from app.features.datasets.queries import unread_uploads, unused_calibrations, unused_frames
 from app.features.datasets.service import list_datasets
-from app.features.groups.projection_queries import all_groups, all_stations
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import StateSnapshot, read_state_snapshot
+from app.features.groups.state_snapshot_queries import (
+    StateSnapshot,
+    all_groups,
+    all_stations,
+    read_state_snapshot,
+)
 from app.features.guidelines.queries import GUIDELINE, all_guidelines
 from app.features.integrity.records import (
     DELETED,

@@ -23,7 +23,7 @@ from app.features.comments.service import begin_thread
 from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.history import read_history, redo, undo
 from app.features.groups.replay import _STEPS, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit, submit_all
 from app.features.imports.ingest import ingest
 from app.features.jobs.queries import NewJob, insert_job, read_jobs

@@ -14,7 +14,7 @@ from app.features.datasets.service import delete_dataset, get_dataset, list_data
 from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import UnassignedFrame, ingest, ingest_unassigned
 from app.features.people.access_tokens import AccessTokens

@@ -12,7 +12,7 @@ from app.features.groups.edit import IncludeView, SetLines, set_ball
 from app.features.groups.edit_codec import edit_from_json
 from app.features.groups.history import redo, undo
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.imports.merge import merge_edits

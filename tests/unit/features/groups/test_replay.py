@@ -11,7 +11,7 @@ from app.features.groups.edit import IncludeView, SetLines, SetStationLines, set
 from app.features.groups.group_edits import apply_noise_factors
 from app.features.groups.history import redo, undo
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import UnassignedFrame, ingest, ingest_unassigned

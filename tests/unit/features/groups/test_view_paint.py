@@ -12,7 +12,7 @@ from app.errors import OverloadedError
 from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.history import read_history, redo, undo
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, preview, submit
 from app.features.groups.view_paint import PaintFollower
 from app.features.paint.service import take_back_paint

@@ -4,7 +4,7 @@ import pytest
 
 from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.body import GONE
 from app.features.imports.ingest import ingest

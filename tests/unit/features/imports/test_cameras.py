@@ -11,7 +11,7 @@ from app.features.datasets.service import get_dataset
 from app.features.exports.service import export_dataset
 from app.features.groups.edit import SetLines, SetStationCamera
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.ingest import ingest

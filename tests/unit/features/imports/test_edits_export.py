@@ -24,7 +24,7 @@ from app.features.groups.edit import (
 )
 from app.features.groups.history import read_history, undo
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.cameras import ingest_cameras
 from app.features.imports.edits_export import GROUPS, STATIONS

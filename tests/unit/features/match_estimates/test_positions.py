@@ -10,7 +10,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import SetLines, SetPicture
 from app.features.groups.history import read_history, undo
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.match_estimates import positions as editing

@@ -18,7 +18,7 @@ from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.history import read_history, undo
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.edits_export import group_to_merge
 from app.features.imports.ingest import ingest

@@ -12,7 +12,7 @@ from app.features.findings.service import finding_values
 from app.features.groups.edit import SetLines
 from app.features.groups.history import read_history, undo
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
 from app.features.pitches.service import (

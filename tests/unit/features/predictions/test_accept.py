@@ -9,7 +9,7 @@ from app.evaluation.frame import Detection
 from app.features.groups.edit import set_ball
 from app.features.groups.history import read_history, undo
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.predictions.accept import (
     AcceptRequest,

@@ -11,7 +11,7 @@ import pytest
 
 from app.db.store import Store
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.recordings.ball_runs import get_run
 from app.features.recordings.follow import follow_hints
 from app.features.recordings.queries import update_recording

@@ -19,7 +19,7 @@ from app.errors import ConflictError, InputError, JobCancelled
 from app.features.datasets.queries import unused_frames
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.imports.cameras import ingest_cameras
 from app.features.recordings import camera_tracking as module
 from app.features.recordings.camera_tracking import Tracked, track_now, track_stretch

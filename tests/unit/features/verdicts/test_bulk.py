@@ -16,7 +16,7 @@ from app.features.datasets.tables import GroupModel
 from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
 from app.features.groups.state import VerdictState
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ensure_dataset
 from app.features.queue.refresh_queries import refresh_queue

@@ -8,7 +8,7 @@ from sqlalchemy import text, update
 from app.errors import ConflictError, NotFoundError
 from app.features.groups.edit import set_ball
 from app.features.groups.replay import replay_log
-from app.features.groups.state_snapshot import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load, submit
 from app.features.queue.service import list_groups
 from app.features.queue.tables import QueueModel

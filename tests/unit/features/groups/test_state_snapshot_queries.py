@@ -5,7 +5,8 @@ from sqlalchemy import insert, select
 from app.db.dialects.dialect import dialect_in
 from app.db.store import Store
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
-from app.features.groups.projection_queries import (
+from app.features.groups.queries import upsert_unassigned
+from app.features.groups.state_snapshot_queries import (
     all_groups,
     all_import_findings,
     all_stations,
@@ -13,7 +14,6 @@ from app.features.groups.projection_queries import (
     all_verdicts,
     replace_all_rows,
 )
-from app.features.groups.queries import upsert_unassigned
 from app.features.paint.proposal_queries import Proposal, read_proposals, save_proposals
 from app.features.predictions.tables import PredictionModel, PredictionSetModel
 from app.features.verdicts.queries import StoredVerdict, insert_verdicts
