@@ -26,6 +26,7 @@ from app.wording import plural
 
 if TYPE_CHECKING:
     from app.evaluation.result import Cell, Table
+    from app.features.predictions.detect import OnnxModel
     from app.features.predictions.evaluation_run import SourcesRequest
 
 
@@ -37,6 +38,7 @@ Query = Annotated[
 
 
 BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
+FILM = "Frames of a recording"
 CAREFUL, TRUTH, RESULT = "Reference boxes", "The truth", "The result"
 Predictions = Annotated[
     Path | None,
@@ -173,7 +175,9 @@ def accept(
 @commands.command()
 def detect(
     dataset: Dataset,
-    model: Annotated[Path, typer.Option("--model", help="MODEL.onnx, as Ultralytics exports it.")],
+    model: Annotated[
+        Path | None, typer.Option("--model", help="MODEL.onnx, as Ultralytics exports it.")
+    ] = None,
     name: Annotated[
         str | None,
         typer.Option(help="Name of the set of predictions; default: that of the model."),
@@ -193,6 +197,27 @@ def detect(
             min=32, max=4096, help="Side of the model's input in pixels, where it is variable."
         ),
     ] = None,
+    recording: Annotated[
+        str | None,
+        typer.Option(
+            help="Look at the frames of this recording instead; what is found are candidates where a ball is followed.",
+            rich_help_panel=FILM,
+        ),
+    ] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRST-LAST", help="Of the recording; default: all.", rich_help_panel=FILM
+        ),
+    ] = None,
+    boxes: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True,
+            help="Boxes that were made elsewhere, instead of --model.",
+            rich_help_panel=FILM,
+        ),
+    ] = None,
     workers: Workers = None,
     json_: Json = False,
 ) -> None:
@@ -200,12 +225,24 @@ def detect(
     from app.features.predictions.detect import DetectRequest, OnnxModel
     from app.features.predictions.detect import run_detector as run_detect
 
+    source = model if boxes is None else boxes
+    if source is None or (model is not None and boxes is not None):
+        raise typer.BadParameter("name --model, or --boxes with --recording")
+    if recording is None and (frames is not None or boxes is not None):
+        raise typer.BadParameter("--frames and --boxes are of a --recording")
+    if recording is not None and (query or missing):
+        raise typer.BadParameter("--query and --missing choose groups, not frames of a recording")
     settings = read_settings()
-    opened = OnnxModel.open(
-        model, category=category, side=side, threads=workers or settings.workers
-    )
+    opened = None
+    if model is not None:
+        threads = workers or settings.workers
+        opened = OnnxModel.open(model, category=category, side=side, threads=threads)
+    if opened is None or recording is not None:
+        place = dataset, recording or "", frames
+        _detect_in_film(place, opened or source, name or source.stem, min_score, json_)
+        return
     with opened_store() as store, show_progress("Detecting") as progress:
-        request = DetectRequest(name or model.stem, query, missing, min_score)
+        request = DetectRequest(name or source.stem, query, missing, min_score)
         found = run_detect(
             store, dataset, opened, request, actor=current_actor(), progress=progress
         )
@@ -219,6 +256,59 @@ def detect(
     say(
         f"They stay predictions; touchline accept --dataset {dataset} {found.name} takes them over."
     )
+
+
+def _detect_in_film(
+    place: tuple[str, str, str | None],
+    source: OnnxModel | Path,
+    name: str,
+    min_score: float,
+    json_: bool,
+) -> None:
+    """What a detector, or a file of boxes, says of frames of a recording."""
+    from app.features.recordings.frame_boxes import (
+        detect_in_frames,
+        find_recording,
+        read_boxes_of_file,
+    )
+
+    dataset, recording, frames = place
+    numbers = None if frames is None else _frames_of(frames)
+    with opened_store() as store, show_progress("Detecting") as progress:
+        found, by = find_recording(store, dataset, recording), current_actor()
+        if isinstance(source, Path):
+            if numbers is not None:
+                raise typer.BadParameter("--frames are those that a --model looks at")
+            kept = read_boxes_of_file(store, found, source, name, min_score=min_score, actor=by)
+        else:
+            kept = detect_in_frames(
+                store,
+                found,
+                source,
+                name,
+                numbers,
+                min_score=min_score,
+                actor=by,
+                progress=progress,
+            )
+    if json_:
+        print_json(vars(kept))
+        return
+    say(
+        f"{plural(kept.boxes, 'box', 'boxes')} in {kept.frames:,} of {plural(kept.looked_at, 'frame')} "
+        f"of {recording}; they are candidates where a ball is followed"
+    )
+    if kept.unknown:
+        print_error(f"  {plural(kept.unknown, 'frame')} of the file are not of the recording")
+
+
+def _frames_of(text: str) -> range:
+    """Frames of an option: ``100-400``, both included, or one number."""
+    first, _, last = text.partition("-")
+    try:
+        return range(int(first), int(last or first) + 1)
+    except ValueError as error:
+        raise typer.BadParameter(f'--frames "{text}" is not FIRST-LAST') from error
 
 
 def print_set(found: Mapping[str, Any]) -> None:

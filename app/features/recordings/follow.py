@@ -12,6 +12,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import OverloadedError
 from app.features.recordings.cameras import cameras_at
+from app.features.recordings.frame_boxes import boxes_in
 from app.features.recordings.index import read_index
 from app.features.recordings.queries import predicted_in, views_of_video
 from app.features.recordings.service import Recording
@@ -123,15 +124,19 @@ def follow_in_file(
 
 
 def follow_hints(store: Store, recording: Recording, frames: range) -> FollowHints:
-    """What is known of frames of a recording: cameras over time, and what detectors say of those that are groups."""
+    """What is known of frames of a recording: cameras over time, and what detectors say."""
     found = cameras_at(store, recording, frames)
     cameras = {number: one.camera for number, one in found.items() if one.camera is not None}
-    return FollowHints(cameras, _detected(store, recording, frames))
+    detected = _detected(store, recording, frames)
+    for number, balls in boxes_in(store.settings, recording, frames).items():
+        detected[number] = (*detected.get(number, ()), *balls)
+    return FollowHints(cameras, detected)
 
 
 def _detected(
     store: Store, recording: Recording, frames: range
 ) -> dict[int, tuple[DetectedBall, ...]]:
+    """What detectors predicted in views of groups that show the frames."""
     with store.read() as session:
         shown = views_of_video(session, recording.dataset_id, recording.require_readable())
         rows = predicted_in(session, [view for view in shown if view.number in frames])
