@@ -22,6 +22,7 @@ from app.features.tracks.queries import (
     keys_of_match,
     list_rows,
     match_groups,
+    match_states,
     place_of_group,
 )
 from app.features.tracks.run_measurements import followed_observations, followed_runs
@@ -77,7 +78,7 @@ def tracks_of_group(store: Store, group_id: int) -> list[TrackOfGroup]:
         if frame is None or not rows:
             return []
         head = read_dataset_head(session, place.dataset_id)
-        groups = match_groups(session, head.id, [place.match]).get(place.match, [])
+        groups = match_states(session, head.id, [place.match]).get(place.match, [])
         runs = followed_runs(session, head.id).get(place.match, ())
         return [TrackOfGroup(stored_track(row, head.policy, groups, runs), frame) for row in rows]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from sqlalchemy import Select, delete, insert, select, update
 
@@ -17,6 +17,13 @@ from app.features.recordings.tables import BallRunModel, RecordingModel
 from app.features.tracks.tables import TrackModel
 
 _LARGE = ("inputs", "body", "patches")
+
+
+class GroupState(NamedTuple):
+    """A group as far as a track depends on it, of which there are thousands."""
+
+    key: str
+    state: tuple[str, bool, bool]
 
 
 @dataclass(frozen=True)
@@ -152,6 +159,29 @@ def keys_of_match(session: Session, dataset_id: int, match: str) -> Sequence[Any
         .order_by(GroupModel.number)
     )
     return session.execute(statement).all()
+
+
+def match_states(
+    session: Session, dataset_id: int, matches: Collection[str]
+) -> dict[str, list[GroupState]]:
+    """What tracks of matches depend on, as ``match_groups`` has it, and nothing else: a third of its work."""
+    statement = (
+        select(
+            GroupModel.match,
+            GroupModel.key,
+            GroupModel.inputs_hash,
+            QueueModel.solved,
+            QueueModel.status,
+        )
+        .outerjoin(QueueModel, QueueModel.group_id == GroupModel.id)
+        .where(GroupModel.dataset_id == dataset_id, GroupModel.match.in_(list(matches)))
+        .order_by(GroupModel.number)
+    )
+    found: dict[str, list[GroupState]] = {}
+    for match, key, inputs, solved, status in session.execute(statement):
+        state = GroupState(key, (inputs, bool(solved), status == "rejected"))
+        found.setdefault(match, []).append(state)
+    return found
 
 
 def match_groups(

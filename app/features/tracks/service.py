@@ -36,6 +36,7 @@ from app.features.tracks.queries import (
     find_row,
     list_rows,
     match_groups,
+    match_states,
     read_bodies,
     recording_shots,
     update_track,
@@ -97,7 +98,7 @@ def list_tracks(store: Store, dataset: str | int) -> list[Track]:
     with store.read() as session:
         found = read_dataset_head(session, dataset)
         rows = list_rows(session, found.id)
-        groups = match_groups(session, found.id, {row.match for row in rows}) if rows else {}
+        groups = match_states(session, found.id, {row.match for row in rows}) if rows else {}
         runs = followed_runs(session, found.id) if rows else {}
         return [
             stored_track(row, found.policy, groups.get(row.match, ()), runs.get(row.match, ()))
@@ -201,7 +202,7 @@ def accepted_tracks(session: Session, dataset: DatasetHead) -> dict[str, Json]:
     """The tracks of a dataset that people accepted as its groups are now, by stretch, each with all that it
     was computed from (``codec.frozen_track``)."""
     rows = [row for row in list_rows(session, dataset.id) if row.verdict == "accepted"]
-    groups = match_groups(session, dataset.id, {row.match for row in rows}) if rows else {}
+    groups = match_states(session, dataset.id, {row.match for row in rows}) if rows else {}
     runs = followed_runs(session, dataset.id) if rows else {}
     found = {}
     for row in rows:

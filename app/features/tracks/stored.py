@@ -10,7 +10,7 @@ import numpy as np
 
 from app.db.json_columns import as_written, parse
 from app.features.tracks.codec import TRACK_VERSION, corrections_from_json
-from app.features.tracks.queries import TrackGroup
+from app.features.tracks.queries import GroupState, TrackGroup
 from app.features.tracks.run_measurements import FollowedRun, followed_states
 from app.features.tracks.stretches import StoredStretch, frame_of
 from app.soccer.codec import digest
@@ -121,7 +121,10 @@ def summary_of(track: BallTrack, like: TrackSummary) -> TrackSummary:
 
 
 def stored_track(
-    row: Any, policy: Policy, groups: Iterable[TrackGroup], runs: Sequence[FollowedRun] = ()
+    row: Any,
+    policy: Policy,
+    groups: Iterable[TrackGroup | GroupState],
+    runs: Sequence[FollowedRun] = (),
 ) -> Track:
     """A row of the table without what is large, with the groups and accepted ball runs of its match."""
     return Track(
@@ -165,7 +168,7 @@ def corrections_of(row: Any) -> tuple[Correction, ...]:
 
 def track_stamp(
     policy: Policy,
-    groups: Iterable[TrackGroup],
+    groups: Iterable[TrackGroup | GroupState],
     place: StoredStretch,
     runs: Sequence[FollowedRun] = (),
 ) -> str:
