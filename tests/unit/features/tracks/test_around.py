@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,12 +13,15 @@ from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.groups.submit import load
 from app.features.tracks.around import AROUND, track_around, tracks_of_group
+from app.features.tracks.codec import TrackInputs, make_part
 from app.features.tracks.making import read_records
 from app.features.tracks.queries import TrackGroup
 from app.features.tracks.service import list_tracks, make_tracks, read_track
 from app.features.verdicts.service import set_verdict
 from app.formats.export_record import ExportRecord
-from tests.flights import FIRST, places
+from app.soccer.group import Group
+from app.tracking.ball_track import BallTrack, ViewErrors
+from tests.flights import FIRST, flight_groups, places
 from tests.unit.features.tracks.test_service import move
 
 AT = 30
@@ -96,6 +100,37 @@ class TestTrackAround:
             track_around(store, track, 3)
         with pytest.raises(NotFoundError, match="there is no track 99"):
             track_around(store, 99, FIRST)
+
+
+class TestInexactCamera:
+    def test_is_known_from_the_whole(
+        self, store: Store, fill: Callable[..., list[int]], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        fill(*map(with_a_low_camera, flight_groups(60)))
+        make_tracks(store, "demo", None, "ann", lambda *_: None)
+        (track,) = list_tracks(store, "demo")
+        assert track.summary.noise.keys() == {"cam1"} and track.summary.noise["cam1"] > 5
+        told: list[ViewErrors] = []
+
+        def part(inputs: TrackInputs, known: ViewErrors) -> BallTrack:
+            told.append(known)
+            return make_part(inputs, known)
+
+        monkeypatch.setattr("app.features.tracks.around.make_part", part)
+        whole = read_track(store, track.id).ball.position[AT]
+        assert np.linalg.norm(at_frame(store, track.id) - whole) < 0.05
+        assert told == [ViewErrors(track.summary.noise, track.summary.late)]
+
+
+def with_a_low_camera(group: Group) -> Group:
+    """A group whose first camera is said to stand a metre lower than it does."""
+    views = []
+    for view in group.views:
+        given = view.station.given
+        if view.key == "cam1" and given is not None:
+            given = replace(given, position=given.position + np.array([0.0, 0.0, 1.0]))
+        views.append(replace(view, station=replace(view.station, given=given)))
+    return replace(group, views=tuple(views))
 
 
 class TestTracksOfGroup:
