@@ -253,10 +253,14 @@ def jump(m, P, mode, dt):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def see(m, P, first, last, centres, across, along, noise, scale, far, far_sigma):
-    """Take the measurements of a knot, in place; their log likelihood and those left out, as bits."""
+def see(
+    m, P, first, last, centres, across, along, noise, scale, far, far_sigma, kept_m, kept_P
+):  # fmt: skip
+    """Take the measurements of a knot, in place; their log likelihood and those left out, as bits.
+
+    ``kept_m`` and ``kept_P`` are room for a state as it was before one that is left out.
+    """
     total, left = 0.0, 0
-    kept_m, kept_P = np.zeros(6), np.zeros((6, 6))
     for row in range(first, last):
         reach = 0.0
         for i in range(3):

@@ -128,6 +128,7 @@ def likeliest(
     clatest, cjump = np.zeros(size, np.int64), np.zeros(size, np.int64)
     order = np.zeros(size, np.int64)
     second = np.zeros((3, 4, 2))
+    kept_m, kept_P = np.zeros(6), np.zeros((6, 6))
     jump_of = np.zeros((3, 4), np.int64)
     for k in range(K):
         made, best = 0, -np.inf
@@ -188,11 +189,12 @@ def likeliest(
                             continue
                         copy(m, P, M[h], C[h])
                         cost = touch(m, P, mode, after, dt)
-                    if cost == -np.inf:
+                    if cost == -np.inf or (k and score[h] + cost + most < best - _WORST):
+                        # Whatever it sees, it is not kept.
                         continue
                     likely, cleft[made] = see(
                         m, P, starts[k], starts[k + 1],
-                        centres, across, along, noise, scale, far, far_sigma,
+                        centres, across, along, noise, scale, far, far_sigma, kept_m, kept_P,
                     )  # fmt: skip
                     likely += cost + score[h] if k else cost
                     for row in range(places[k], places[k + 1]):
