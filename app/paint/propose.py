@@ -195,13 +195,32 @@ def propose_camera(
             their lenses, first.
         policy: Prior of the distortion.
     """
-    pitch, policy = pitch or Pitch(), policy or CalibrationPolicy()
     frame = read_frame(image)
     if isinstance(frame, str):
         return FrameProposal("nothing", frame)
+    return propose_for_frame(
+        frame, image, pitch or Pitch(), known, policy or CalibrationPolicy(), (MAIN, WIDE)
+    )
+
+
+def propose_for_frame(
+    frame: SearchedFrame,
+    image: Image,
+    pitch: Pitch,
+    known: Sequence[Camera],
+    policy: CalibrationPolicy,
+    libraries: Sequence[Library],
+) -> FrameProposal:
+    """As ``propose_camera``, for a frame that is read already.
+
+    Args:
+        frame: In the width in which it is searched.
+        image: In its own size, red green blue, shape (H, W, 3).
+        libraries: Where it is looked for after the positions of ``known``.
+    """
     ranked: list[RankedCamera] = []
     match = known_library(known) if known else None
-    for library in [*([match] if match else []), MAIN, WIDE]:
+    for library in [*([match] if match else []), *libraries]:
         found = rank_cameras(frame, library, pitch, policy)
         if match is not None and library is not match:
             found = [_move_to_known_position(frame, item, match, pitch) for item in found]
@@ -243,16 +262,30 @@ def read_frame(image: Image) -> SearchedFrame | str:
     reason = why_no_field(image, field)
     if reason is not None:
         return reason
-    strength = _line_strength(image, field)
+    return frame_to_search(image, field, line_strength(image, field), read_picture(image, field))
+
+
+def frame_to_search(
+    image: Image, field: BoolArray, strength: Strength, reading: Reading
+) -> SearchedFrame | str:
+    """A frame that is read, ready to be searched, or why there is nothing to search for.
+
+    Args:
+        image: In the width in which it is searched, red green blue, shape (H, W, 3).
+        field: The field of play, shape (H, W).
+        strength: As of ``line_strength``, shape (H, W).
+        reading: Of the same image and field.
+    """
     pieces = find_straight_pieces(strength > 0, MOST_PIECES)
     if not len(pieces):
         return "no straight line is seen on the grass"
     center = principal_point(ImageSize(image.shape[1], image.shape[0]))
     picture = ScoredPicture.of(strength > 0, field, center)
-    return SearchedFrame(image, field, strength, pieces, picture, read_picture(image, field))
+    return SearchedFrame(image, field, strength, pieces, picture, reading)
 
 
-def _line_strength(image: Image, field: BoolArray) -> Strength:
+def line_strength(image: Image, field: BoolArray) -> Strength:
+    """Strength of what looks like paint, shape (H, W); at the border of a picture nothing does."""
     strength = measure_line_strength(image, field)
     for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
         strength[border] = strength[:, border] = 0.0
@@ -278,7 +311,7 @@ def _rank_in_own_size(
             frame,
             image=image,
             field=field,
-            strength=_line_strength(image, field),
+            strength=line_strength(image, field),
             reading=read_picture(image, field),
         )
         drawn = kernel_threads().map(

@@ -29,12 +29,13 @@ from app.geometry.resection import (
     projection_jacobians,
 )
 from app.paint.agreement import PaintAgreement, measure_agreement
-from app.paint.propose import propose_camera, weakest_marking
+from app.paint.candidates import MAIN, WIDE, Library
+from app.paint.propose import weakest_marking
 from app.paint.snap import SnappedCamera, snap_reading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.motion import BackgroundMatches, rotate_camera
-from app.tracking.picture import Picture
+from app.tracking.picture import Picture, propose_in_picture
 
 Outcome = Literal["tracked", "bridged", "lost"]
 TRACKED: Outcome = "tracked"
@@ -61,6 +62,10 @@ MOST_BRIDGED = 20
 USUAL_DECAY = 0.995
 LIKELY, LIKELY_WEAKEST, MOST_UNSURE = 0.65, 0.25, 12
 """Support of a camera that is likely, also by its weakest marking, and how many of these are kept."""
+EVERYWHERE = (1, 3, 7, 15, 31)
+"""Searches in vain after which all libraries are searched."""
+SAME_VIEW, SAME_VIEW_FRAMES = 0.05, 24
+"""Share of a picture by which it has to move until a search that was in vain is worth another, or so many frames."""
 PROPOSED_AFTER, PROPOSED_EVERY, PATCHY_EVERY, PATCHY_LEAST_OFTEN, CLEARLY = 3, 5, 12, 48, 1.1
 """Frames without paint from which on a camera is proposed, between two tries, and between two where the camera has
 paint, but less than usual: ever more of them while that is in vain, and another has to agree clearly better."""
@@ -152,6 +157,8 @@ class Follower:
         unsure: Frames with a camera that is likely and not certain.
         patchy_every: Frames between two tries to propose another camera for one that has paint.
         sought: Frame in which paint was sought farther off in vain.
+        in_vain: How often a camera was proposed in vain since one was found, or since a cut.
+        turned_since: Share of the picture by which it has moved since.
     """
 
     pitch: Pitch
@@ -163,6 +170,8 @@ class Follower:
     unsure: list[Likely] = field(default_factory=list)
     patchy_every: int = PATCHY_EVERY
     sought: int | None = None
+    in_vain: int = 0
+    turned_since: float = 0.0
 
     def start(
         self, picture: Picture, camera: Camera, covariance: FloatArray | None
@@ -189,7 +198,9 @@ class Follower:
         found = self._followed(picture, match)
         if match is None:
             # What is shown now is another picture than the one that was tried.
-            self.tried, self.patchy_every = None, PATCHY_EVERY
+            self.tried, self.patchy_every, self.in_vain = None, PATCHY_EVERY, 0
+        else:
+            self.turned_since += _share_turned(match, picture.reading.width)
         if found.outcome is TRACKED and found.seen is not None:
             return self._now(self._another(picture, found) if self._is_patchy(found) else found)
         if found.outcome is LOST or found.age >= PROPOSED_AFTER:
@@ -213,9 +224,11 @@ class Follower:
         """A frame whose camera the paint alone says; None where it does not, or was asked lately."""
         if self._was_tried(picture, every):
             return None
-        self.tried = picture.number
+        self.tried, self.turned_since = picture.number, 0.0
+        libraries = self._libraries()
+        self.in_vain += 1
         try:
-            found = propose_camera(picture.image, self.pitch, self.known[-1:], self.policy)
+            found = propose_in_picture(picture, self.pitch, self.known[-1:], self.policy, libraries)
         except (GeometryError, np.linalg.LinAlgError):
             return None
         if found.camera is None or found.snapped is None or found.agreement is None:
@@ -227,14 +240,28 @@ class Follower:
             if is_likely and not self.known and len(self.unsure) < MOST_UNSURE:
                 self.unsure.append(Likely(picture, found.camera, found.agreement.product))
             return None
+        # One that was found is no reason to wait until the view is another one.
+        self.in_vain, self.turned_since = 0, np.inf
         return TrackedFrame(
             picture.number, picture.time, TRACKED, found.camera, found.snapped, found.agreement,
             is_key=True,
         )  # fmt: skip
 
+    def _libraries(self) -> tuple[Library, ...]:
+        """Where a camera is sought besides the positions that are known: a tripod stays where it is.
+
+        The farther off, the more seldom: to look everywhere costs ten times what a frame may.
+        """
+        if self.in_vain in EVERYWHERE:
+            return (MAIN, WIDE)
+        return () if self.known else (MAIN,)
+
     def _was_tried(self, picture: Picture, every: int) -> bool:
-        """Whether a camera was proposed, in vain, in one of so many frames before."""
-        return self.tried is not None and abs(picture.number - self.tried) < every
+        """Whether a camera was proposed, in vain, in one of so many frames before, or of this view."""
+        if self.tried is None:
+            return False
+        ago = abs(picture.number - self.tried)
+        return ago < every or (ago < SAME_VIEW_FRAMES and self.turned_since < SAME_VIEW)
 
     def _followed(self, picture: Picture, match: BackgroundMatches | None) -> TrackedFrame:
         last = self.last
@@ -351,6 +378,14 @@ class Follower:
             self.usual = max(share, USUAL_DECAY * self.usual)
             self.known = [*self.known[:1], found.camera]
         return found
+
+
+def _share_turned(match: BackgroundMatches, width: int) -> float:
+    """By which share of its width the picture moved, or grew."""
+    moved = match.there - match.here
+    shift = float(np.hypot(*np.median(moved, axis=0)))
+    spread = [float(np.std(each)) for each in (match.here, match.there)]
+    return shift / width + abs(float(np.log(spread[1] / spread[0])))
 
 
 def _product(frame: TrackedFrame) -> float:

@@ -1,9 +1,9 @@
-"""Picture: one frame read as far as it can be read without any camera."""
+"""Picture: one frame read as far as it can be read without any camera, and a camera proposed from that."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 
@@ -11,10 +11,20 @@ import cv2
 import numpy as np
 
 from app.geometry.arrays import BoolArray
+from app.geometry.camera import Camera
+from app.paint.candidates import Library
 from app.paint.evidence import Image, Reading, read_picture
 from app.paint.grass import field_of_play
-from app.paint.propose import BORDER_PX, kernel_threads
-from app.paint.ridges import find_line_like
+from app.paint.propose import (
+    FrameProposal,
+    frame_to_search,
+    kernel_threads,
+    line_strength,
+    propose_for_frame,
+)
+from app.paint.ridges import Strength
+from app.soccer.pitch import Pitch
+from app.soccer.policy import CalibrationPolicy
 from app.tracking.clip import Frame
 from app.tracking.motion import Grey
 
@@ -32,7 +42,7 @@ class Picture:
         image: Red green blue, work size, shape (H, W, 3).
         grey: For its motion, shape (H, W).
         field: The field of play, shape (H, W).
-        paint: What looks like painted lines, shape (H, W).
+        strength: Of what looks like painted lines, 0 elsewhere, shape (H, W).
         reading: Ready for paint to be read along markings.
     """
 
@@ -41,19 +51,21 @@ class Picture:
     image: Image
     grey: Grey
     field: BoolArray
-    paint: BoolArray
+    strength: Strength
     reading: Reading
+
+    @property
+    def paint(self) -> BoolArray:
+        """What looks like painted lines, shape (H, W)."""
+        return np.asarray(self.strength > 0)
 
 
 def read_frame(frame: Frame) -> Picture:
     """All that a frame shows."""
     image = frame.image
     field = field_of_play(image)
-    paint = find_line_like(image, field)
-    for border in (slice(0, BORDER_PX), slice(-BORDER_PX, None)):
-        paint[border] = paint[:, border] = False
-    reading = read_picture(image, field)
-    return Picture(frame.number, frame.time, image, grey_of(frame), field, paint, reading)
+    strength, reading = line_strength(image, field), read_picture(image, field)
+    return Picture(frame.number, frame.time, image, grey_of(frame), field, strength, reading)
 
 
 def grey_of(frame: Frame) -> Grey:
@@ -70,3 +82,17 @@ def read_frames(frames: Iterable[Frame]) -> Iterator[Picture]:
             yield waiting.popleft().result()
     while waiting:
         yield waiting.popleft().result()
+
+
+def propose_in_picture(
+    picture: Picture,
+    pitch: Pitch,
+    known: Sequence[Camera],
+    policy: CalibrationPolicy,
+    libraries: Sequence[Library],
+) -> FrameProposal:
+    """As ``propose_for_frame``, for a picture of a clip."""
+    frame = frame_to_search(picture.image, picture.field, picture.strength, picture.reading)
+    if isinstance(frame, str):
+        return FrameProposal("nothing", frame)
+    return propose_for_frame(frame, picture.image, pitch, known, policy, libraries)

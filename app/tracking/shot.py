@@ -15,7 +15,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.paint.propose import propose_camera
+from app.paint.candidates import MAIN, WIDE
 from app.paint.snap import WINDOWS, snap_reading
 from app.soccer.paint_evidence import NO_PAINT
 from app.soccer.pitch import Pitch
@@ -32,7 +32,14 @@ from app.tracking.follow import (
     TrackedFrame,
 )
 from app.tracking.motion import BackgroundMatches, match_background, rotate_camera
-from app.tracking.picture import AHEAD, Picture, grey_of, read_frame, read_frames
+from app.tracking.picture import (
+    AHEAD,
+    Picture,
+    grey_of,
+    propose_in_picture,
+    read_frame,
+    read_frames,
+)
 
 TRIALS, ASKED = 2, 4
 """Likely cameras that are followed where none is certain, and frames in which each is asked for again."""
@@ -138,8 +145,8 @@ def _holds(trial: Shot, number: int, clip: Clip, follower: Follower) -> bool:
     if len(tracked) < LEAST_HELD * len(trial.frames) or not far:
         return False
     for frame in sorted(far, key=lambda frame: turns[frame.number])[:: -max(len(far) // ASKED, 1)]:
-        image = next(clip.frames(frame.number, frame.number + 1)).image
-        found = propose_camera(image, follower.pitch, [start], follower.policy)
+        picture = read_frame(next(clip.frames(frame.number, frame.number + 1)))
+        found = propose_in_picture(picture, follower.pitch, [start], follower.policy, (MAIN, WIDE))
         if found.outcome == "proposed" and _shows_the_same(found.camera, frame.camera, 0):
             return True
     return False

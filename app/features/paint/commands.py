@@ -302,4 +302,10 @@ def track(
     shown = result["pitch"]
     if shown is not None and shown["other"] is not None:
         length, width = shown["other"]["length"], shown["other"]["width"]
-        say(f"The clip shows a pitch of {length:g} x {width:g} m, not 105 x 68 m.")
+        laid = (
+            "The cameras are those of that pitch"
+            if on_shown
+            else "The cameras lay the markings of 105 x 68 m on its paint as well as they can; "
+            "--pitch shown gives those of that pitch"
+        )
+        say(f"The clip shows a pitch of {length:g} x {width:g} m, not 105 x 68 m. {laid}.")

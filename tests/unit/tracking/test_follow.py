@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from app.geometry.camera import Camera
 from app.paint.agreement import PaintAgreement
+from app.paint.candidates import MAIN, WIDE
 from app.paint.propose import FrameProposal
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking import follow
 from app.tracking.clip import Frame
-from app.tracking.follow import PATCHY_EVERY, PATCHY_LEAST_OFTEN, TRACKED, Follower, TrackedFrame
+from app.tracking.follow import (
+    PATCHY_EVERY,
+    PATCHY_LEAST_OFTEN,
+    PROPOSED_EVERY,
+    SAME_VIEW_FRAMES,
+    TRACKED,
+    Follower,
+    TrackedFrame,
+)
+from app.tracking.motion import BackgroundMatches
 from app.tracking.picture import Picture, read_frame
+from tests.tripod_films import render_film
 
 FRAMES = 200
 
@@ -35,7 +48,7 @@ def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
         asked.append(now)
         return FrameProposal("nothing", "no straight line is seen on the grass")
 
-    monkeypatch.setattr(follow, "propose_camera", nothing)
+    monkeypatch.setattr(follow, "propose_in_picture", nothing)
     for now in range(FRAMES):
         assert follower._another(replace(black, number=now), frame) is frame
     waits = np.diff(asked).tolist()
@@ -43,3 +56,49 @@ def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
     # A picture that has nothing to do with the one before is another matter.
     follower.step(replace(black, number=FRAMES), None)
     assert follower.patchy_every == PATCHY_EVERY
+
+
+class TestWhereOneIsSought:
+    """A search in vain is repeated where the view is another one, and at the tripod first."""
+
+    @pytest.fixture
+    def searches(self, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, tuple[str, ...]]]:
+        """Frames in which a camera was sought, and in which libraries besides the known positions."""
+        found: list[tuple[int, tuple[str, ...]]] = []
+
+        def nothing(shown: Picture, *asked: Any) -> FrameProposal:
+            found.append((shown.number, tuple(library.name for library in asked[-1])))
+            return FrameProposal("nothing", "no straight line is seen on the grass")
+
+        monkeypatch.setattr(follow, "propose_in_picture", nothing)
+        return found
+
+    def lose(self, known: list[Camera], shift_px: float) -> None:
+        """Follow frames of black pictures whose background moves."""
+        follower, black = Follower(Pitch(), CalibrationPolicy(), known), picture(0)
+        here = np.random.default_rng(0).uniform(0, 90, (50, 2))
+        match = BackgroundMatches(here, here + np.array([shift_px, 0.0]))
+        for number in range(FRAMES):
+            follower.step(replace(black, number=number), match)
+
+    def test_a_view_that_stays_is_searched_once_a_second(
+        self, searches: list[tuple[int, tuple[str, ...]]]
+    ) -> None:
+        self.lose([], 0.0)
+        assert np.diff([number for number, _ in searches]).tolist() == [SAME_VIEW_FRAMES] * 8
+
+    def test_a_view_that_moves_is_searched_every_few_frames(
+        self, searches: list[tuple[int, tuple[str, ...]]]
+    ) -> None:
+        self.lose([], 10.0)
+        assert set(np.diff([number for number, _ in searches])) == {PROPOSED_EVERY}
+        assert {libraries[0] for _, libraries in searches} == {MAIN.name}
+        wide = [place for place, one in enumerate(searches) if WIDE.name in one[1]]
+        assert wide == [1, 3, 7, 15, 31]
+
+    def test_other_positions_than_the_known_one_are_searched_ever_more_rarely(
+        self, searches: list[tuple[int, tuple[str, ...]]]
+    ) -> None:
+        self.lose([render_film(1).cameras[0]], 10.0)
+        wide = [place for place, (_, libraries) in enumerate(searches) if libraries]
+        assert wide == [1, 3, 7, 15, 31]
