@@ -329,7 +329,9 @@ def _add_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
         known_as = (
             None if known is None else f"is {id_text(value)}, which is {quoted(known)} already"
         )
-        raise FieldError("id", f"{known_as or 'is missing or no id'}; left out")
+        raise FieldError(
+            "id", f"{known_as or 'must be a number or a text'}; this entry is left out"
+        )
 
 
 def _image_id_text(value: Any) -> str:
@@ -462,7 +464,7 @@ def _add_yolo(
     category = fields.whole_number(cells[0])
     x, y, width, height = (fields.number(cell) for cell in cells[1:5])
     if not all(-1 <= value <= 2 for value in (x, y, width, height)):
-        raise ValueError("is in pixels; YOLO's numbers are shares of the image")
+        raise ValueError("is in pixels; YOLO's numbers are fractions of the image size")
     score = fields.number(cells[5]) if len(cells) > 5 and not tracked else None
     if not run.wants(category) or frame is None:
         return

@@ -174,8 +174,10 @@ class PredictionRun:
             raise FieldError("score", f"is {score:g}, which is not between 0 and 1")
         found = self.found.detections.setdefault(frame.id, [])
         self._total += 1
-        if len(found) >= MAX_PER_FRAME or self._total > MAX_BOXES:
-            raise ValueError(f"is one of more than {MAX_PER_FRAME} boxes of its frame")
+        if len(found) >= MAX_PER_FRAME:
+            raise ValueError(f"is left out: its frame has more than {MAX_PER_FRAME:,} boxes")
+        if self._total > MAX_BOXES:
+            raise ValueError(f"is left out: the file has more than {MAX_BOXES:,} boxes")
         self._near_corner += max(box.x + box.width, box.y + box.height) <= _LARGEST_SHARE
         if from_corner or seen != frame.size:
             # Images are resized about the corner of their first pixel.
@@ -203,7 +205,7 @@ class PredictionRun:
         if 2 * self._near_corner > self.found.boxes:
             raise InputError(
                 f"most boxes of {path.name} lie within {_LARGEST_SHARE:g} pixels of the corner",
-                hint="They seem to be shares of the image; boxes are in pixels here.",
+                hint="They seem to be fractions of the image size (0 to 1); boxes must be in pixels.",
             )
         if not self.matched and not self.found.unknown and not report.problems:
             raise InputError(

@@ -89,7 +89,7 @@ def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -
         texts = [name for name in tree.names() if name.lower().endswith(".txt")]
         names = [name for name in texts if is_mot(tree.read_bytes(name))]
     if len(names) != 1:
-        what = "no CSV file" if not names else f"{len(names)} CSV files; one is read"
+        what = "no CSV file" if not names else f"{len(names)} CSV files; give exactly one"
         raise DatasetFormatError(str(path), None, None, f"holds {what}")
     shown = tree.shown(names[0])
     columns: list[str] | None = None
@@ -309,7 +309,7 @@ class _Balls:
             return
         frame, time = _read_instant(row)
         if (frame if frame is not None else time) in self._seen:
-            raise FieldError("frame", "has a ball already")
+            raise FieldError("frame", "has a ball in an earlier row; this row is left out")
         x, y, z = (read_field(row, name, _read_metres) for name in _PLACE)
         sigma = _read_sigma(row)
         self._seen.add(frame if frame is not None else time)

@@ -9,6 +9,7 @@ that have been imported.
 
 from __future__ import annotations
 
+from app.db import idempotency  # noqa: F401
 from app.db.session import Base as Base
 from app.features.agreement import queries as agreement  # noqa: F401
 from app.features.batches import tables as batches  # noqa: F401

@@ -183,7 +183,9 @@ class Categories:
         for index, item in enumerate(listed):
             record = f"categories[{index}]"
             if not isinstance(item, dict) or id_text(item.get("id")) is None:
-                self._report.note(self._path, record, "id", "is missing or no id; left out")
+                self._report.note(
+                    self._path, record, "id", "must be a number or a text; this entry is left out"
+                )
                 continue
             name = item.get("name")
             if not isinstance(name, str) or not name.strip():

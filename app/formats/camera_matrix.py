@@ -192,7 +192,7 @@ def _decompose_projection_matrix(matrix: FloatArray) -> tuple[FloatArray, FloatA
     """K, R and the position of a projection matrix. Source: Hartley & Zisserman, sec. 6.2.4."""
     determinant = np.linalg.det(matrix[:, :3])
     if determinant == 0:
-        raise ValueError("determines no position of a camera")
+        raise ValueError("is singular, so the camera has no position")
     matrix = matrix * np.sign(determinant)
     # An RQ decomposition by the QR decomposition of the matrix turned upside down.
     q, r = np.linalg.qr(np.flipud(matrix[:, :3]).T)
@@ -398,7 +398,9 @@ def _read_array(
             raise ValueError("holds values that are not numbers")
         numbers = math.prod(shape)
         if numbers * kind.itemsize != item.file_size - file.tell():
-            raise ValueError("holds an array whose size differs from the size that it declares")
+            raise ValueError(
+                "holds an array whose size differs from the size that it declares: the file is damaged"
+            )
         if numbers > MOST_CAMERAS * _NUMBERS[name]:
             raise _too_many_cameras_error(path, name, f"holds {numbers:,} numbers")
         body = file.read()

@@ -236,7 +236,7 @@ def _merge_records_of_frame(frame: Frame, other: Frame, report: Report) -> None:
     if frame.camera is None:
         frame.camera = other.camera
     elif other.camera is not None and other.camera != frame.camera:
-        problem = f"is another one than in {first}; that one counts"
+        problem = f"differs from the camera in {first}, which is used"
         report.note(other.path, other.record, "camera", problem)
     if not frame.split:
         frame.split = other.split

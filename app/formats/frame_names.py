@@ -186,7 +186,7 @@ class ExportNames:
                 self._owners.update(names)
                 return key
         raise InputError(
-            f"the view {view.key} of group {group.key} has no name of its own in the export",
+            f"view {view.key} of group {group.key} and another view would have one name in the export",
             hint="Rename the view or its group in the source, and import it again.",
         )
 

@@ -109,7 +109,7 @@ def read_gamestate(
                 # A match whose groups are in several splits has a file in each.
                 place = (sequence.key, sequence.split)
                 if place in seen:
-                    problem = f"is a second {sequence.key}; {seen[place]} is used"
+                    problem = f"describes the sequence {sequence.key} again and is left out; {seen[place]} is used"
                     raise DatasetFormatError(sequence.path, None, None, problem)
             except DatasetFormatError as error:
                 report.skip(error)
@@ -177,7 +177,7 @@ class _LabelledSequence:
         for identity, record, size in self._image_records(stems):
             image = _AnnotatedImage(record, size)
             if not index.add(identity, image):
-                problem = f"is {identity}, as that of another image is; no annotation joins it"
+                problem = f"is {identity}, the id of an earlier image, too: that one gets all its annotations"
                 self._report.note(self.path, str(record["file_name"]), "image_id", problem)
             images.append(image)
         self._join_annotations(index)
@@ -207,7 +207,9 @@ class _LabelledSequence:
                 if "image_id" not in image and "id" not in image:
                     raise ValueError("has no image_id")
                 if PurePosixPath(key).stem in names:
-                    raise ValueError(f"is a second {key}")
+                    raise ValueError(
+                        f"has the file_name {key} of an earlier record; this record is left out"
+                    )
                 size = ImageSize(
                     _read_side_length(image, "width"), _read_side_length(image, "height")
                 )
@@ -232,7 +234,7 @@ class _LabelledSequence:
             name = categories.find(item.get("category_id"))
             if name is None:
                 shown = str(item.get("category_id"))[:40]
-                problem = f"is {shown}, which is not a category; kept without its meaning"
+                problem = f"is {shown}, which is not a category; the annotation is kept for export and not used"
                 self._report.note(self.path, where, "category_id", problem)
             if name == PITCH:
                 self._add_lines(image, item, image.size, where)
@@ -272,7 +274,9 @@ class _LabelledSequence:
         try:
             image.balls.append(_read_ball(item))
         except ValueError as error:
-            self._report.note(self.path, where, "bbox_image", f"{error}; kept without geometry")
+            self._report.note(
+                self.path, where, "bbox_image", f"{error}; kept for export and not used"
+            )
             image.kept.setdefault("others", []).append(item)
             return
         rest = {name: value for name, value in item.items() if name != "bbox_image"}

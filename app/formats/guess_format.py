@@ -139,7 +139,7 @@ class FormatGuess:
         return f"It looks like {self.format}: choose that format and import it again."
 
     def is_stated_by(self, problem: str) -> bool:
-        """Whether a problem says already what to do about such files, as ``json_kind`` does."""
+        """Whether a problem says already what to do about such files, as ``describe_document`` does."""
         if self.format is not None:
             return f"import it as {self.format}" in problem
         return any(advice in self.advice and advice in problem for advice in (EVALUATE, EXPORT))

@@ -102,7 +102,7 @@ class IssiaNumberOwners:
         if known != station:
             raise InputError(
                 f"two frames ({first} and {whose}) have different cameras called cam{number}, and"
-                " ISSIA's files have one of each number",
+                " ISSIA's files can hold only one of that name",
                 hint="Export them as coco, parquet or cameras instead.",
             )
         return number

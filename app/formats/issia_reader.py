@@ -250,7 +250,12 @@ def _read_tracks(
             if camera is None:
                 report.note(shown, None, None, "has no camera number in its name")
             elif camera in found.tracks:
-                report.note(shown, None, None, f"is a second file of camera {camera}")
+                report.note(
+                    shown,
+                    None,
+                    None,
+                    f"is left out: another file of camera {camera} was read already",
+                )
             else:
                 found.tracks[camera] = _shift_frames(track, options.offset(camera))
                 _compare_sizes(camera, track, shown, options, report)
@@ -280,8 +285,8 @@ def _tracks_by_camera(
             shown,
             f"source {number} ({track.source})",
             None,
-            f"is left out with {plural(balls, 'ball')} and {plural(persons, 'person')}: no name "
-            "of a camera in it tells it from the first source",
+            f"is left out with {plural(balls, 'ball')} and {plural(persons, 'person')}: its file "
+            "name has no camera number, such as cam2",
         )
 
 

@@ -28,7 +28,7 @@ def describe_document(value: Any) -> str:
     """What a document is, as the end of a sentence that begins with its name.
 
     Example:
-        >>> json_kind({"kp": {}, "lines": {}})
+        >>> describe_document({"kp": {}, "lines": {}})
         'holds keypoints that a detector predicted (kp), not annotated lines'
     """
     if holds_homography(value):

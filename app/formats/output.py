@@ -269,7 +269,7 @@ def require_free_in_store(out: StoredPath) -> None:
     """
     if not out.settings.exports:
         raise InputError(
-            f'the store "{out.store_name}" is only read from',
+            f'exports into the store "{out.store_name}" are not allowed',
             hint='The operator allows it with "exports": true in TOUCHLINE_STORES.',
         )
     if not out.key:

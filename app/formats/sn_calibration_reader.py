@@ -277,7 +277,7 @@ def _read_marking_name(name: str, path: str, report: Report) -> str | None:
     found = find_marking_like(name)
     if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
         problem = UnknownMarkingError(name).message
-        report.note(path, None, name, f"{problem}; kept without geometry")
+        report.note(path, None, name, f"{problem}; kept for export and not used")
     return found
 
 

@@ -110,8 +110,8 @@ class LabelsWriter:
                 first = self._images.setdefault((match, image_numbers(view.key)), whose)
                 if first != whose:
                     raise InputError(
-                        f"the images of two frames ({first} and {whose}) would have one name in"
-                        f" match {match}, and SoccerNet's files know one frame by each",
+                        f"the images of two frames ({first} and {whose}) would have the same"
+                        f" name in match {match} in SoccerNet's files",
                         hint="Export as coco, parquet, cameras or sn-calibration instead.",
                     )
 

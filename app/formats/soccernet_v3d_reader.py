@@ -249,7 +249,12 @@ def _read_split_list(
         if not slash:
             report.note(shown, f"line {number}", None, "is not <match>/<action>[_<replay>]")
         elif found.setdefault((PurePosixPath(match).name, stem), split) != split:
-            report.note(shown, f"line {number}", None, "is in another split already")
+            report.note(
+                shown,
+                f"line {number}",
+                None,
+                "is in the list of another split already; the first one counts",
+            )
 
 
 COMPUTED = (
@@ -313,7 +318,12 @@ class _DatasetReader:
         self._seen.add((group.match, main))
         rows = self._table.rows.get(group.match, {}).get(main, {})
         for image in rows.keys() - {view.key for view in group.views}:
-            self._report.note(path, image, None, f"is in {TABLE} and not here")
+            self._report.note(
+                path,
+                image,
+                None,
+                f"has a row in {TABLE} and is not in this file; the row is not used",
+            )
         views = tuple(self._add_row_to_view(view, rows.get(view.key), path) for view in group.views)
         split = self._table.split(group.match, main) or group.split
         return replace(group, views=views, split=split)
@@ -367,7 +377,7 @@ class _DatasetReader:
         self, match: str, main: str, rows: Mapping[str, TableRow], frames: MatchFrames
     ) -> Group | None:
         if main not in rows:
-            problem = "has replays and no row of its own"
+            problem = "has rows of replays and none of the main picture; the group is left out"
             self._report.note(f"{self._table.folder}{TABLE}", f"{match}/{main}", None, problem)
             return None
         ordered = sorted(rows.values(), key=lambda row: -1 if row.replay is None else row.replay)

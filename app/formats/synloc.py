@@ -93,12 +93,12 @@ def _rotation_and_position(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotation, pitch to camera, and position in our pitch frame of ``s [R | -R C]``."""
     scale = np.cbrt(np.linalg.det(matrix[:, :3]))
     if not np.isfinite(scale) or scale == 0:
-        raise ValueError("determines no position of a camera")
+        raise ValueError("is singular, so the camera has no position")
     found = matrix / scale
     left, _, right = np.linalg.svd(found[:, :3])
     rotation = left @ right
     if np.abs(rotation - found[:, :3]).max() > MAX_SKEWNESS:
-        raise ValueError("is not a rotation with a translation")
+        raise ValueError("is not a rotation and a translation, [R | t], up to scale")
     position = -rotation.T @ found[:, 3]
     return rotation @ _TO_PITCH.T, _TO_PITCH @ position
 

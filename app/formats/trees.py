@@ -152,11 +152,13 @@ class ZipTree:
     def _check_totals(self, members: list[zipfile.ZipInfo]) -> None:
         limits, shown = self._limits, str(self.path)
         if len(members) > limits.members:
-            problem = f"has {len(members):,} members; at most {limits.members:,} are read"
+            problem = f"has {len(members):,} members, and the limit is {limits.members:,}: split it"
             raise DatasetFormatError(shown, None, None, problem)
         total = sum(member.file_size for member in members)
         if total > limits.total_bytes:
-            problem = f"unpacks to {total:,} bytes; at most {limits.total_bytes:,} are read"
+            problem = (
+                f"unpacks to {total:,} bytes, and the limit is {limits.total_bytes:,}: split it"
+            )
             raise DatasetFormatError(shown, None, None, problem)
         self._count, self._total = len(members), total
 

@@ -195,7 +195,9 @@ class StateReader:
             return None
         try:
             if self.value.get("given") is None:
-                raise ValueError("has no given camera")
+                raise ValueError(
+                    "is of a given camera, and the view has none: add `given`, or leave this out"
+                )
             return camera_covariance(fields.number_list(found, 64))
         except ValueError as error:
             raise self.error("given_covariance", str(error)) from error

@@ -335,6 +335,8 @@ def _parse_framespan(span: Any) -> list[int]:
             raise ValueError(f"the framespan {part} ends before it begins")
         count = len(frames) + last - first + 1
         if count > MAX_SPAN:
-            raise ValueError(f"covers {count:,} frames; at most {MAX_SPAN:,} are read")
+            raise ValueError(
+                f"is left out: it covers {count:,} frames, and the limit is {MAX_SPAN:,}"
+            )
         frames.extend(range(first, last + 1))
     return frames

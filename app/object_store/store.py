@@ -312,8 +312,8 @@ def _read_key_file(settings: StoreSettings) -> tuple[str, ...]:
     try:
         if is_open_to_others(path.stat()):
             raise StorageError(
-                "other users can read the file of a store's keys",
-                hint=f"Run chmod 600 {path.name}.",
+                f"other users can read {path}, which holds the keys of a store",
+                hint=f"Run chmod 600 {path}.",
             )
         parser.read_string(path.read_text("utf-8"))
         section = parser[settings.profile]

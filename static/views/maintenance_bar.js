@@ -38,7 +38,7 @@ export function MaintenanceCard() {
 	return html`
 		<section class="card" aria-labelledby="people-maintenance">
 			<h2 id="people-maintenance">Maintenance notice</h2>
-			${one ? html`<p>Set now: “${one.text}”${one.starts ? `, from ${timeText(one.starts)}` : ''}${one.until ? `, until ${timeText(one.until)}` : ''}. <button class="button button--small" type="button" disabled=${busy} onClick=${() => attempt(deleteMaintenance(), () => publishBanner(null))}>Clear</button></p>` : null}
+			${one ? html`<p>Current notice: “${one.text}”${one.starts ? `, from ${timeText(one.starts)}` : ''}${one.until ? `, until ${timeText(one.until)}` : ''}. <button class="button button--small" type="button" disabled=${busy} onClick=${() => attempt(deleteMaintenance(), () => publishBanner(null))}>Clear</button></p>` : null}
 			<form class="form" onSubmit=${set}>
 				<div class="form__row"><label for="maintenance-text">Text</label><input class="field" id="maintenance-text" name="text" required maxlength="300" autocomplete="off" placeholder="Upgrade at 18:00, about ten minutes" /><small>All people see it on every page, even before login.</small></div>
 				<div class="form__columns">

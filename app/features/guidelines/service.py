@@ -109,8 +109,11 @@ def write_guidelines(
         newest = heads[0].number if heads else 0
         if newest != based_on:
             raise ConflictError(
-                f"{heads[0].written_by if heads else 'nobody'} wrote version {newest} meanwhile",
-                hint="Read it, and write yours on top of it.",
+                f"the guidelines are at version {newest} (by {heads[0].written_by}), and yours are"
+                f" based on version {based_on}"
+                if heads
+                else "there are no guidelines yet, so none can be based on",
+                hint="Read the newest version, and base yours on it (0: none is there).",
                 pointer="/based_on",
             )
         if text != (guideline_text(session, dataset_id, newest) or ""):

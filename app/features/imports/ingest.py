@@ -244,7 +244,7 @@ def ingest_batch(
         raise ConflictError(
             "this dataset holds independent annotations of one person; importing into it is not "
             "possible",
-            hint="Import into the dataset that they are of.",
+            hint="Import into the dataset that the annotated groups come from.",
         )
     shared = SharedStations(
         session, origin.dataset_id, origin.source, origin.actor, lines_left=origin.lines_left

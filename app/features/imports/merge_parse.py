@@ -134,7 +134,7 @@ def parse_station(value: Json) -> MergeStation:
         station = _station_of_record(_require_object(value)["station"])
         base = station if value["base"] is None else _station_of_record(value["base"])
         if not (station.shared and base.shared and station.key == base.key):
-            raise InputError("has a `base` that is another camera, or no static one")
+            raise InputError("has a `base` that is not the same static camera as its `station`")
         return MergeStation(
             station, base, _require_digests(value["states"]), _log_of_record(value["log"])
         )
@@ -152,7 +152,9 @@ def parse_group(value: Json, shared: Mapping[str, Station]) -> MergeGroup:
         group = _group_of_record(_require_object(value)["group"], shared)
         base = group if value["base"] is None else _group_of_record(value["base"], shared)
         if group.key != base.key:
-            raise InputError("has a `base` that is another group")
+            raise InputError(
+                "has a `base` ({base.key}) that is not the same group as its `group` ({group.key})"
+            )
         return MergeGroup(
             group=group,
             base=base,
@@ -202,7 +204,9 @@ def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
     views = _require_list(_require_object(value)["views"], MAX_VIEWS)
     names = {view["station"] for view in views if isinstance(view["station"], str)}
     if names - shared.keys():
-        raise InputError(f'names the static camera "{min(names - shared.keys())}", unknown here')
+        raise InputError(
+            f'uses the static camera "{min(names - shared.keys())}", which the file does not have'
+        )
     group = group_of_log_entry(
         {**value, "views": [{**view, "media": None} for view in views]}, shared
     )
@@ -241,10 +245,14 @@ def _checked_station(station: Station) -> Station:
     _require_text(station.key)
     for side in (station.size.width, station.size.height):
         if not isinstance(side, int) or isinstance(side, bool) or not 2 <= side <= MAX_SIDE:
-            raise InputError(f"has an image side of {side}")
+            raise InputError(
+                f"has an image side of {side}, and sides are whole numbers from 2 to {MAX_SIDE:,}"
+            )
     if station.calibration not in CALIBRATIONS:
-        raise InputError("has a calibration that Touchline does not know")
-    _require_truth_values("a station", station.flipped, station.shared)
+        raise InputError(f"has a `calibration` that is none of {', '.join(CALIBRATIONS)}")
+    _require_truth_values(
+        "a static camera whose `flipped` or `shared`", station.flipped, station.shared
+    )
     for marking in station.annotated_lines:
         if canonical_marking(marking) != marking:
             raise InputError(f"has {marking}, which is not a pitch marking")
@@ -259,7 +267,7 @@ def _checked_station(station: Station) -> Station:
 
 def _require_truth_values(what: str, *values: object) -> None:
     if not all(isinstance(value, bool) for value in values):
-        raise InputError(f"has {what} with a value that is neither true nor false")
+        raise InputError(f"has {what} is neither true nor false")
 
 
 def _verdict_of_record(value: Json) -> Mapping[str, Any]:

@@ -390,7 +390,7 @@ class PartWriter:
     def _require_next_byte(self, upload: Upload) -> None:
         if self._next > upload.bytes:
             raise ConflictError(
-                f"{upload.bytes:,} bytes of {upload.name} were received, and these begin at {self._next:,}",
+                f"this part of {upload.name} begins at byte {self._next:,}, and only {upload.bytes:,} bytes were received before it",
                 hint="Request the number of received bytes (GET /api/v1/uploads/ID), and continue there.",
             )
 

@@ -209,7 +209,7 @@ class OnnxModel:
         chosen = ball_category(names) if category is None else category
         if chosen is None and names:
             raise InputError(
-                f"{path.name} has {len(names)} classes and several or none of them are balls",
+                f"which of the {len(names)} classes of {path.name} is the ball is not clear from their names",
                 hint="Say which one is the ball (--category).",
                 pointer="/category",
             )
@@ -283,14 +283,18 @@ def _parse_class_names(text: str) -> tuple[str, ...]:
 def _input_size(path: Path, shape: list[Any], text: str, side: int | None) -> ImageSize:
     """Height and width of the input: the model's, else what it says, else the caller's."""
     if len(shape) != 4:
-        raise InputError(f"{path.name} takes no picture: its input has the shape {shape}")
+        raise InputError(
+            f"{path.name} is no detector of pictures: its input has the shape {shape}, not (1, 3, H, W)"
+        )
     height, width = (item if isinstance(item, int) and item > 0 else None for item in shape[2:])
     if height is None or width is None:
         sides = [int(part) for part in text.strip("[]() ").split(",") if part.strip().isdigit()]
         chosen = [side, side] if side else (sides * 2)[:2] or [DEFAULT_SIDE, DEFAULT_SIDE]
         height, width = height or chosen[0], width or chosen[1]
     if not (1 <= height <= MAX_SIDE and 1 <= width <= MAX_SIDE):
-        raise InputError(f"{path.name} takes pictures of {width} x {height} pixels")
+        raise InputError(
+            f"{path.name} needs pictures of {width} x {height} pixels, and {MAX_SIDE:,} a side are possible"
+        )
     return ImageSize(width, height)
 
 

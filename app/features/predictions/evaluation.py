@@ -52,7 +52,7 @@ from app.features.versions.frozen_queries import read_frozen, read_json
 from app.features.versions.service import Version
 from app.formats.safe_path import resolve_inside
 from app.formats.tracks_writer import folder_name
-from app.json_text import json_text
+from app.json_text import json_text, quoted
 from app.soccer.codec import digest
 from app.soccer.solution import SOLVER_VERSION
 
@@ -209,7 +209,10 @@ def compare_runs(
         InputError: They belong to different datasets, or the field has no difference.
     """
     if field not in FIELDS:
-        raise InputError(f"frames can be compared by {', '.join(FIELDS)}", pointer="/field")
+        raise InputError(
+            f"frames cannot be compared by {quoted(field)}; use one of {', '.join(FIELDS)}",
+            pointer="/field",
+        )
     with store.read() as session:
         first, second = read_evaluation(session, first_id), read_evaluation(session, second_id)
         if first.dataset_id != second.dataset_id:

@@ -279,7 +279,7 @@ def _find_track_set(
     for name in ("careful", "split", "boxes", "min_score"):
         if getattr(request, name) != getattr(usual, name):
             raise InputError(
-                f'"{found.name}" is of tracks, which do not use {name}',
+                f'the predictions "{found.name}" are tracks of the ball, and {name} is not used with them',
                 hint="Leave it out, or evaluate boxes by themselves.",
                 pointer=f"/{name}",
             )

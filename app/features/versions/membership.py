@@ -69,9 +69,9 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
     """Raise ConflictError where groups that might enter have no solution of this solver."""
     count = sum(item.unsolved for item in candidates)
     if count:
-        groups = plural(count, "group that may belong", "groups that may belong")
+        groups = plural(count, "group that may take part", "groups that may take part")
         raise ConflictError(
-            f"{groups} in the version {'is' if count == 1 else 'are'} not solved yet",
+            f"{groups} {'is' if count == 1 else 'are'} not solved yet",
             hint=f'The server solves them when it starts; touchline solve --dataset "{dataset}" '
             "does it now.",
         )

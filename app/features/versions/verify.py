@@ -125,11 +125,10 @@ class VerifyReport:
     def _older_sentence(self) -> str:
         made = " and ".join(sorted(set(self.older_tracks.values())))
         names = ", ".join(sorted(self.older_tracks)[:_A_GROUP])
-        count = len(self.older_tracks)
-        which = f"track {names} was" if count == 1 else f"{count:,} tracks ({names}) were"
+        count = plural(len(self.older_tracks), "track comes", "tracks come")
         return (
-            f" The {which} made by version {made} of the track solver, this is version {TRACK_VERSION}, which makes "
-            f"{'another one' if count == 1 else 'others'}: {_KEEP}."
+            f" {count} out differently ({names}): made by version {made} of the track solver, and this is"
+            f" version {TRACK_VERSION}: {_KEEP}."
         )
 
     def add(self, found: Sequence[VersionDifference]) -> None:

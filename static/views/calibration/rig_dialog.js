@@ -20,7 +20,7 @@ import { JobProgress } from '../job_progress.js';
 
 const CHOICES = /** @type {{name: Accepted, label: string, note: string}[]} */ ([
 	{ name: 'cameras', label: 'The adjusted cameras', note: 'balls move; can be undone' },
-	{ name: 'sigma', label: 'Only the uncertainty of the cameras in use', note: 'no ball moves; uncertainties are corrected' },
+	{ name: 'sigma', label: 'Keep the present cameras', note: 'no ball moves; only their uncertainty is corrected' },
 ]);
 
 /** @param {number | null} before @param {number | null} after */

@@ -143,7 +143,7 @@ function GroupRow({ one }) {
 	return html`
 		<tr>
 			<th scope="row"><a href=${link}>${one.number}</a></th><td>${said}</td>
-			<td>${one.state}${isUnjudged(one) ? ', no verdict' : ''}${one.taken ? html`<small>${one.taken}’s${one.state === 'decided' ? `, by ${one.decided_by}` : ''}${one.outcome === 'start' ? ', continued from' : ''}</small>` : null}</td>
+			<td>${one.state}${isUnjudged(one) ? ', no verdict' : ''}${one.taken ? html`<small>${one.taken}’s${one.state === 'decided' ? `, ${one.outcome === 'start' ? 'continued' : 'chosen'} by ${one.decided_by}` : one.outcome === 'start' ? ', continued' : ''}</small>` : null}</td>
 			<td data-numeric="true">${one.disagreements}</td><td data-numeric="true">${spread(one.spreads.line_px, 1)}</td>
 			<td data-numeric="true">${spread(one.spreads.ball_px, 1)}</td><td data-numeric="true">${fixed(one.spreads.ball_m.median, 2)}</td><td data-numeric="true">${spread(one.spreads.jac, 2)}</td>
 		</tr>

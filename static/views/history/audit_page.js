@@ -17,7 +17,7 @@ import { When } from '../when.js';
 
 const FAMILIES = [
 	{ name: 'edit', label: 'edits' }, { name: 'verdict', label: 'verdicts' }, { name: 'comment', label: 'comments' }, { name: 'policy', label: 'policies' },
-	{ name: 'version', label: 'versions' }, { name: 'import', label: 'imports' }, { name: 'people', label: 'people, rights, tokens, logins' }, { name: 'job', label: 'jobs' }, { name: 'work', label: 'work, independent annotations, gold groups' }, { name: 'other', label: 'other' },
+	{ name: 'version', label: 'versions' }, { name: 'import', label: 'imports' }, { name: 'people', label: 'people, rights, tokens, logins' }, { name: 'job', label: 'jobs' }, { name: 'work', label: 'batches, independent annotations, gold groups' }, { name: 'other', label: 'other' },
 ];
 /** Pages of what belongs to no dataset. */
 const PLACES = /** @type {Record<string, string>} */ ({ people: 'People', job: 'Jobs' });

@@ -78,7 +78,7 @@ function Band({ frames, at, goTo, whole }) {
 			<ol class="track__modes" aria-label="What the ball does">
 				${modes.map(({ value, from, to }) => html`<li key=${from} style=${{ flexGrow: to - from + 1 }} data-mode=${value || 'gap'} title=${`${MODES[value].name}: frames ${frames.frame[from]} to ${frames.frame[to]}`}><span class="hidden-text">${MODES[value].name}, frames ${frames.frame[from]} to ${frames.frame[to]}</span><span aria-hidden="true">${MODES[value].letter}</span></li>`)}
 			</ol>
-			<ol class="track__states" aria-label="How it is known">
+			<ol class="track__states" aria-label="How the position of the ball is known">
 				${states.map(({ value, from, to }) => html`<li key=${from} style=${{ flexGrow: to - from + 1 }} data-state=${value} title=${STATES[value]}><span class="hidden-text">${STATES[value]}, frames ${frames.frame[from]} to ${frames.frame[to]}</span></li>`)}
 			</ol>
 			${shown ? html`<span class="film__head" style=${{ left: left(at) }}></span>` : null}

@@ -72,7 +72,7 @@ class TestReadTracks:
             ("-4,0,1,2,-1", "not the number of a frame"),
             ("1,0,1,2,-4000", "metres from the centre mark"),
             ("1,0,1,2,-1,-0.1", "not above zero"),
-            ("5,0,1,2,-1", "has a ball already"),
+            ("5,0,1,2,-1", "has a ball in an earlier row"),
         ],
     )
     def test_what_is_wrong_is_noted_and_left_out(

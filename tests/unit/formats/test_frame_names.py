@@ -117,7 +117,9 @@ class TestExportNames:
         names = ExportNames(lambda group, view, split: {"always": (group.key, view.key)})
         first, second = groups_of(view, ("a", "north"), ("b", "north"))
         assert names.of(first, {}) == {}
-        with pytest.raises(InputError, match="the view north of group b has no name of its own"):
+        with pytest.raises(
+            InputError, match="view north of group b and another view would have one name"
+        ):
             names.of(second, {})
 
 

@@ -197,7 +197,7 @@ class TestReadGamestate:
         read(labels, "a/SNGS-060")
         groups = read(labels, "b/SNGS-060")
         assert len(groups) == 2
-        assert "is a second SNGS-060" in report.problems[-1].problem
+        assert "describes the sequence SNGS-060 again" in report.problems[-1].problem
 
     def test_a_match_in_two_splits_is_one_sequence_with_each_image_once(
         self, tmp_path: Path, soccer_group: Make, report: Report
@@ -212,7 +212,7 @@ class TestReadGamestate:
         (first,) = tmp_path.glob("test/*/Labels-GameState.json")
         again.write_text(first.read_text())
         assert len(list(read_gamestate(tmp_path, report))) == 2
-        assert "is a second 8" in report.problems[0].problem
+        assert "has the file_name 8.png" in report.problems[0].problem
 
 
 class TestWriteGamestate:

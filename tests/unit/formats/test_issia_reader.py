@@ -159,7 +159,7 @@ class TestGroups:
         groups = _groups(folder, report)
         assert len(groups) >= 1
         assert {problem.problem for problem in report.problems} == {
-            "has no camera number in its name", "is a second file of camera 3",
+            "has no camera number in its name", "is left out: another file of camera 3 was read already",
         }  # fmt: skip
 
     def test_a_folder_without_xgtf_is_reported(self, tmp_path: Path, report: Report) -> None:

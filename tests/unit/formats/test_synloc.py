@@ -70,7 +70,7 @@ class TestCameraFromSynloc:
         ("changes", "field", "problem"),
         [
             ({"camera_matrix": [[1, 0, 0, 0]] * 2}, "camera_matrix", "has 2 rows"),
-            ({"camera_matrix": [[0, 0, 0, 0]] * 3}, "camera_matrix", "determines no position"),
+            ({"camera_matrix": [[0, 0, 0, 0]] * 3}, "camera_matrix", "is singular"),
             (
                 {"camera_matrix": [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 9]]},
                 "camera_matrix",

@@ -299,8 +299,8 @@ class TestNamesThatAreNoText:
     @pytest.mark.parametrize(
         ("limits", "said"),
         [
-            (Limits(members=5), "has 2 members; at most 1 are read"),
-            (Limits(total_bytes=3_000), "unpacks to 2,000 bytes; at most 1,000 are read"),
+            (Limits(members=5), "has 2 members, and the limit is 1: split it"),
+            (Limits(total_bytes=3_000), "unpacks to 2,000 bytes, and the limit is 1,000: split it"),
         ],
     )
     def test_what_nested_zips_hold_counts_toward_the_limits_of_the_one_around_them(

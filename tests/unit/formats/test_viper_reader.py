@@ -114,7 +114,7 @@ class TestReadViper:
         assert len(_read(tmp_path, HEAD + ball(points) + TAIL, report).balls) == 10_000
         whole, parts = map(str, report.problems)
         assert whole.endswith(
-            "1.xgtf, Ball 0, framespan 0:99999: covers 100,000 frames; at most 10,000 are read"
+            "1.xgtf, Ball 0, framespan 0:99999: is left out: it covers 100,000 frames, and the limit is 10,000"
         )
         assert "covers 10,001 frames" in parts
 

@@ -208,9 +208,7 @@ class TestRunEvaluation:
         self, store, fill, make_group, exact
     ) -> None:
         fill(make_group(10), solved=False)
-        with pytest.raises(
-            ConflictError, match="1 group that may belong in the version is not solved yet"
-        ):
+        with pytest.raises(ConflictError, match="1 group that may take part is not solved yet"):
             run_evaluation(store, "demo", EvaluationRequest(predictions=exact.id), actor="ann")
 
 

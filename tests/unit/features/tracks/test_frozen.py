@@ -92,9 +92,9 @@ class TestVerify:
             ("track rig", f"made by version {TRACK_VERSION}", "version later makes another one")
         ]
         assert report.sentence == (
-            f"All {len(accepted)} groups and the hash came out as they were frozen. The track rig was made by "
-            f"version {TRACK_VERSION} of the track solver, this is version later, which makes another one: compute anew and freeze "
-            "another version, or keep this one as it was frozen."
+            f"All {len(accepted)} groups and the hash came out as they were frozen. 1 track comes out "
+            f"differently (rig): made by version {TRACK_VERSION} of the track solver, and this is version later: "
+            "compute anew and freeze another version, or keep this one as it was frozen."
         )
 
     def test_a_track_that_breaks_the_solver_does_not_hide_the_rest(

@@ -223,9 +223,7 @@ class TestFreeze:
         with store.write() as session:
             session.execute(delete(SolutionModel))
         change_policy(store, "demo", STRICT, if_match=None, actor="ann")
-        with pytest.raises(
-            ConflictError, match="2 groups that may belong in the version are not solved yet"
-        ):
+        with pytest.raises(ConflictError, match="2 groups that may take part are not solved yet"):
             frozen(store)
 
     def test_what_an_earlier_solver_solved_waits_and_how_to_solve_it_is_said(
@@ -233,7 +231,7 @@ class TestFreeze:
     ) -> None:
         upgrade_solver()
         with pytest.raises(
-            ConflictError, match="2 groups that may belong in the version are not solved yet"
+            ConflictError, match="2 groups that may take part are not solved yet"
         ) as refused:
             frozen(store)
         assert 'touchline solve --dataset "demo"' in str(refused.value.hint)
