@@ -5,12 +5,13 @@ import { computed, effect, signal } from '@preact/signals';
 
 import { postPractice } from '../api/practice.js';
 import { ApiError } from '../api/problem.js';
-import { navigate } from '../lib/router.js';
+import { navigate, place } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { loadDatasets } from './datasets.js';
 import { follow } from './jobs.js';
 import { actions } from './last_action.js';
 import { loadSession, isTeam } from './me.js';
+import { inform } from './notice.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
 
@@ -37,13 +38,17 @@ effect(() => {
 export async function startPractice(again = false) {
 	if (making.value) return;
 	makingFailed.value = '';
+	const from = place.peek();
 	try {
 		const job = await follow(await postPractice(again), (moved) => { making.value = moved; });
 		if (job.state === 'done') {
 			endFirstSteps();
 			// A team's server has made a dataset in which one may judge, whatever one may elsewhere.
 			if (isTeam) await Promise.all([loadSession(), loadDatasets()]);
-			navigate(`/review/${job.result.first}`);
+			const open = () => navigate(`/review/${job.result.first}`);
+			// Who went elsewhere meanwhile is not called away from there.
+			if (place.peek() === from) open();
+			else inform('Your practice groups are ready.', { label: 'Open them', run: open });
 		} else makingFailed.value = job.problem?.detail ?? `The job was ${job.state}.`;
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;

@@ -2,7 +2,7 @@
 /** The query as text, with what may stand there offered below it. */
 
 import { html } from 'htm/preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 import { param } from '../lib/router.js';
 import { complete } from '../state/completion.js';
@@ -36,16 +36,18 @@ export function QueryBox({ field, invalid, onQuery }) {
 	/** The text of the chosen offer: offers may change while one chooses. */
 	const [chosen, setChosen] = useState('');
 	const caret = useRef(/** @type {number | null} */ (null));
+	const typing = useRef(/** @type {ReturnType<typeof setTimeout> | undefined} */ (undefined));
 	const { offers } = at === null ? NOTHING : complete(text, at, facets.value, queryFields.value);
 	const active = offers.findIndex((one) => one.text === chosen);
 	useEffect(() => {
 		if (document.activeElement !== field.current) setText(asked);
 	}, [asked]);
-	useEffect(() => {
+	// A layout effect: others are cleaned up after the next page is painted, and the query would lead back from there.
+	useLayoutEffect(() => {
 		// A word that still lacks its value is no question yet.
 		if (text.trim() === asked || /[:<>=]$/.test(text)) return undefined;
-		const timer = setTimeout(() => onQuery(text), TYPING_PAUSE);
-		return () => clearTimeout(timer);
+		typing.current = setTimeout(() => onQuery(text), TYPING_PAUSE);
+		return () => clearTimeout(typing.current);
 	}, [text]);
 	useEffect(() => {
 		if (caret.current !== null) field.current?.setSelectionRange(caret.current, caret.current);
@@ -82,6 +84,8 @@ export function QueryBox({ field, invalid, onQuery }) {
 		event.preventDefault();
 	}
 	function submit() {
+		// Asked now: a moment later it would undo what was clicked since.
+		clearTimeout(typing.current);
 		onQuery(text);
 		setAt(null);
 		field.current?.blur();

@@ -70,7 +70,38 @@ def statuses(page: Page) -> list[str]:
     return [text.split()[-1] for text in page.locator(".queue-row .pill").all_text_contents()]
 
 
+# The row is opened at the end of the pause after typing, and the pause ends before the next page is painted.
+HOLD_THE_PAUSE = """() => {
+  const [set, clear] = [setTimeout, clearTimeout];
+  window.setTimeout = (run, pause, ...rest) => {
+    if (pause !== 250) return set(run, pause, ...rest);
+    window.typed = run;
+    return -1;
+  };
+  window.clearTimeout = (timer) => { if (timer === -1) window.typed = null; else clear(timer); };
+}"""
+OPEN_AS_IT_ENDS = """async () => {
+  document.querySelector('.queue-row[data-active=true]').focus();
+  document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true }));
+  for (let turn = 0; turn < 20; turn += 1) await null;
+  window.typed?.();
+}"""
+
+
 class TestQueryBox:
+    def test_a_query_that_was_just_typed_leads_nobody_back_from_a_group(
+        self, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page)
+        expect(page.locator(".queue-row[data-active=true]")).to_be_visible()
+        page.evaluate(HOLD_THE_PAUSE)
+        page.locator(".field--query").press_sequentially("sort:jac")
+        page.wait_for_function("Boolean(window.typed)")
+        page.evaluate(OPEN_AS_IT_ENDS)
+        page.wait_for_url("**/review/*")
+        page.wait_for_selector('.image-panel__stage[data-ready="true"]')
+        assert "/review/" in page.url
+
     def test_completion_fills_in_a_field_and_its_value(self, open_page: OpenPage) -> None:
         page = opened(open_page)
         page.keyboard.press("/")

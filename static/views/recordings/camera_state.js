@@ -11,10 +11,10 @@ import { useAttempt } from '../../lib/attempt.js';
 import { useKeys } from '../../lib/hooks.js';
 import { pitchSize } from '../../lib/pitch_size.js';
 import { useResource } from '../../lib/resource.js';
-import { address, navigate } from '../../lib/router.js';
+import { address, navigate, page } from '../../lib/router.js';
 import { worstFrame, nextUntracked } from '../../state/cameras.js';
 import { isOver, jobToShow } from '../../state/jobs.js';
-import { announce } from '../../state/notice.js';
+import { announce, inform } from '../../state/notice.js';
 import { goTo, wanted } from '../../state/playback.js';
 import { useEnded } from '../running_jobs.js';
 
@@ -98,8 +98,14 @@ export function useCameras(one, shot, { jobs, watch }) {
 			if (over.state !== 'done') return;
 			// Both ways back lead to this frame.
 			const place = { frame: String(frame) };
+			const open = () => navigate(address(`/review/${over.result.group}/calibration`, { recording: String(one.id), ...place }));
+			const there = page.peek();
+			if (there.page !== 'recording' || there.recording !== one.id) {
+				inform(`Frame ${frame} of ${one.name} is a group now.`, { label: 'Draw its lines', run: open });
+				return;
+			}
 			navigate(address(`/recordings/${one.id}`, place), { replace: true });
-			navigate(address(`/review/${over.result.group}/calibration`, { recording: String(one.id), ...place }));
+			open();
 		});
 	}
 	const frames = id < 0 || found.waiting && found.value?.first !== id ? null : found.value;

@@ -2,7 +2,7 @@
 /** One track: its curves with their bands, its modes and events, and what is said of it. */
 
 import { html } from 'htm/preact';
-import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
 import { listenToGroups } from '../../api/events.js';
 import { ApiError } from '../../api/problem.js';
@@ -250,7 +250,8 @@ function Track({ track, setTrack }) {
 	const goTo = player.goTo;
 	const switchView = () => { shownAs.value = shownAs.value === 'space' ? 'curves' : 'space'; };
 	useEffect(() => () => player.stand(), [player]);
-	useEffect(() => {
+	// A layout effect: others are cleaned up after the next page is painted, whose address would get the frame.
+	useLayoutEffect(() => {
 		if (plays) return undefined;
 		const timer = setTimeout(() => {
 			const values = { ...Object.fromEntries(place.peek().search), frame: String(at) };
