@@ -65,7 +65,7 @@ def added(page: Page, film: Path, dataset: str) -> int:
     page.get_by_label("Dataset", exact=True).fill(dataset)
     page.set_input_files("#import-file", film)
     uploads = page.get_by_role("list", name="Uploads")
-    expect(uploads).to_contain_text("uploaded", timeout=LONG_MS)
+    expect(uploads.locator(".pill").first).to_have_text("uploaded", timeout=LONG_MS)
     page.get_by_role("button", name="Add and find its shots").click()
     page.get_by_role("link", name=f"Open {film.stem}").click(timeout=LONG_MS)
     shows(page, 0)

@@ -99,7 +99,8 @@ class TestAdding:
         page = open_page("/recordings")
         page.get_by_label("Dataset", exact=True).fill("sent")
         page.set_input_files("#import-file", film)
-        expect(page.get_by_role("list", name="Uploads")).to_contain_text("uploaded")
+        pill = page.get_by_role("list", name="Uploads").locator(".pill").first
+        expect(pill).to_have_text("uploaded")
         page.get_by_role("button", name="Add and find its shots").click()
         page.get_by_role("link", name="Open cup final").click()
         shows(page, 0)
@@ -173,7 +174,7 @@ class TestSending:
         expect(uploads).to_contain_text("Choose the file again to continue")
         there = half_sent(page)
         page.set_input_files("#import-file", films[0])
-        expect(uploads).to_contain_text("uploaded")
+        expect(uploads.locator(".pill").first).to_have_text("uploaded")
         expect(uploads.get_by_role("listitem")).to_have_count(1)
         assert 0 < there < films[0].stat().st_size
         uploads.get_by_role("button", name="Remove").click()
@@ -198,10 +199,10 @@ class TestSending:
             page.set_input_files("#import-file", films[0])
             until(page, lambda: half_sent(page) > 0)
             server.kill()
-            expect(uploads).to_contain_text("it goes on by itself")
+            expect(uploads).to_contain_text("it continues by itself")
         with killable(home, port):
             network.detach()
-            expect(uploads).to_contain_text("uploaded")
+            expect(uploads.locator(".pill").first).to_have_text("uploaded")
             (sent,) = page.request.get(f"http://127.0.0.1:{port}/api/v1/uploads").json()["items"]
             content = next((home / "uploads").glob("*/content/long.mp4")).read_bytes()
             assert (sent["bytes"], content) == (sent["size"], films[0].read_bytes())
