@@ -43,11 +43,11 @@ class PoolTask:
     def __init__(self, explain: Explain, begin: Callable[[], None] = begin_all) -> None:
         self.future: Future[Any] = Future()
         self._explain, self._begin = explain, begin
-        self._left = threading.Event()
+        self._abandoned = threading.Event()
 
-    def leave(self) -> None:
+    def abandon(self) -> None:
         """Give the task up: it is not begun, or its worker is killed soon."""
-        self._left.set()
+        self._abandoned.set()
         self.future.cancel()
 
     async def result_unless_client_gone(self, gone: Callable[[], Awaitable[bool]]) -> Any:
@@ -64,7 +64,7 @@ class PoolTask:
                     return None
             return result.result()
         finally:
-            self.leave()
+            self.abandon()
             # Of one that is given up nobody asks for the error.
             result.cancel()
 
@@ -82,7 +82,7 @@ class PoolTask:
         began = monotonic()
 
         def stop() -> None:
-            if self._left.is_set() and monotonic() - began > ABANDONED_SECONDS:
+            if self._abandoned.is_set() and monotonic() - began > ABANDONED_SECONDS:
                 raise CancelledError
 
         try:
@@ -166,7 +166,7 @@ class WorkerPool:
         task = PoolTask(explain or self._explain, begin)
         with self._lock:
             if self._closed:
-                task.leave()
+                task.abandon()
                 return task
             if bounded and len(self._tasks) >= self._most:
                 raise OverloadedError(
@@ -185,7 +185,7 @@ class WorkerPool:
             self._closed = True
             left = list(self._tasks)
         for task in left:
-            task.leave()
+            task.abandon()
         for worker in self._workers:
             worker.kill()
         self._threads.shutdown(cancel_futures=True)

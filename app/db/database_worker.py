@@ -62,9 +62,9 @@ class CallingServer:
         self._place = done, last_total if total is None else total, sentence or last_sentence
         self._unsent = True
         if self._place[2] != last_sentence or monotonic() - self._sent_at >= STEP_SECONDS:
-            self.flush()
+            self.send_progress()
 
-    def flush(self) -> None:
+    def send_progress(self) -> None:
         """Report the progress that was held back."""
         if self._unsent:
             self._request("step", self._place)
@@ -211,5 +211,5 @@ def _run_and_flush(
     result = work(store, *arguments, caller)
     # It is done: to cancel it now is too late.
     with suppress(JobCancelled):
-        caller.flush()
+        caller.send_progress()
     return result

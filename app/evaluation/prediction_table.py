@@ -226,7 +226,7 @@ def _row_frame(run: PredictionRun, cells: Mapping[str, str]) -> NamedFrame | Non
             return run.frame(id_text(text) or text if name == "image_id" else text)
     if number is not None:
         return run.numbered(cells[number].strip())
-    raise FieldError("frame", "is missing, and so is every other name of the frame")
+    raise FieldError("frame", "is missing, and so is every other column that can name the frame")
 
 
 BALL, EVENTS = "ball.csv", "events.csv"

@@ -216,12 +216,12 @@ class Team:
     def _device_cookie(self, name: str) -> str:
         return f"{self._cookie_name(DEVICE)}_{self.devices.cookie_of(name)}"
 
-    def begun(self, request: Request) -> str:
-        """What a browser alone knows that was sent to the provider; empty: it was not."""
+    def sign_on_secret(self, request: Request) -> str:
+        """Value of the sign-on cookie of a browser; empty where it began no sign-on."""
         return read_cookie(request.scope, self._cookie_name(SIGN_ON)) or ""
 
-    def begun_values(self, asker: str | None) -> dict[str, Any]:
-        """How it is told that; None: how it is taken back."""
+    def sign_on_cookie_values(self, asker: str | None) -> dict[str, Any]:
+        """How that cookie is set; None: how it is removed."""
         return self._cookie_arguments(
             SIGN_ON, asker or "", int(BEGUN_LASTS.total_seconds()) if asker else 0
         )

@@ -299,7 +299,7 @@ class Frames:
             # It has waited already.
             reading = submit(bounded=False)
             waiting.future.add_done_callback(
-                lambda one: reading.leave() if one.cancelled() else None
+                lambda one: reading.abandon() if one.cancelled() else None
             )
             reading.future.add_done_callback(partial(_forward_result, waiting.future))
 

@@ -333,7 +333,7 @@ def _require_adjustable(camera: RigCamera) -> None:
     if camera.camera.is_wide:
         raise InputError(
             f"camera {camera.key} has a {camera.camera.lens} lens, which a rig does not adjust",
-            hint="One focal length and one radial term can be; leave this camera as it is.",
+            hint="Only one focal length and one radial term can be adjusted: keep this camera as it is.",
         )
     grass = grass_in_view(camera)
     plain = camera.with_parameters(camera.parameters)
@@ -343,7 +343,7 @@ def _require_adjustable(camera: RigCamera) -> None:
     if not apart <= MAX_MODEL_ERROR_PX * camera.unit:
         raise InputError(
             f"the lens of camera {camera.key} has terms that cannot be adjusted",
-            hint="One focal length and one radial term can be; leave this camera as it is.",
+            hint="Only one focal length and one radial term can be adjusted: keep this camera as it is.",
         )
 
 

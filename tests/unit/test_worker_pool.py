@@ -84,7 +84,7 @@ class TestSubmit:
         gate.wait_until_reached()
         left = pool.submit(note, tmp_path, "left")
         last = pool.submit(note, tmp_path, "last")
-        left.leave()
+        left.abandon()
         gate.open.touch()
         first.future.result(60)
         last.future.result(60)
@@ -98,7 +98,7 @@ class TestSubmit:
     ) -> None:
         task = pool.submit(pass_gate, Gate(tmp_path), "a")
         Gate(tmp_path).wait_until_reached()
-        task.leave()
+        task.abandon()
         with pytest.raises(CancelledError):
             task.future.result(60)
         assert pool.submit(os.getpid).future.result(60) != os.getpid()
@@ -175,7 +175,7 @@ class TestCounts:
         gate.wait_until_reached()
         assert (counts.busy, counts.waiting) == (1, 2)
         for _ in range(2):
-            tasks[1].leave()
+            tasks[1].abandon()
         assert (counts.busy, counts.waiting) == (1, 1)
         gate.open.touch()
         assert [tasks[number].future.result(60) for number in (0, 2)] == ["a", "a"]
@@ -193,7 +193,7 @@ class TestCounts:
     ) -> None:
         task = pool.submit(pass_gate, Gate(tmp_path), "a")
         Gate(tmp_path).wait_until_reached()
-        task.leave()
+        task.abandon()
         with pytest.raises(CancelledError):
             task.future.result(60)
         assert (counts.busy, counts.waiting) == (0, 0)

@@ -159,7 +159,12 @@ class _HintedStatement(SQLiteCompiler):
 
 def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
     if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
-        raise StorageError(f"SQLite {pysqlite3.dbapi2.sqlite_version} can corrupt its file")
+        needed = ".".join(map(str, MIN_SQLITE))
+        raise StorageError(
+            f"SQLite {pysqlite3.dbapi2.sqlite_version} has a fault that can damage a database;"
+            f" Touchline needs {needed} or later",
+            hint="Install a newer pysqlite3, as requirements.txt names it.",
+        )
     engine = create_engine(settings.database, module=pysqlite3.dbapi2, **pool)
     engine.dialect.statement_compiler = _HintedStatement
     event.listen(engine, "connect", partial(_set_pragmas, lasting))

@@ -199,8 +199,9 @@ def _read_view(folder: Path, report: Report) -> BallRays:
     kept = [one for one, first in zip(seen, new, strict=True) if first]
     if len(kept) > _MOST_RAYS:
         raise InputError(
-            f"{folder / BALL_FILE} has {len(kept):,} frames with a ball; a shot has {_MOST_RAYS:,} "
-            "at most: cut it out first"
+            f"{folder / BALL_FILE} has {len(kept):,} frames with a ball, and a shot may have"
+            f" {_MOST_RAYS:,} at most",
+            hint="Give only the rows of one shot.",
         )
     return ball_rays([one[0] for one in kept], [one[1] for one in kept], [one[2] for one in kept])
 

@@ -214,7 +214,7 @@ class PaintFollower:
             try:
                 reading = waiting.future.result(max(end - monotonic(), 0.0))
             except (TimeoutError, CancelledError, WorkerEnded, ReviewError):
-                waiting.leave()
+                waiting.abandon()
                 continue
             if reading is not None:
                 yield task.view.key, reading

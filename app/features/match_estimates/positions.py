@@ -171,7 +171,7 @@ def require_sharable(
         _matches_with_inputs(session, found, matches)
     if not found.policy.calibration.share_position:
         raise ConflictError(
-            f'the policy of "{found.name}" does not use the position that a match shares',
+            f'the policy of "{found.name}" does not use a camera position that frames of a match share',
             hint="Set calibration.share_position to true in the policy first.",
         )
     return found

@@ -102,11 +102,11 @@ class ProviderClient:
                     "the response is compressed, although the request did not allow it"
                 )
             if answer.is_redirect:
-                raise ValueError("the answer leads elsewhere")
+                raise ValueError("the response is a redirect, which is not followed")
             async for part in answer.aiter_raw():
                 content += part
                 if len(content) > LARGEST:
-                    raise ValueError("the answer is too large")
+                    raise ValueError("the response is too large")
         return answer.status_code, bytes(content)
 
     @cached_property

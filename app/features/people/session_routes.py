@@ -277,7 +277,7 @@ def begin(body: SignOnBegin, request: Request, response: Response, team: AppTeam
     address = sign_on.begin(
         asker, redirect=team.landing(request), to=body.to, link=body.link, name=body.name
     )
-    response.set_cookie(**team.begun_values(asker))
+    response.set_cookie(**team.sign_on_cookie_values(asker))
     return SignOnStarted(address=address)
 
 
@@ -300,7 +300,7 @@ def finish(
     team.count_try(request)
     try:
         entered = sign_on.finish(
-            team.begun(request),
+            team.sign_on_secret(request),
             body.state,
             body.code,
             factor=body.factor,
@@ -314,7 +314,7 @@ def finish(
     except AccessError as error:
         log.warning("a single sign-on was refused", address=address, reason=error.message)
         raise
-    response.set_cookie(**team.begun_values(None))
+    response.set_cookie(**team.sign_on_cookie_values(None))
     if entered.token is None:
         return SignOnEnd(session=session_document(team.login(request), store), to=entered.to)
     response.set_cookie(**team.cookie_values(entered.token))
@@ -351,7 +351,7 @@ def begin_link(
     team.count_try(request, me.name)
     asker = secrets.token_urlsafe()
     address = sign_on.begin_link(asker, me, body.password, redirect=team.landing(request))
-    response.set_cookie(**team.begun_values(asker))
+    response.set_cookie(**team.sign_on_cookie_values(asker))
     return SignOnStarted(address=address)
 
 

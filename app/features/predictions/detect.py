@@ -284,7 +284,7 @@ def _input_size(path: Path, shape: list[Any], text: str, side: int | None) -> Im
     """Height and width of the input: the model's, else what it says, else the caller's."""
     if len(shape) != 4:
         raise InputError(
-            f"{path.name} is no detector of pictures: its input has the shape {shape}, not (1, 3, H, W)"
+            f"{path.name} is not an image detector: its input has the shape {shape}, not (1, 3, H, W)"
         )
     height, width = (item if isinstance(item, int) and item > 0 else None for item in shape[2:])
     if height is None or width is None:

@@ -41,7 +41,7 @@ MOST_AT_ONCE = 5000
 
 
 @dataclass(frozen=True)
-class Taken:
+class TakenInstants:
     """What became of the instants that were asked for.
 
     Attributes:
@@ -127,7 +127,7 @@ def take_instants(
     actor: str,
     progress: ReportProgress,
     dry_run: bool = False,
-) -> Taken:
+) -> TakenInstants:
     """Make a group of each instant: of one view, or with those of linked replays; in a worker process, which decodes.
 
     Killed anywhere and started again, it ends in the same state.
@@ -166,7 +166,7 @@ def take_instants(
         progress(done, total)
     linked_views = [view for number in wanted for view in replays.of.get(number, ())]
     new = sum(number not in there for number in wanted)
-    return Taken(
+    return TakenInstants(
         recording.name,
         new if dry_run else report.new,
         len(wanted) - new if dry_run else report.changed,

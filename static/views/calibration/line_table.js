@@ -74,9 +74,9 @@ export function LineTable({ picture, influences }) {
 	const known = Boolean(influences?.some(({ jac }) => jac));
 	const jac = picture.solved?.calibration.jac ?? null;
 	return html`
-		<section class="card strip-card" aria-label="Lines in numbers">
+		<section class="card strip-card" aria-label="Table of line errors">
 			<h2>Lines · ${annotated.length}<span class="card__aside">JaC ${['0.5', '1', '2'].map((gamma) => fixed(jac?.[gamma], 2)).join(' · ')}</span></h2>
-			<div class="editor__scroll" tabindex="0" role="group" aria-label="Lines in numbers">
+			<div class="editor__scroll" tabindex="0" role="group" aria-label="Table of line errors">
 				<table class="numbers line-table" data-stale=${changed.value}>
 					<thead>
 						<tr>

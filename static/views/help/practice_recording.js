@@ -46,7 +46,7 @@ export function RecordingPracticePart({ onLeave }) {
 					: html`
 						${next ? html`<a class="button" href=${place(next.frame)} onClick=${onLeave}>Go to: ${NAMES[next.name].toLowerCase()}</a>` : null}
 						<button class="button" type="button" onClick=${reload}>Compare again</button>
-						<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Start it again</button>`}
+						<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Restart the practice</button>`}
 			</p>
 			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
 			${refused ? html`<${FormError} error=${refused} />` : null}

@@ -192,7 +192,7 @@ class TestFramesOfTheServer:
         frames = Frames(settings)
         try:
             asked = frames.ask_of(media, False, is_indexed)
-            asked.leave()
+            asked.abandon()
             indexing = frames.ask_fetch(media)
             assert indexing is None or indexing.future.result(60)
             assert asked.future.cancelled() and frames._readers.tasks == 0
@@ -253,7 +253,7 @@ class TestFramesOfTheServer:
             first, second = frames.ask_fetch(media), frames.ask_fetch(media)
             assert first is not None and second is not None
             assert frames._videos.pool.tasks == 1
-            first.leave()
+            first.abandon()
             assert second.future.result(60) and first.future.cancelled()
             assert has_index(media, settings)
         finally:

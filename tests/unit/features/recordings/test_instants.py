@@ -29,7 +29,7 @@ def recording(store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     return index_now(store, recording.id, progress=lambda *_: None, stop=lambda: None)
 
 
-def take(store: Store, recording: Recording, *frames: int) -> module.Taken:
+def take(store: Store, recording: Recording, *frames: int) -> module.TakenInstants:
     return take_instants(store, recording.id, frames, False, "ann", lambda *_: None)
 
 
