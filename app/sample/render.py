@@ -85,7 +85,7 @@ def _to_unit_spread(tile: npt.NDArray[Any]) -> Tile:
 
 
 @lru_cache(maxsize=8)
-def board_atlas(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
+def board_mipmap(seed: int) -> tuple[Image, npt.NDArray[np.float64]]:
     """The boards of a match at five sizes, one below the other.
 
     Returns:
@@ -277,7 +277,7 @@ def shading_grass(look: MatchLook) -> ShadingGrass:
 def shading_stadium(camera: Camera, look: MatchLook) -> ShadingStadium:
     """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
-    atlas, levels = board_atlas(look.seed)
+    atlas, levels = board_mipmap(look.seed)
     along, beyond = stands.board_distance
     x, y = (float(value) for value in camera.position[:2])
     # A camera beyond a line stands before the boards of that side, or among the crowd.

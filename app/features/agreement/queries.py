@@ -141,7 +141,7 @@ def read_group_states(session: Session, group_ids: Sequence[int]) -> dict[int, s
     return {row.group_id: row.state for row in rows}
 
 
-def forget_open(session: Session, group_id: int, batch_id: int) -> None:
+def delete_open_agreement(session: Session, group_id: int, batch_id: int) -> None:
     """Nothing of a group waits for a decision in a batch (0: in none) any more."""
     table = AgreementModel
     where = (table.group_id == group_id, table.batch_id == batch_id, table.state == OPEN)
@@ -158,7 +158,7 @@ def decide_agreement(
     return int(session.execute(done).scalar_one())
 
 
-def settle_rest(session: Session, take_ids: Sequence[int], at: str) -> None:
+def settle_unchosen_annotations(session: Session, take_ids: Sequence[int], at: str) -> None:
     """Takes that were compared and not taken are over."""
     rest = (
         IndependentAnnotationModel.id.in_(take_ids),

@@ -29,7 +29,7 @@ from app.features.agreement.queries import (
     put_agreement,
     put_limits,
     required_verdicts,
-    settle_rest,
+    settle_unchosen_annotations,
 )
 from app.features.batches.completion_queries import settle_in_batch
 from app.features.batches.own_annotations import adopt_submitted
@@ -319,7 +319,7 @@ def adopt_and_settle(
         if found is not None:
             put_agreement(session, found)
         dataset = decide_agreement(session, group_id, batch_id or 0, values)
-        settle_rest(session, [annotation.id for annotation in annotations], at)
+        settle_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
         if batch_id is not None:
             settle_in_batch(session, batch_id, group_id, actor=actor, at=at)
         append(session, [Entry(KIND, actor, at, body, dataset, group_id)])

@@ -18,7 +18,7 @@ from app.features.independent_annotations.known_truth import (
     BatchTerms,
     begin_next,
     count_gold_left,
-    fresh_outside,
+    unseen_gold_outside_batches,
 )
 from app.features.independent_annotations.queries import (
     INDEPENDENT,
@@ -80,7 +80,9 @@ def own_left(session: Session, batch: Batch, person: str) -> int:
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)
     kinds = [annotation.kind for annotation in annotations if annotation.person == name]
     fresh = len(
-        fresh_outside(session, batch.dataset_id, name, _list_waiting_groups(session, batch))
+        unseen_gold_outside_batches(
+            session, batch.dataset_id, name, _list_waiting_groups(session, batch)
+        )
     )
     return left + count_gold_left(kinds, batch.gold_every, free, fresh)
 

@@ -58,7 +58,7 @@ class BatchStall:
     since: str
 
 
-def last_of(session: Session, batch: Batch) -> str:
+def last_activity(session: Session, batch: Batch) -> str:
     """When somebody did something in a batch last, opening a group included; else when it was made."""
     times = [batch.created, batch.last, last_work(session, batch.id)]
     times += [one.seen for one in batch.here]
@@ -99,7 +99,7 @@ def _find_stalled_groups(
     session: Session, datasets: list[int], at: datetime, hours: float
 ) -> list[tuple[Batch, BatchStall]]:
     batches = [read_batch(session, one) for one in batches_that_wait(session, datasets)]
-    found = [(one, stall_of(one, last_of(session, one), at, hours)) for one in batches]
+    found = [(one, stall_of(one, last_activity(session, one), at, hours)) for one in batches]
     return [(batch, stall) for batch, stall in found if stall is not None]
 
 
@@ -218,7 +218,7 @@ def _count_left(batch: Batch, parts: Iterable[Part]) -> int:
 
 
 def _team_batch(session: Session, batch: Batch, at: datetime, hours: float) -> TeamBatch:
-    stall = stall_of(batch, last_of(session, batch), at, hours)
+    stall = stall_of(batch, last_activity(session, batch), at, hours)
     since = stall.since if stall is not None and stall.why is StallReason.IDLE else None
     entries = entries_of_work(session, batch.id, batch.created)
     annotations = annotations_of_batch(session, batch.id, batch.dataset_id)

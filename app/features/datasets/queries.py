@@ -253,7 +253,7 @@ def delete_solutions(session: Session, ids: Sequence[int]) -> None:
     session.execute(delete(SolutionModel).where(SolutionModel.id.in_(ids)))
 
 
-def keep_used_ids(session: Session) -> None:
+def record_used_ids(session: Session) -> None:
     """No id is ever given again: the log speaks of what had it."""
     used = dict(session.execute(select(UsedIdModel.table, UsedIdModel.id)).all())
     newest = {

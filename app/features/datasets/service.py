@@ -391,7 +391,7 @@ def delete_dataset(
     _delete_solutions(store, identity)
     with store.write() as session:
         contents = _read_contents_in(session, identity)
-        removal.keep_used_ids(session)
+        removal.record_used_ids(session)
         heir = None if afresh is None else removal.move_access(session, identity)
         body = {"name": contents.name, "counts": contents.counts, "heir": heir}
         append(session, [Entry(KIND, actor, now(), body, identity)])

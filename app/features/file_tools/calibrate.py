@@ -142,7 +142,7 @@ def calibrate_files(
             piece = slice(start, start + CHUNK)
             jobs.append(
                 executor.submit(
-                    share_chunk, files[piece], frames[piece], shares[piece], size, policy,
+                    recalibrate_chunk_with_match, files[piece], frames[piece], shares[piece], size, policy,
                     with_leave_one_out,
                 )
             )  # fmt: skip
@@ -165,7 +165,7 @@ def calibrate_chunk(
     return [_calibrate_file(file, size, policy, with_leave_one_out) for file in files]
 
 
-def share_chunk(
+def recalibrate_chunk_with_match(
     files: Sequence[LineFile],
     frames: Sequence[CalibratedFrame],
     shares: Sequence[MatchShare],

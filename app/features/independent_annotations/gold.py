@@ -168,7 +168,7 @@ def mark_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
     return marked
 
 
-def start_with(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
+def set_gold_start(store: Store, group_id: int, start: str, *, actor: str) -> GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays.
 
     Copies that were begun stay as they are.

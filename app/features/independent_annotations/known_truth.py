@@ -279,7 +279,7 @@ def _next_annotation(
     if terms.gold_every and is_gold_turn(
         [annotation.kind for annotation in mine], terms.gold_every, len(free), chance
     ):
-        fresh = fresh_outside(session, terms.dataset_id, person, terms.groups)
+        fresh = unseen_gold_outside_batches(session, terms.dataset_id, person, terms.groups)
         kind, choice = (GOLD, fresh) if fresh else (kind, choice)
     if not choice:
         return None
@@ -296,7 +296,7 @@ def _next_annotation(
     )
 
 
-def fresh_outside(
+def unseen_gold_outside_batches(
     session: Session, dataset_id: int, person: str, groups: Collection[int]
 ) -> list[int]:
     """Gold groups of a dataset that a person never had, and that wait in no batch of theirs."""

@@ -340,7 +340,7 @@ def mark(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldG
 @responds(document)
 def change(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
-    return gold.start_with(store, group, edit.start, actor=actor)
+    return gold.set_gold_start(store, group, edit.start, actor=actor)
 
 
 @gold_router.delete(

@@ -13,7 +13,7 @@ from app.db.json_columns import Json
 from app.db.log import Entry, append, read_entries_of
 from app.db.session import Session
 from app.errors import ConflictError, ForbiddenError
-from app.features.agreement.queries import forget_open
+from app.features.agreement.queries import delete_open_agreement
 from app.features.groups.queries import read_groups
 from app.features.independent_annotations.queries import (
     IndependentAnnotation,
@@ -113,7 +113,7 @@ def return_copy(session: Session, annotation: IndependentAnnotation) -> None:
     if annotation.submitted is None:
         raise ConflictError(f"{annotation.person} has not submitted this yet")
     update_annotation(session, annotation.id, submitted=None)
-    forget_open(session, annotation.group_id, annotation.batch_id or 0)
+    delete_open_agreement(session, annotation.group_id, annotation.batch_id or 0)
 
 
 def list_submissions(

@@ -124,7 +124,7 @@ class JobRecords:
             update_job(session, job_id, **values)
             job = read_job(session, job_id)
             if job is not None:
-                cancelled_by(session, job, by)
+                record_cancellation(session, job, by)
             if job is not None and job.state in _REPORTED:
                 notify(
                     session,
@@ -152,7 +152,7 @@ def need_job(session: Session, job_id: int) -> Job:
     return job
 
 
-def cancelled_by(session: Session, job: Job, by: str | None) -> Job:
+def record_cancellation(session: Session, job: Job, by: str | None) -> Job:
     """Note who cancels a job and answer their request with it; None: it ends with other work."""
     if by is not None:
         add_audit_event(session, by, "job cancelled", job.dataset_id, job=job.id, title=job.title)

@@ -144,7 +144,7 @@ class JobRun:
         """How far it is, as columns of its record."""
         return dict(zip(("done", "total", "sentence"), self.progress.place, strict=True))
 
-    def outcome(self) -> dict[str, Any] | None:
+    def run_to_end(self) -> dict[str, Any] | None:
         """Do the work; how it ended, as columns. None where the server stops and the next one
         decides."""
         try:

@@ -39,7 +39,7 @@ from app.features.jobs.queries import (
     trim_jobs,
     update_job,
 )
-from app.features.jobs.records import JobRecords, Then, cancelled_by, need_job
+from app.features.jobs.records import JobRecords, Then, need_job, record_cancellation
 from app.features.jobs.runner import JobProgress, JobRun, RunQueue, Work
 
 log = structlog.get_logger("touchline.jobs")
@@ -200,7 +200,7 @@ class Jobs(JobRecords):
         if by is None:
             return self.get(job_id)
         with self._store.write() as session:
-            return cancelled_by(session, need_job(session, job_id), by)
+            return record_cancellation(session, need_job(session, job_id), by)
 
     def set_dataset(self, job_id: int, dataset_id: int) -> None:
         """Note whose a running job is, where its dataset came to be while it ran."""
@@ -221,11 +221,11 @@ class Jobs(JobRecords):
             if run.job.dataset_id == dataset_id and (not kinds or run.job.kind in kinds)
         ]
 
-    def end_with(self, session: Session, ids: Collection[int]) -> None:
+    def cancel_on_commit(self, session: Session, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin, once a transaction is kept."""
-        session.once_kept(lambda: self.end_soon(ids))
+        session.once_kept(lambda: self.signal_cancel(ids))
 
-    def end_soon(self, ids: Collection[int]) -> None:
+    def signal_cancel(self, ids: Collection[int]) -> None:
         """Let jobs write nothing more, nor begin: without asking the database, so that it can be
         called when a transaction is kept (``Session.once_kept``)."""
         for run in self._queue.runs:
@@ -418,7 +418,7 @@ class Jobs(JobRecords):
         )
         ticker.start()
         try:
-            values = run.outcome()
+            values = run.run_to_end()
         finally:
             ended.set()
             ticker.join()

@@ -34,7 +34,7 @@ from app.features.jobs.queries import (
     trim_jobs,
     update_job,
 )
-from app.features.jobs.records import cancelled_by, need_job
+from app.features.jobs.records import need_job, record_cancellation
 from app.features.jobs.runner import JobProgress, JobRun, Work
 from app.features.jobs.service import CLOSE_SECONDS, KEPT, WAIT_FOR_JOB, Jobs, Pool
 
@@ -124,7 +124,7 @@ class SharedJobs(Jobs):
             if need_job(session, job_id).state in (DONE, FAILED):
                 raise ConflictError(f"job {job_id} is over already")
             self._request_end(session, [job_id])
-            job = cancelled_by(session, need_job(session, job_id), by)
+            job = record_cancellation(session, need_job(session, job_id), by)
         self._announce(job)
         return job
 
@@ -133,11 +133,11 @@ class SharedJobs(Jobs):
         with self._store.read_one() as session:
             return job_ids_of_dataset(session, dataset_id, kinds, OPEN)
 
-    def end_with(self, session: Session, ids: Collection[int]) -> None:
+    def cancel_on_commit(self, session: Session, ids: Collection[int]) -> None:
         """See ``Jobs``."""
         self._request_end(session, ids)
 
-    def end_soon(self, ids: Collection[int]) -> None:
+    def signal_cancel(self, ids: Collection[int]) -> None:
         """See ``Jobs``."""
         self.cancel_each(ids)
 

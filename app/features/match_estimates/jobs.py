@@ -182,7 +182,7 @@ class MatchJob:
             undo(session, number, match, actor=actor, stopped=stopped)
             ended.extend(job.id for job in stopped)
             # Whoever is at it waits for this transaction, and asks in the next whether to go on.
-            jobs.end_with(session, ended)
+            jobs.cancel_on_commit(session, ended)
 
         job = change_and_solve(jobs, store, number, change, actor=actor)
         jobs.cancel_each(ended)

@@ -73,7 +73,7 @@ def propose_adjustment(
         InputError: Too few cameras share balls, or their pitches differ.
         ConflictError: The cameras were adjusted already.
     """
-    states, pitch, policy = adjustable(store, dataset)
+    states, pitch, policy = load_adjustable_cameras(store, dataset)
     with store.read() as session:
         frames = _rig_frames(session, states[0].dataset_id)
     own = None if lines is None else _read_lines(lines, states)
@@ -106,7 +106,9 @@ def propose_adjustment(
     return ProposedRig(proposal, pitch, {state.station.key: state for state in states}, inputs)
 
 
-def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pitch, Policy]:
+def load_adjustable_cameras(
+    store: Store, dataset: str | int
+) -> tuple[list[StationState], Pitch, Policy]:
     """The static cameras of a dataset, their pitch, and the dataset's policy.
 
     Raises:
@@ -139,10 +141,10 @@ def adjustable(store: Store, dataset: str | int) -> tuple[list[StationState], Pi
 def require_adjustable(
     store: Store, dataset: str | int, _matches: Collection[str] | None = None
 ) -> DatasetHead:
-    """The dataset, unless its cameras cannot be adjusted; raises as ``adjustable`` does."""
+    """The dataset, unless its cameras cannot be adjusted; raises as ``load_adjustable_cameras`` does."""
     with store.read() as session:
         found = read_dataset_head(session, dataset)
-    adjustable(store, found.id)
+    load_adjustable_cameras(store, found.id)
     return found
 
 

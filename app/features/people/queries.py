@@ -388,12 +388,12 @@ def delete_second_factor(session: Session, person_id: int) -> bool:
     return session.execute(statement.returning(SecondFactorModel.person_id)).first() is not None
 
 
-def is_required(session: Session) -> bool:
+def is_second_factor_required(session: Session) -> bool:
     """Whether everybody needs a second factor."""
     return read_team_setting(session, REQUIRED) == "on"
 
 
-def set_required(session: Session, on: bool) -> None:
+def set_second_factor_required(session: Session, on: bool) -> None:
     """Let everybody need one, or not."""
     write_team_setting(session, REQUIRED, "on" if on else "off")
 

@@ -26,10 +26,10 @@ from app.features.people.queries import (
     delete_second_factor,
     find_second_factor,
     has_second_factor,
-    is_required,
+    is_second_factor_required,
     person_by_id,
     put_second_factor,
-    set_required,
+    set_second_factor_required,
 )
 from app.features.people.roles import log_account_event, require_no_token
 
@@ -88,7 +88,7 @@ class SecondFactors:
             found = find_second_factor(session, person_id)
             return FactorState(
                 has_second_factor(session, person_id),
-                is_required(session),
+                is_second_factor_required(session),
                 count_recovery_codes(session, person_id),
                 bool(found and found.confirmed),
             )
@@ -176,7 +176,7 @@ class SecondFactors:
     def required(self) -> bool:
         """Whether everybody needs one."""
         with self._store.read() as session:
-            return is_required(session)
+            return is_second_factor_required(session)
 
     def require(self, on: bool, *, actor: str) -> None:
         """Let everybody need one: whoever has none makes one before anything else.
@@ -186,8 +186,8 @@ class SecondFactors:
         """
         require_no_token(actor)
         with self._store.write() as session:
-            if is_required(session) != on:
-                set_required(session, on)
+            if is_second_factor_required(session) != on:
+                set_second_factor_required(session, on)
                 word = "required" if on else "not required"
                 log_account_event(session, actor, "everybody", f"second factor {word}", "")
 
@@ -210,7 +210,7 @@ def end_factor(session: Session, login: Login) -> None:
     """
     if has_second_factor(session, login.person_id):
         return
-    if is_required(session):
+    if is_second_factor_required(session):
         raise ConflictError(
             "this server requires a second factor of everybody",
             hint="Add another second factor first.",

@@ -74,7 +74,7 @@ def read_position(store: Store) -> int:
         return newest_entry(session)
 
 
-def read_moment(store: Store) -> tuple[int, int]:
+def newest_entry_and_solution(store: Store) -> tuple[int, int]:
     """Ids of the log's last entry and of the last solution; 0 where there is none."""
     with store.read() as session:
         return newest_entry(session), newest_solution(session)

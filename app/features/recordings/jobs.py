@@ -28,7 +28,7 @@ from app.features.recordings.service import (
     groups_taken,
     require_video,
 )
-from app.features.recordings.shots import find_again
+from app.features.recordings.shots import detect_shots_again
 from app.features.solve.jobs import request_solve
 from app.progress import ReportProgress
 from app.wording import plural
@@ -109,7 +109,7 @@ def index_work(store: Store, progress: JobProgress) -> Json:
     with left_to_next_server(progress):
         if progress.job.request["shots"] and has_index(store, recording):
             actor = progress.job.actor
-            find_again(store, recording_id, actor=actor, progress=step, stop=progress.check)
+            detect_shots_again(store, recording_id, actor=actor, progress=step, stop=progress.check)
             found = get_recording(store, recording_id)
         else:
             found = index_now(store, recording_id, progress=step, stop=progress.check)

@@ -52,7 +52,7 @@ class RecordingShots:
     etag: str
 
 
-def find_again(
+def detect_shots_again(
     store: Store,
     recording_id: int,
     *,

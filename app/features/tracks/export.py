@@ -23,8 +23,8 @@ from app.features.tracks.stretches import (
     Shots,
     Stretch,
     gather_stretches,
+    match_stored_to_stretches,
     require_stretch,
-    stored_as,
 )
 from app.formats.export_record import ExportRecord
 from app.formats.tracks_writer import TrackRecord
@@ -95,7 +95,7 @@ class TrackSource:
         require_stretch(self.dataset, stretches)
         if self.try_only:
             return
-        reasons, known = [], stored_as(stretches, self.known)
+        reasons, known = [], match_stored_to_stretches(stretches, self.known)
         for stretch in stretches:
             found = self._record(stretch, known.get(stretch.key))
             if isinstance(found, str):

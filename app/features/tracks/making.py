@@ -49,8 +49,8 @@ from app.features.tracks.stretches import (
     Stretch,
     gather_stretches,
     instant_of,
+    match_stored_to_stretches,
     require_stretch,
-    stored_as,
 )
 from app.formats.export_record import ExportRecord
 from app.json_text import canonical
@@ -114,7 +114,7 @@ def make_tracks(
                     progress(done + len(records), total)
             done += len(items)
             stretches += gather_stretches(records, found.policy, shots, followed)
-        stored = stored_as(stretches, list_rows(session, found.id))
+        stored = match_stored_to_stretches(stretches, list_rows(session, found.id))
     require_stretch(found.name, stretches)
     for tracked, stretch in enumerate(stretches, 1):
         stamp = track_stamp(

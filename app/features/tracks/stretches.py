@@ -198,7 +198,9 @@ def gather_stretches(
     return stretches
 
 
-def stored_as(stretches: Iterable[Stretch], stored: Iterable[Stored]) -> dict[str, Stored]:
+def match_stored_to_stretches(
+    stretches: Iterable[Stretch], stored: Iterable[Stored]
+) -> dict[str, Stored]:
     """What is stored of stretches, by their keys.
 
     A stretch is what was stored under its key, or else what shares the most frames with it in its match: one

@@ -87,7 +87,9 @@ class TestAfterHandIn:
 
         with monkeypatch.context() as broken:
             broken.setattr(
-                weigh, "settle_rest" if comes_to == "agreed" else "_announce_disagreement", fail
+                weigh,
+                "settle_unchosen_annotations" if comes_to == "agreed" else "_announce_disagreement",
+                fail,
             )
             with pytest.raises(OSError, match="power"):
                 after_submission(store, second.copy_id)

@@ -6,7 +6,7 @@ from sqlalchemy import text
 from app.db.dialects.dialect import dialect_in
 from app.db.log import Entry, append
 from app.db.store import Store
-from app.features.datasets.queries import count_contents, dataset_rows, delete_rows, keep_used_ids
+from app.features.datasets.queries import count_contents, dataset_rows, delete_rows, record_used_ids
 from app.features.datasets.tables import GroupModel
 from app.features.findings.queries import insert_dismissal
 from app.features.groups.insert_queries import next_id
@@ -60,7 +60,7 @@ class TestRemoval:
 
     def test_everything_that_was_said_goes_and_no_id_comes_again(self, filled: Store) -> None:
         with filled.write() as session:
-            keep_used_ids(session)
+            record_used_ids(session)
             delete_rows(session, 1)
             assert dataset_rows(session) == []
             assert dialect_in(session).count_lost_references(session) == 0

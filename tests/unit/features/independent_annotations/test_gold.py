@@ -16,7 +16,7 @@ from app.features.independent_annotations.gold import (
     mark_group,
     median_interval,
     read_report,
-    start_with,
+    set_gold_start,
     unmark_group,
     wilson,
 )
@@ -76,7 +76,7 @@ class TestStartWith:
             truth = gold_truth(session, state.id)
         view = state.group.views[0]
         change(store, state.id, set_ball(view.key, BallAnnotation(box=Box(1, 1, 9, 9))), "ann")
-        changed = start_with(store, state.id, "without_balls", actor="max")
+        changed = set_gold_start(store, state.id, "without_balls", actor="max")
         assert changed == replace(marked, start="without_balls")
         assert read_report(store, state.dataset_id).groups == (changed,)
         with store.read() as session:
@@ -84,13 +84,13 @@ class TestStartWith:
 
     def test_of_an_ordinary_group_there_is_nothing_to_begin_with(self, store, state) -> None:
         with pytest.raises(NotFoundError, match="not a gold group"):
-            start_with(store, state.id, "bare", actor="lea")
+            set_gold_start(store, state.id, "bare", actor="lea")
         with pytest.raises(NotFoundError, match="there is no group 99"):
-            start_with(store, 99, "bare", actor="lea")
+            set_gold_start(store, 99, "bare", actor="lea")
         judge(store, state.id)
         mark_group(store, state.id, "bare", actor="lea")
         with pytest.raises(InputError) as refused:
-            start_with(store, state.id, "half", actor="lea")
+            set_gold_start(store, state.id, "half", actor="lea")
         assert refused.value.pointer == "/start"
 
 

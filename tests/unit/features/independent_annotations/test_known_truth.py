@@ -19,7 +19,7 @@ from app.features.batches.service import NewBatch, change_batch, make_batch
 from app.features.groups.edit import SetLines, set_ball
 from app.features.groups.submit import load, submit
 from app.features.imports.ingest import ingest
-from app.features.independent_annotations.gold import TruthSource, read_report, start_with
+from app.features.independent_annotations.gold import TruthSource, read_report, set_gold_start
 from app.features.independent_annotations.known_truth import (
     BatchTerms,
     GoldChoice,
@@ -122,7 +122,7 @@ class TestSample:
         judge(store, 1, "lea")
         # Said twice it is changed once.
         for _ in range(2):
-            assert start_with(store, 1, "imported", actor="lea").source is TruthSource.SAMPLE
+            assert set_gold_start(store, 1, "imported", actor="lea").source is TruthSource.SAMPLE
         audit = read_audit(store, AuditQuery(), EVERYTHING).items
         assert [one.sentence for one in audit if one.kind == "gold"] == [
             "lets annotators of gold group 1 begin with the imported annotations",

@@ -136,7 +136,7 @@ class TestSharedJobs:
         job = ask(asked)
         assert work.begun.acquire(timeout=SECONDS)
         with store.write() as session:
-            asked.end_with(session, [job.id])
+            asked.cancel_on_commit(session, [job.id])
         # The row alone says so: no look has passed, and no word was heard.
         work.go_on.release()
         assert asked.wait(job.id, SECONDS).state == "cancelled"

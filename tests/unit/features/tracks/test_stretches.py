@@ -13,8 +13,8 @@ from app.features.tracks.stretches import (
     Stretch,
     gather_stretches,
     instant_of,
+    match_stored_to_stretches,
     require_stretch,
-    stored_as,
 )
 from app.formats.export_record import ExportRecord
 from app.soccer.annotation import BallAnnotation, Extras
@@ -197,22 +197,22 @@ class TestStoredAs:
         before, other = Stored("final 0-20", "final", 0, 20), Stored("cup 0-30", "cup", 0, 30)
         (stretch,) = self.stretches(0, 10, 20, 30)
         assert stretch.key == "final 0-30"
-        assert stored_as([stretch], [other, before]) == {"final 0-30": before}
+        assert match_stored_to_stretches([stretch], [other, before]) == {"final 0-30": before}
 
     def test_the_larger_part_of_what_was_cut_has_it(self) -> None:
         whole = Stored("final 0-410", "final", 0, 410)
         found = self.stretches(0, 10, 390, 410, 420)
-        assert stored_as(found, [whole]) == {"final 390-420": whole}
+        assert match_stored_to_stretches(found, [whole]) == {"final 390-420": whole}
 
     def test_the_same_key_counts_before_what_is_shared(self) -> None:
         same, more = Stored("final 0-20", "final", 0, 20), Stored("final 0-25", "final", 0, 25)
         (stretch,) = self.stretches(0, 10, 20)
-        assert stored_as([stretch], [more, same]) == {"final 0-20": same}
+        assert match_stored_to_stretches([stretch], [more, same]) == {"final 0-20": same}
 
     def test_nothing_is_of_two_and_nothing_is_found_where_nothing_is_shared(self) -> None:
         first = Stored("final 0-15", "final", 0, 15)
         found = self.stretches(0, 20, 400, 410)
-        assert stored_as(found, [first]) == {"final 0-20": first}
+        assert match_stored_to_stretches(found, [first]) == {"final 0-20": first}
 
 
 class TestInstantOf:
