@@ -1,5 +1,5 @@
 """JSON text: the canonical one, of which digests are made, and values on their way out: numbers that are infinite or
-NaN become null, texts are quoted, times are told in UTC with a Z.
+NaN become null, texts are quoted, times are in UTC with a Z.
 
 JSON, CSV and logs have no infinity and no NaN that every reader understands. A number that is
 neither known nor finite leaves as null, as an empty cell, as nothing.

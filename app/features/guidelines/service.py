@@ -112,8 +112,8 @@ def write_guidelines(
                 f"the guidelines are at version {newest} (by {heads[0].written_by}), and yours are"
                 f" based on version {based_on}"
                 if heads
-                else "there are no guidelines yet, so none can be based on",
-                hint="Read the newest version, and base yours on it (0: none is there).",
+                else f"there are no guidelines yet, so yours cannot be based on version {based_on}",
+                hint="Read the newest version, and send its number as based_on; 0 where there is none.",
                 pointer="/based_on",
             )
         if text != (guideline_text(session, dataset_id, newest) or ""):

@@ -230,20 +230,11 @@ def own_uploads(settings: Settings, visibility: Visibility) -> list[Upload]:
 
 
 def delete_own_upload(store: Store, upload_id: str, mine: Callable[[str], bool]) -> None:
-    """Delete an upload, or no longer be among those who sent it while others have sent it, too.
+    """``delete_upload`` for a request, and as it does.
 
     What goes is a file, which no transaction holds. Under a key, that it is to go is written down
     before, and the response stored afterwards: sent again, a request that was stopped in between
     does the rest.
-
-    Args:
-        store: Of the home.
-        upload_id: Which.
-        mine: Whether whoever asks is that sender.
-
-    Raises:
-        NotFoundError: There is none of that id.
-        InputError: A dataset reads frames from it.
     """
     if not has_key():
         delete_upload(store.settings, upload_id, mine)

@@ -38,7 +38,7 @@ Query = Annotated[
 
 
 BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
-FILM = "Frames of a recording"
+RECORDING = "Frames of a recording"
 CAREFUL, TRUTH, RESULT = "Reference boxes", "The truth", "The result"
 Predictions = Annotated[
     Path | None,
@@ -201,13 +201,13 @@ def detect(
         str | None,
         typer.Option(
             help="Look at the frames of this recording instead; what is found are candidates where a ball is followed.",
-            rich_help_panel=FILM,
+            rich_help_panel=RECORDING,
         ),
     ] = None,
     frames: Annotated[
         str | None,
         typer.Option(
-            metavar="FIRST-LAST", help="Of the recording; default: all.", rich_help_panel=FILM
+            metavar="FIRST-LAST", help="Of the recording; default: all.", rich_help_panel=RECORDING
         ),
     ] = None,
     boxes: Annotated[
@@ -215,7 +215,7 @@ def detect(
         typer.Option(
             exists=True,
             help="Boxes that were made elsewhere, instead of --model.",
-            rich_help_panel=FILM,
+            rich_help_panel=RECORDING,
         ),
     ] = None,
     workers: Workers = None,
@@ -239,7 +239,7 @@ def detect(
         opened = OnnxModel.open(model, category=category, side=side, threads=threads)
     if opened is None or recording is not None:
         place = dataset, recording or "", frames
-        _detect_in_film(place, opened or source, name or source.stem, min_score, json_)
+        _detect_in_recording(place, opened or source, name or source.stem, min_score, json_)
         return
     with opened_store() as store, show_progress("Detecting") as progress:
         request = DetectRequest(name or source.stem, query, missing, min_score)
@@ -258,7 +258,7 @@ def detect(
     )
 
 
-def _detect_in_film(
+def _detect_in_recording(
     place: tuple[str, str, str | None],
     source: OnnxModel | Path,
     name: str,

@@ -136,6 +136,13 @@ function LimitsCard({ limits, dataset, saved }) {
 	`;
 }
 
+/** Whose annotation is used, and who chose it or continued from it. @param {GroupAgreementJson} one */
+function takenText({ taken, state, outcome, decided_by: by }) {
+	const way = outcome === 'start' ? 'continued' : 'chosen';
+	if (state === 'decided') return `${taken}’s, ${way} by ${by}`;
+	return outcome === 'start' ? `${taken}’s, ${way}` : `${taken}’s`;
+}
+
 /** @param {{one: GroupAgreementJson}} props */
 function GroupRow({ one }) {
 	const link = one.state === 'open' ? `/adjudicate/${one.group}` : reviewAddress(one.group);
@@ -143,7 +150,7 @@ function GroupRow({ one }) {
 	return html`
 		<tr>
 			<th scope="row"><a href=${link}>${one.number}</a></th><td>${said}</td>
-			<td>${one.state}${isUnjudged(one) ? ', no verdict' : ''}${one.taken ? html`<small>${one.taken}’s${one.state === 'decided' ? `, ${one.outcome === 'start' ? 'continued' : 'chosen'} by ${one.decided_by}` : one.outcome === 'start' ? ', continued' : ''}</small>` : null}</td>
+			<td>${one.state}${isUnjudged(one) ? ', no verdict' : ''}${one.taken ? html`<small>${takenText(one)}</small>` : null}</td>
 			<td data-numeric="true">${one.disagreements}</td><td data-numeric="true">${spread(one.spreads.line_px, 1)}</td>
 			<td data-numeric="true">${spread(one.spreads.ball_px, 1)}</td><td data-numeric="true">${fixed(one.spreads.ball_m.median, 2)}</td><td data-numeric="true">${spread(one.spreads.jac, 2)}</td>
 		</tr>

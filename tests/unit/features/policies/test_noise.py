@@ -11,6 +11,7 @@ import pytest
 from app.db.log import Entry, append
 from app.db.store import Store
 from app.errors import DegenerateGeometryError, InputError, NotFoundError
+from app.features.datasets.queries import group_ids
 from app.features.groups.edit import set_ball
 from app.features.groups.edit_codec import edit_to_json
 from app.features.groups.state import GroupState, read_states
@@ -20,7 +21,6 @@ from app.features.policies import noise
 from app.features.policies.noise import ASSUMED_WORDS, apply_noise, read_noise, take_noise_back
 from app.features.policies.service import change_policy, policy_with, read_policy
 from app.features.solutions import service as recompute
-from app.features.solutions.queries import list_solved_groups
 from app.features.solutions.service import solve_dataset, stale_groups
 from app.features.solve.jobs import solve_fully
 from app.soccer.annotation import BallAnnotation, make_lines
@@ -81,7 +81,7 @@ def placings(states: Sequence[GroupState]) -> Iterator[Entry]:
 def read_states_of(store: Store) -> list[GroupState]:
     """Every group of the first dataset."""
     with store.read() as session:
-        return read_states(session, list_solved_groups(session, 1))
+        return read_states(session, group_ids(session, 1))
 
 
 def _spreads(store: Store) -> np.ndarray:
