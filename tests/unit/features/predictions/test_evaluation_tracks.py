@@ -100,7 +100,7 @@ class TestEvaluation:
     def test_what_tracks_do_not_use_is_refused_at_once(self, accepted, own, asked) -> None:
         found = add_predictions(accepted, "flight", None, PredictionFiles(own), actor="ann")
         request = EvaluationRequest(predictions=found.id, **asked)
-        with pytest.raises(InputError, match=f"do not use {next(iter(asked))}"):
+        with pytest.raises(InputError, match=f"{next(iter(asked))} is not used with them"):
             check_evaluation(accepted, "flight", request)
 
 
