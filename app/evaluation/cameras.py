@@ -219,7 +219,7 @@ def cameras_table(
     if unseen:
         note += (
             f" The list of frames has {count - unseen} of them: the ball of the other {unseen} is "
-            f"not known, so they are scored here and judged nowhere else."
+            f"not known, so they count only in this table."
         )
     return Table("calibration", "Calibration against annotated lines", COLUMNS, made, note)
 

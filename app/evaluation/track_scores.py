@@ -351,11 +351,11 @@ def _describe_counts(
     said = [
         f"{plural(counts['track_frames'], 'frame')} with a true ball, "
         f"{counts['track_frames_compared']} with a predicted one too. MAE, median and P 2 m are over those; "
-        "inside 95 % are the true places within what the predicted sigmas call 95 % in three dimensions."
+        "inside 95 % counts true places inside the 95 % ellipsoid of the predicted sigmas."
     ]
     if counts["predicted_frames_without_truth"]:
         balls = plural(counts["predicted_frames_without_truth"], "predicted ball")
-        said.append(f"{balls} belong to no frame with a true one.")
+        said.append(f"{balls} belong to frames without a true ball.")
     said += [_describe_names("Not predicted", missed) + "."] if missed else []
     said += (
         [_describe_names("Predicted, but no stretch of the truth", unknown) + "."]

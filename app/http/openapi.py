@@ -138,46 +138,47 @@ DESCRIPTION = """
 Everything that the browser does goes through these addresses.
 
 * **State and ETag.** `PATCH`, `PUT`, undo and redo need `If-Match` with the ETag of the state that
-  they build on: 428 without it, 412 (with the present document as `current`) when somebody else
-  was faster.
-* **Names.** A script says its name in `X-Actor` and is remembered as `script:NAME`; nobody checks it.
-* **Who asks.** A server that one person runs alone asks nobody. On a server of a team everything but
-  `/healthz`, `/readyz` and logging in needs a session: `POST /api/v1/session` sets its cookie, and a
-  change must carry an `Origin` of this server. Scripts send a token of `POST /api/v1/tokens` as
-  `Authorization: Bearer tl_...`, and neither cookie nor `Origin`. 401: there is none that is valid;
-  403: the role does not suffice, or the token lacks a scope.
-* **Problems.** Every answer that is not a success is `application/problem+json` (RFC 9457).
-* **Pages.** Every list takes `limit` and `cursor` and answers `items` and `next`: the cursor of the
-  next page, null on the last one. Some answer `total`, too: how many there are.
+  they change: 428 without it, 412 (with the present document as `current`) if another request
+  changed that state first.
+* **Names.** A script sends its name in `X-Actor` and is logged as `script:NAME`; the name is not
+  checked.
+* **Authentication.** A server that one person runs alone needs none. On a server of a team
+  everything but `/healthz`, `/readyz` and logging in needs a session: `POST /api/v1/session` sets
+  its cookie, and a change must carry an `Origin` of this server. Scripts send a token of
+  `POST /api/v1/tokens` as `Authorization: Bearer tl_...`, and neither cookie nor `Origin`. 401:
+  no valid session or token; 403: the role does not suffice, or the token lacks a scope.
+* **Problems.** Every response that is not a success is `application/problem+json` (RFC 9457).
+* **Pages.** Every list takes `limit` and `cursor` and returns `items` and `next`: the cursor of the
+  next page, null on the last one. Some also return `total`, the number of all items.
 * **Units.** Pixels of the annotated image size, (0, 0) the centre of the first pixel; metres in
   the pitch frame, z down; degrees.
 """.strip()
 TAGS = {
-    "datasets": "What there is, how far it is, how its numbers are spread, what judges it.",
+    "datasets": "The datasets, their progress, statistics and policies.",
     "groups": "The views of one instant: the unit of review.",
     "views": "One image of an instant: its lines, its ball, its frame.",
     "stations": "Static cameras, whose lines many views share.",
     "findings": "What a person should look at.",
-    "insight": "Suggestions for a group, and which points move its ball most.",
-    "verdicts": "Many groups judged at once.",
+    "insight": "Suggestions that would help a group, and the influence of its markings and points.",
+    "verdicts": "Verdicts on many groups at once.",
     "queue": "Saved queries, and how much each person has reviewed.",
     "work": "Batches of groups that leads assign, and which person has which group open.",
     "independent annotations": "Independent annotations, gold groups whose true values are known, guidelines.",
-    "yield": "What a policy lets through, and what another one would.",
+    "yield": "How many groups pass the policy, and how many would pass another one.",
     "agreement": "Agreement of people who annotated the same frames.",
     "comments": "Comments on groups, and notifications.",
-    "webhooks": "Addresses that get signed messages about what happens in a dataset.",
+    "webhooks": "Addresses to which the server sends signed messages about a dataset.",
     "imports": "Files and folders that become datasets.",
-    "tracks": "The ball over time: its place in every frame of a stretch, and what happened to it.",
-    "recordings": "Videos of matches, their shots, and the groups that are taken from them.",
+    "tracks": "The ball over time: its position in every frame of a stretch, and its events.",
+    "recordings": "Videos of matches, their shots, and the groups that are made from them.",
     "predictions": "Predictions of detectors, beside the annotations of people.",
-    "evaluations": "Detectors measured on what was accepted.",
-    "versions": "Datasets as they were frozen.",
-    "exports": "Datasets as files.",
+    "evaluations": "Predictions of detectors compared with accepted groups or frozen versions.",
+    "versions": "Frozen versions of datasets.",
+    "exports": "Exports of datasets as files.",
     "policies": "The thresholds that judge a dataset.",
     "practice": "Eight groups with known answers, to learn on.",
-    "jobs": "Work that outlasts a request: how far it is and what came of it.",
-    "events": "What changes, as it changes.",
+    "jobs": "Work that takes longer than a request: its progress and its result.",
+    "events": "Changes, sent as they happen.",
     "pitch": "Names and shapes of the 26 markings.",
     "sessions": "On a team's server: login and open sessions.",
     "tokens": "On a team's server: tokens for scripts that act in the name of a person.",

@@ -525,18 +525,18 @@ def lead_over_second(ranked: Sequence[RankedCamera]) -> float | None:
 def why_unsure(ranked: Sequence[RankedCamera]) -> str | None:
     """Why the best camera cannot be proposed; None where it can."""
     if not ranked:
-        return "no camera was found that lies on the paint"
+        return "no camera was found that fits the paint"
     best, lead = ranked[0], lead_over_second(ranked)
     if best.is_contradicted:
-        return "a marking that the best camera shows has no paint"
+        return "the best camera shows a marking where there is no paint"
     supported = best.agreement.supported
     is_patchy = supported < WELL_SUPPORTED and best.weakest < WELL_PAINTED
     if is_patchy or supported < LEAST_SUPPORTED:
-        return "much of the markings that the best camera shows has no paint"
+        return "the best camera shows many markings where there is no paint"
     # Where the match knows the position no paint has to tell it.
     is_known = best.known is not None
     if best.uncertain_m > MOST_UNCERTAIN_M and not is_known:
-        return "too few markings are seen to say where the camera stands"
+        return "too few markings are seen to determine where the camera stands"
     lead = SOLE_LEAD if lead is None else lead
     if lead < LEAST_LEAD:
         return "another camera fits the paint nearly as well"
@@ -561,13 +561,13 @@ def why_not_square(image: Image, camera: Camera, pitch: Pitch) -> str | None:
     if seen is not None and seen.is_certain:
         return (
             f"the pixels are not square: the goal looks {seen.share:.1f} times as high as the "
-            "grass says; bring the picture in its own shape"
+            "grass says; import the picture in its original shape"
         )
     height, width = image.shape[:2]
     if not SHAPES[0] < width / height < SHAPES[1]:
         return (
-            "the picture has not the shape of a broadcast, and no goal shows that its pixels are "
-            "square; bring it in its own shape"
+            "the aspect ratio is not that of a broadcast, and no goal shows that the pixels are "
+            "square; import the picture in its original shape"
         )
     return None
 

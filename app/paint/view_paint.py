@@ -182,7 +182,9 @@ def read_paint_of_image(
             image, grass, camera, pitch, hidden=hidden, policy=policy, start_covariance=spread
         )
     except (GeometryError, np.linalg.LinAlgError):
-        return replace(nothing, sentence="The camera of the lines cannot be drawn onto the paint.")
+        return replace(
+            nothing, sentence="The camera from the lines cannot be moved onto the paint."
+        )
     seen = measure_agreement(snapped.camera, seen_grass, paint, pitch)
     return replace(
         nothing,
@@ -207,8 +209,8 @@ def _why_unusable(start: Calibration) -> str | None:
     """Why paint cannot be sought with a calibration; None: it can."""
     camera = start.camera
     if camera is None:
-        return "The lines make no camera yet, so nothing says where paint should be."
+        return "The lines do not determine a camera yet, so it is not known where paint should be."
     across, down = camera.focal_length
     if camera.lens != BROWN_CONRADY or abs(across / down - 1) > SHAPES_APART or camera.skew:
-        return "Paint is read with square pixels and lenses of one radial term; this one differs."
+        return "Paint is read only for square pixels and one radial distortion term; this camera differs."
     return None

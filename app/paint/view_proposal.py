@@ -75,7 +75,9 @@ def propose_lines_in_image(
     try:
         found = propose_camera(image, pitch, known, policy)
     except (GeometryError, np.linalg.LinAlgError):
-        return ViewProposal("nothing", "The paint of this picture cannot be solved.", {})
+        return ViewProposal(
+            "nothing", "No camera can be computed from the paint of this picture.", {}
+        )
     scale, lines, seen, snapped = PictureScale.of(image, size), {}, found.agreement, found.snapped
     if found.outcome == "proposed" and snapped is not None:
         lines = dict(scale.evidence(snapped).some_points())
@@ -189,5 +191,5 @@ def _describe_contradiction(apart: Mapping[str, float], limit: float) -> str:
     ]
     if not names:
         return ""
-    advice = "It stays as drawn" if len(names) == 1 else "They stay as drawn"
-    return f"{', and '.join(names)}. {advice}: look whether label and place are right."
+    advice = "It is kept" if len(names) == 1 else "They are kept"
+    return f"{', and '.join(names)}. {advice} as drawn: check label and place."

@@ -183,13 +183,13 @@ def _picture_geometry_findings(
         if abs(right) > abs(down):
             where = "right of" if right > 0 else "left of"
         found = (
-            f"the camera's axis lies {100 * aside:.0f} % of the width {where} the middle: a "
+            f"the principal point lies {100 * aside:.0f} % of the width {where} the middle: a "
             "cropped picture"
         )
     yield Finding(
         "picture_geometry",
-        f"The lines fit far better when {found}. The camera is found as if it were not, so its "
-        "place is doubtful. Use this geometry, import the picture as it was taken, or leave the view "
+        f"The lines fit far better if {found}. The camera was computed without this, so its "
+        "position is doubtful. Use this geometry, import the picture as it was taken, or leave the view "
         "out.",
         view,
         number=number,
@@ -214,8 +214,8 @@ def lone_findings(alone: LoneFrame | None, pitch: Pitch) -> Iterator[Finding]:
     where = f"; {names} {'lies' if len(alone.explains) == 1 else 'lie'} there, too" if names else ""
     yield Finding(
         PITCH_SIZE,
-        f"The lines show a pitch of {other.length:g} x {other.width:g} m, and the camera is found on "
-        f"{pitch.length:g} x {pitch.width:g} m{where}. Its place is as uncertain as that.",
+        f"The lines show a pitch of {other.length:g} x {other.width:g} m, but the camera was "
+        f"computed for {pitch.length:g} x {pitch.width:g} m{where}. Its position is uncertain by this difference.",
         number=float(off[axis]),
         threshold=max(OTHER_M, OTHER_SIGMAS * float(alone.sizes_sigma[axis])),
     )
@@ -235,7 +235,7 @@ def _camera_size_findings(
     yield Finding(
         "camera_size",
         f"The given camera was made for pictures of {other.width} x {other.height}: its principal "
-        f"point ({x:g}, {y:g}) is their middle, and the view has {size.width} x {size.height}. Import "
+        f"point ({x:g}, {y:g}) is their middle, but the view has {size.width} x {size.height}. Import "
         f"the cameras again for that size (--size {other.width}x{other.height}).",
         view,
         number=aside,
@@ -279,24 +279,24 @@ def _implausible_camera_findings(calibration: Calibration, view: str | None) -> 
 
 READ_PAINT = "read_paint"
 """The fix that asks for a picture to be read."""
-STAYS = "so its camera is that of the clicks"
+STAYS = "so its camera comes from the annotated lines"
 READ_AGAIN = (
     "The lines of this view, the boxes of its people, its pitch or the thresholds have changed since "
     f"its paint was read, {STAYS}. Read the paint again."
 )
 SENTENCES = {
     NO_PAINT: (
-        f"Too little paint is seen near the lines of this view, {STAYS}. Where the picture shows its "
-        "markings well, look whether each line has the right label."
+        f"Too little paint is seen near the lines of this view, {STAYS}. If the picture shows the "
+        "markings well, check that each line has the right label."
     ),
     NO_FRAME: (
         f"The picture of this view is missing or cannot be read, {STAYS}. Put it where it was "
         "imported from, and read the paint again."
     ),
     PAINT_DISAGREES: (
-        "The paint in this view's picture does not lie where its lines were drawn, so its camera is "
-        "that of the clicks. Look whether each line has the right label and lies on its paint, and "
-        "read the paint again."
+        "The paint in this view's picture does not lie where its lines were drawn, so its camera "
+        "comes from the annotated lines. Check that each line has the right label and lies on its "
+        "paint, and read the paint again."
     ),
 }
 

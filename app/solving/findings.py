@@ -177,8 +177,8 @@ def view_disagrees_finding(
     if apart_px <= tau_px:
         return Finding(
             "view_disagrees",
-            "The ray of this view meets those of the others behind a camera only, where no ball "
-            "is. Check the sides of its lines and its ball, or leave the view out.",
+            "The ray of this view meets those of the others only behind a camera, where no ball "
+            "can be. Check the sides of its lines and its ball, or leave the view out.",
             view,
             fix=fix,
         )
@@ -187,7 +187,7 @@ def view_disagrees_finding(
     return Finding(
         "view_disagrees",
         f"This view does not see the ball where another view sees it: at best {format_pixels(here)} apart "
-        f"here and {format_pixels(there)} in {letters[other]}, {format_pixels(tau_px)} are allowed. Correct its "
+        f"here and {format_pixels(there)} in {letters[other]}; at most {format_pixels(tau_px)} is allowed. Correct its "
         "ball, or leave the view out.",
         view,
         number=apart_px,
@@ -207,8 +207,8 @@ def misses_ball_finding(view: str, error_px: float, tau_px: float) -> Finding:
     """What is said of a view that counts and that the 3D ball misses by so many pixels."""
     return Finding(
         "view_disagrees",
-        f"The 3D ball is {format_pixels(error_px)} from the ball of this view, {format_pixels(tau_px)} are "
-        "allowed, although each pair that counts fits: the pairs contradict each other. Correct "
+        f"The 3D ball is {format_pixels(error_px)} from the ball of this view; at most {format_pixels(tau_px)} is "
+        "allowed. Each valid pair fits, but the pairs contradict each other. Correct "
         "the ball of a view, or leave a view out.",
         view,
         number=error_px,
@@ -254,8 +254,8 @@ def _not_synchronous_findings(
         sentence = "The rays of no two views meet in front of their cameras"
     yield Finding(
         "not_synchronous",
-        f"{sentence}. Look first whether each ball is drawn on the ball. If they are, compare "
-        "players and clock: the pictures show different instants where these differ.",
+        f"{sentence}. First check that each ball is drawn on the ball. If so, compare "
+        "players and clock: if they differ, the pictures show different instants.",
         number=error_px if error_px > tau_px else None,
         threshold=tau_px if error_px > tau_px else None,
     )
@@ -271,17 +271,17 @@ def _views_contradict_finding(item: Contradiction, group: Group, ball: Ball3D | 
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
     sentences = [
-        f"{one} not show one ball: consistent views have residuals as large as these "
+        f"{one} not agree on one ball: consistent views have residuals as large as these "
         f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in only "
         f"{odds_text(found.p_value)}."
     ]
     if ball is not None and item.widening > 1:
         sentences.append(
-            f"Sigma is widened {item.widening:.1f} times for it, to {format_metres(ball.sigma_m)}."
+            f"Because of this, sigma is {item.widening:.1f} times larger: {format_metres(ball.sigma_m)}."
         )
     if not item.is_known:
         sentences.append(
-            "Nobody says how exact the given cameras are: “Annotation noise” under Statistics "
+            "The accuracy of the given cameras is not known: “Annotation noise” under Statistics "
             "estimates it."
         )
     if item.view is not None:
@@ -311,13 +311,13 @@ def _describe_time_gap(gap_m: float, moved_m: float | None) -> str:
     least = _round_milliseconds(gap_m / fast)
     if moved_m is None:
         return (
-            f"The rays miss each other by {gap_m:.2f} m: perhaps another instant, by at least "
-            f"{least} ms."
+            f"The rays miss each other by {gap_m:.2f} m: perhaps the pictures were taken "
+            f"at least {least} ms apart."
         )
     most = _round_milliseconds(moved_m / slow)
     return (
-        f"The rays miss each other by {gap_m:.2f} m: perhaps another instant, about "
-        f"{_round_milliseconds(moved_m / TYPICAL_SPEED)} ms ({least} to {most}) for a ball at "
+        f"The rays miss each other by {gap_m:.2f} m: perhaps the pictures were taken about "
+        f"{_round_milliseconds(moved_m / TYPICAL_SPEED)} ms apart ({least} to {most}), for a ball at "
         f"{TYPICAL_SPEED:.0f} m/s ({slow:.0f} to {fast:.0f})."
     )
 
@@ -336,8 +336,8 @@ def _low_parallax_findings(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
         yield Finding(
             "low_parallax",
-            f"The rays meet at {format_degrees(ball.parallax_degrees)} only, so the distance of the ball is "
-            f"uncertain: about ± {format_metres(ball.sigma_m)}. A view from another side would settle it.",
+            f"The rays meet at only {format_degrees(ball.parallax_degrees)}, so the distance of the ball is "
+            f"uncertain: about ± {format_metres(ball.sigma_m)}. A view from another direction would help.",
             number=ball.parallax_degrees,
             threshold=policy.low_parallax_degrees,
         )
@@ -349,7 +349,11 @@ def _high_uncertainty_findings(
     """Above ``UNUSABLE_SIGMA_M`` with that as the threshold: nobody can use such a ball."""
     if not ball.sigma_m > HIGH_SIGMA_M:
         return
-    why = "although the views agree" if contradicted is None else "as the views contradict it"
+    why = (
+        "although the views agree"
+        if contradicted is None
+        else "because the views contradict each other"
+    )
     limit, sentence = (
         HIGH_SIGMA_M,
         f"The position of the ball is uncertain, about ± {format_metres(ball.sigma_m)}, {why}. Decide "
@@ -358,8 +362,8 @@ def _high_uncertainty_findings(
     if ball.sigma_m > UNUSABLE_SIGMA_M:
         limit, sentence = (
             UNUSABLE_SIGMA_M,
-            f"The ball is known to ± {format_metres(ball.sigma_m)} only, {why}; its rays meet at "
-            f"{format_degrees(ball.parallax_degrees)}. Beyond ± {UNUSABLE_SIGMA_M:.0f} m a ball is of no use.",
+            f"The ball is known only to ± {format_metres(ball.sigma_m)}, {why}; its rays meet at "
+            f"{format_degrees(ball.parallax_degrees)}. Above ± {UNUSABLE_SIGMA_M:.0f} m a ball cannot be used.",
         )
     yield Finding("high_uncertainty", sentence, number=ball.sigma_m, threshold=limit)
 
@@ -369,7 +373,7 @@ def _describe_sigma(ball: Ball3D) -> str:
     if not ball.sigma_m > UNUSABLE_SIGMA_M:
         return ""
     return (
-        f", known to ± {format_metres(ball.sigma_m)} only, with rays that meet at "
+        f", known only to ± {format_metres(ball.sigma_m)}, with rays that meet at "
         f"{format_degrees(ball.parallax_degrees)}"
     )
 

@@ -29,8 +29,8 @@ from app.tracking.ball_track import (
 
 _MODES: dict[int, BallMode] = {FLIGHT: "flight", ROLL: "roll", HELD: "held"}
 OPEN = (
-    "The ball's distance is not known: no bounce, kick or known height in reach of a view that sees it "
-    "alone."
+    "The distance of the ball is not known: only one view sees it, and no bounce, kick or known height "
+    "is near."
 )
 """Why a ball that is seen has no place."""
 _JUMP_S = 1.0
@@ -103,9 +103,7 @@ def joined(
         jumps += _jumps(run, knots, history, fitted, known, frames, times)
         off = np.linalg.norm(fitted.miss, axis=1)
         for ray in np.flatnonzero(~run.used & known[knots.at]):
-            reason = (
-                f"It lies {off[ray]:.0f} times its noise beside the track: another ball, or a slip."
-            )
+            reason = f"It lies {off[ray]:.0f} times its noise from the track: another ball, or a wrong click."
             miss = float(off[ray] * run.noise[ray] * knots.scale[ray])
             against.append(Contradiction(int(knots.rows[ray]), miss, reason))
         if options.leave_out:

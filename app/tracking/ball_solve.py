@@ -67,7 +67,7 @@ def track_ball(
             if any(state != "gap" for state in track.state):
                 return track
             reason = OPEN
-    return BallTrack.none(frames, times, reason or "No run of measurements is long enough.")
+    return BallTrack.none(frames, times, reason or "No series of measurements is long enough.")
 
 
 def _odd_view(measurements: BallMeasurements, runs: list[Run]) -> str | None:
@@ -83,7 +83,9 @@ def _odd_view(measurements: BallMeasurements, runs: list[Run]) -> str | None:
     worst = int(share.argmax())
     if share[worst] <= _ODD or rays[worst] < FEWEST:
         return None
-    return contradiction(f"{share[worst]:.0%} of those of {names[worst]} fit no ball of the others")
+    return contradiction(
+        f"{share[worst]:.0%} of those of {names[worst]} do not fit the ball of the others"
+    )
 
 
 def _late(measurements: BallMeasurements, runs: list[Run]) -> FloatArray:

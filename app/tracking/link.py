@@ -20,8 +20,8 @@ from app.tracking.time_map import TimeMap, map_of_instants
 _CHANGE = 15.0
 """Natural logarithm of how many times likelier a change of the map makes the rays."""
 TURNED = (
-    "The rays of live and replay meet once the cameras of the replay are turned by half a turn of the pitch: they "
-    "stand on the other side."
+    "The rays of the live shot and the replay meet once the cameras of the replay are turned to the other side "
+    "of the pitch."
 )
 _CHANGE_S, _CHANGE_SHARE = 0.04, 0.05
 """Time and share of the speed by which the maps of two pieces differ."""
@@ -49,18 +49,16 @@ def find_time_map(
 
 def map_of_ball(live: BallRays, replay: BallRays, hints: FloatArray, whole: bool = True) -> TimeMap:
     """The map that the ball says, near the hints, shape (N, 2); with its pieces where a ``whole`` replay has several."""
-    for name, rays in (("live", live), ("replay", replay)):
+    for name, rays in (("live shot", live), ("replay", replay)):
         if len(rays) < FEWEST_PAIRS:
-            reason = (
-                f"The {name} view has {len(rays)} rays of the ball; a link needs {FEWEST_PAIRS}."
-            )
+            reason = f"The {name} has {len(rays)} rays to the ball; a link needs {FEWEST_PAIRS}."
             return TimeMap(reason)
     fit = Fit(live, replay, hints)
     tried = [fit.refined(one) for one in fit.candidates()]
     found = [one for one in tried if one is not None]
     if not found:
         where = " near the instants given" if len(hints) else ""
-        reason = f"The rays of live and replay meet nowhere{where} for as long as a link needs."
+        reason = f"The rays of the live shot and the replay do not meet long enough{where}."
         return TimeMap(reason)
     best = max(found, key=fit.evidence)
     made = judged(fit, best, found)

@@ -41,13 +41,13 @@ def _why_not(fit: Fit, made: TimeMap, pairs: Pairs) -> str | None:
     assert made.miss is not None
     if made.overlap < LEAST_OVERLAP_S:
         return (
-            f"Live and replay share {made.overlap:.1f} s of the ball; a link needs "
+            f"The live shot and the replay share {made.overlap:.1f} s with the ball; a link needs "
             f"{LEAST_OVERLAP_S} s."
         )
     loud = fit.noise > _LOUD and made.overlap < _LONG_S
     if made.miss > _MOST_MISS_M or loud:
         return (
-            f"The rays of live and replay miss each other by {made.miss:.2f} m at best, "
+            f"The rays of the live shot and the replay miss each other by {made.miss:.2f} m at best, "
             f"{fit.noise:.1f} times their noise: the cameras are exchanged, mirrored or not exact "
             "enough, or the replay is of another action."
         )

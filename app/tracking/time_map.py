@@ -99,7 +99,8 @@ def map_of_instants(
     pieces = _pieces(rows, frame_s)
     if any(piece.speed is None or piece.speed <= 0 for piece in pieces):
         return TimeMap(
-            "The instants given run backwards: later in the replay is earlier live.", by_hand=True
+            "The linked instants run backwards: what is later in the replay is earlier live.",
+            by_hand=True,
         )
     for piece in pieces:
         speed, sigma = piece.speed or 0.0, _speed_sigma(piece)

@@ -121,7 +121,7 @@ class TestAdding:
         expect(page.get_by_role("alert")).to_contain_text("a.png is not a video")
         page.goto("/import")
         page.set_input_files("#import-file", film)
-        expect(page.get_by_role("alert")).to_contain_text("Add it on the Recordings page")
+        expect(page.get_by_role("alert")).to_contain_text("Add it on the page Recordings")
 
 
 SLOW = {"downloadThroughput": -1, "uploadThroughput": 4e6, "latency": 0}
@@ -247,7 +247,7 @@ class TestWatching:
         shows(page, 25)
         card = page.get_by_role("region", name="Time of the match")
         card.get_by_label("What the clock shows in this frame").fill("12:40")
-        card.get_by_role("button", name="Set here").click()
+        card.get_by_role("button", name="Set for this frame").click()
         expect(page.locator("[data-match-time]")).to_have_text("1st half 12:40")
         page.locator("body").press("Shift+ArrowRight")
         shows(page, 50)
@@ -355,7 +355,7 @@ class TestInstants:
         page.keyboard.press("ArrowDown")
         shows(page, 40)
         card.get_by_label("Every").fill("20")
-        card.get_by_role("button", name="of this shot").click()
+        card.get_by_role("button", name="Choose", exact=True).click()
         expect(card).to_contain_text("3 frames chosen")
         card.get_by_label("Propose cameras afterwards").uncheck()
         card.get_by_role("button", name="Make 3 groups").click()
@@ -432,8 +432,8 @@ class TestLinking:
         side(page, "Live", 2)
         side(page, "Replay", 65)
         page.keyboard.press("i")
-        expect(times).to_contain_text("assumed to run as fast as live")
-        page.get_by_label("Assume that it is").fill("4")
+        expect(times).to_contain_text("assumed to run at live speed")
+        page.get_by_label("Assume that the replay is").fill("4")
         times.get_by_role("button", name="Assume").click()
         expect(times).to_contain_text("assumed to run 4.0 times slower than live")
         page.keyboard.press("ArrowRight")
@@ -515,7 +515,7 @@ class TestLinking:
         card.get_by_label("Propose cameras afterwards").uncheck()
         card.get_by_role("button", name="Make 2 groups").click()
         expect(card).to_contain_text(
-            "2 groups made. 1 view of linked replays. 1 view fewer, outside of a replay."
+            "2 groups made. 1 view of linked replays added. 1 view missing, because the replay does not show the instant."
         )
         jobs_end(page)
         rows = page.request.get("/api/v1/groups?dataset=cup").json()["items"]

@@ -302,7 +302,7 @@ def _single_edit_sentence(row: AuditRow, edit: Mapping[str, Any]) -> str:
 
 
 def _dismissal_sentence(_row: AuditRow, body: Mapping[str, Any]) -> str:
-    did = "dismissed the finding" if body.get("dismissed") else "opened the finding again"
+    did = "dismissed the finding" if body.get("dismissed") else "reopened the finding"
     kind = str(body.get("kind")).replace("_", " ")
     place = f" in {body['view']}" if body.get("view") else ""
     why = f": {body['note']}" if body.get("note") else ""
@@ -374,13 +374,13 @@ def _own_work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str | None:
         ("work", "handed in"): f"submitted group {group} of batch {body.get('batch')}",
         ("work", "taken back"): f"reopened group {group} of batch {body.get('batch')}",
         ("agreement", "agreed"): f"annotations agree, {person}’s is used",
-        ("agreement", "decided"): f"decided for {person}’s annotation",
+        ("agreement", "decided"): f"chose {person}’s annotation",
         ("agreement", "limits"): "set the limits of agreement",
         ("gold", "marked"): f"marked group {group} as gold",
         (
             "gold",
             "changed",
-        ): f"lets annotators of gold group {group} begin with {_STARTS.get(str(body.get('start')))}",
+        ): f"set what annotators of gold group {group} begin with: {_STARTS.get(str(body.get('start')))}",
         ("gold", "unmarked"): f"unmarked gold group {group}",
     }
     if row.kind == "work" and did in _BATCH_EVENTS and "name" in body:

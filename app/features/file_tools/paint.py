@@ -126,8 +126,8 @@ def picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]:
 PROPOSED, UNSURE, NOTHING = PROPOSAL_OUTCOMES
 """Outcomes: the camera is the paint's; the clicks' camera stays; there is none."""
 SENTENCES = {
-    "no_paint": "too little paint is seen: the camera of the clicks stays",
-    "paint_disagrees": "the paint and the clicks disagree: the camera of the clicks stays",
+    "no_paint": "too little paint is seen: the camera from the annotated lines is kept",
+    "paint_disagrees": "the paint and the annotated lines disagree: the camera from the lines is kept",
 }
 
 
@@ -292,7 +292,9 @@ def _snap_picture(
     try:
         snapped = _snap_to_paint(picture, field, clicked)
     except (GeometryError, np.linalg.LinAlgError) as error:
-        broken = f"the paint cannot be solved ({error}): the camera of the clicks stays"
+        broken = (
+            f"the paint cannot be solved ({error}): the camera from the annotated lines is kept"
+        )
         return _result_row(frame, UNSURE, reason=broken), kept, None
     spent = 1000 * (time.thread_time() - began)
     seen = measure_agreement(snapped.camera, field, find_line_like(picture.image, field))

@@ -435,7 +435,7 @@ def _report_contradicted(
         "--calibration given"
     )
     shown = len(set[int]().union(*showing))
-    where = f"{shown:,} of {len(groups):,} groups show {'it' if len(off) == 1 else 'one of them'}, and it fails there at the gate jac"
+    where = f"{shown:,} of {len(groups):,} groups show {'it' if len(off) == 1 else 'one of them'} and fail at the gate jac"
     report.remark(contradiction_sentence(off, where, f"`{command}`"))
 
 

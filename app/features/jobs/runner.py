@@ -413,7 +413,7 @@ def _instants_sentence(result: Json) -> str:
     if changed:
         there += f"; {plural(changed, 'group')} got views of replays"
     if views or outside:
-        there += f"; {plural(views, 'view')} of linked replays, {outside:,} outside of them"
+        there += f"; {plural(views, 'view')} of linked replays added, {outside:,} missing"
     return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
 
 
@@ -433,9 +433,9 @@ def _camera_tracking_sentence(result: Json) -> str:
 
 def _link_sentence(result: Json) -> str:
     live, replay = result["rays"]
-    seen = f"{live:,} live rays, {replay:,} of the replay"
+    seen = f"{live:,} rays of the live shot, {replay:,} of the replay"
     left = f", {result['left_out']:,} left out" if result["left_out"] else ""
-    told = "The ball tells the times" if result["reason"] is None else result["reason"].rstrip(".")
+    told = "The times were found" if result["reason"] is None else result["reason"].rstrip(".")
     return f"{told} ({seen}{left})."
 
 

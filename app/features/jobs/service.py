@@ -354,7 +354,9 @@ class Jobs(JobRecords):
             return {"state": WAITING, "started": None, "sentence": "Started again."}
         sentence = "The server stopped before this was done. Start it again."
         if job.kind in self._resumers:
-            sentence = f"The server died {job.tries} times at this, so it is not begun again."
+            sentence = (
+                f"The server crashed {job.tries} times during this job, so it is not started again."
+            )
         problem = {"detail": sentence, "hint": None, "pointer": None}
         return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
 

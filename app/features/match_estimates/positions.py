@@ -281,7 +281,7 @@ def _state_sentence(state: PositionState) -> str:
     if state.mean is not None:
         x, y, z = state.mean
         kept += f", ({x:.1f}, {y:.1f}, {z:.1f}) m on average, sigma {state.sigma_m:.2f} m"
-    changed = "what it was estimated from has changed since"
+    changed = "the data that it was estimated from has changed since"
     if not state.used:
         kept += "; the policy does not use it"
         return kept if state.current else f"{kept}, and {changed}"

@@ -231,7 +231,7 @@ def anchor_sentence(proposal: RigProposal) -> str:
     weak = "the cameras in use, as far as 10 px in the picture"
     if proposal.line_points:
         return f"held in place by {proposal.line_points} points of field lines and by {weak}"
-    return f"held in place by {weak}; no camera has lines, so where the pitch lies rests on them"
+    return f"held in place by {weak}; no camera has lines, so these also fix the place of the pitch"
 
 
 def time_sentence(proposal: RigProposal) -> str:
@@ -249,8 +249,8 @@ def time_sentence(proposal: RigProposal) -> str:
     if not sure:
         pair, offset, sigma = min(known, key=lambda item: item[2])
         return (
-            "no camera is ahead of another: "
-            f"{pair.b} of {pair.a} by {offset:+.3f} +- {sigma:.3f} frames, the surest pair"
+            "no camera is ahead of another: the most certain pair, "
+            f"{pair.b} and {pair.a}, differs by {offset:+.3f} +- {sigma:.3f} frames"
         )
     pair, offset, sigma = max(sure, key=lambda item: abs(item[1]))
     first, second = (pair.b, pair.a) if offset > 0 else (pair.a, pair.b)

@@ -79,7 +79,7 @@ class PitchState:
         used = f"{self.pitch.length:g} x {self.pitch.width:g} m"
         whole = "whole match" if self.match else "groups without a match"
         return (
-            f"The lines of {found.frames} frames show a pitch of {sizes}, and it is solved as "
+            f"The lines of {found.frames} frames show a pitch of {sizes}, but it is solved with "
             f"{'several sizes' if self.mixed else used}; accept the size for the {whole} "
             "under Statistics."
         )

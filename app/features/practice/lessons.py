@@ -255,7 +255,7 @@ def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feed
     if verdict.state == "unreviewed" or verdict.stale:
         return _first_feedback(truth, group, words)
     if verdict.state == "deferred":
-        return words.say(ALMOST, "You put this group off. That is fine when you are not sure.")
+        return words.say(ALMOST, "You deferred this group. That is fine when you are not sure.")
     if verdict.state == "accepted":
         return _judge_accepted(truth, group, words)
     return _judge_rejected(truth, verdict.reason, words)
@@ -271,8 +271,8 @@ def _first_feedback(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
         letter = view_letter(_view_index(group, _views_turned(truth, group)[0]))
         return Feedback(
             OPEN,
-            f"Look again: view {letter} was labelled rightly, and now its sides are exchanged. "
-            "Ctrl Z takes that back.",
+            f"Look again: view {letter} was labelled correctly, and now its sides are swapped. "
+            "Ctrl Z undoes that.",
         )
     return Feedback(OPEN)
 
@@ -282,26 +282,26 @@ def _judge_accepted(truth: SceneTruth, group: Group, words: _LessonTexts) -> Fee
     if kind == CLEAN:
         if _is_sound(truth, group):
             return words.say(RIGHT, "")
-        return words.say(WRONG, "The group was sound, and an edit has spoilt it.")
+        return words.say(WRONG, "The group was correct before your edit.")
     if kind not in _REASONS and _is_corrected(truth, group):
         return words.say(RIGHT, "You fixed it.")
     if kind != "tiny_baseline" and _is_left_out(truth, group):
         if kind == "not_synchronous":
             return words.say(RIGHT, "You left that view out, and the others agree.")
         return words.say(
-            ALMOST, "Leaving the view out works, but it could be fixed, and it is lost now."
+            ALMOST, "Leaving the view out works, but the view could be fixed and is lost now."
         )
-    return words.say(WRONG, "The group was accepted with its fault.")
+    return words.say(WRONG, "You accepted the group with its fault.")
 
 
 def _judge_rejected(truth: SceneTruth, reason: str | None, words: _LessonTexts) -> Feedback:
     kind = lesson_kind(truth)
     if kind == CLEAN:
-        return words.say(WRONG, "A good group was lost.")
+        return words.say(WRONG, "You rejected a good group.")
     if kind not in _REASONS:
-        return words.say(WRONG, "It could have been fixed, and a good group was lost.")
+        return words.say(WRONG, "The group could have been fixed, and you rejected it.")
     if reason == _REASONS[kind]:
-        return words.say(RIGHT, "The reason is the right one, too.")
+        return words.say(RIGHT, "Your reason is right, too.")
     return words.say(ALMOST, "It is right to reject this group, but another reason fits better.")
 
 
@@ -331,7 +331,7 @@ class _LessonTexts:
         return Feedback(state, sentence, self._words.best.format(**self._values))
 
 
-_PLAIN = ("You ", "The ", "It ", "A ", "Leaving ", "Nothing ")
+_PLAIN = ("You ", "Your ", "The ", "It ", "A ", "Leaving ", "Nothing ")
 """Beginnings that are written small behind a colon."""
 
 

@@ -106,17 +106,17 @@ def judge_shots(truth: FilmTruth, shots: Sequence[Shot]) -> RecordingLesson:
     if wrong:
         one = wrong[0]
         shown = _KINDS.get(one.kind, "something else")
-        told += f" Frames {one.first} to {one.last} are one shot of their own, and show {shown}."
+        told += f" Frames {one.first} to {one.last} are a shot of their own: {shown}."
         beside = [other for other in shots if abs(other.first - one.first) <= NEAR_FRAMES]
         if beside and abs(beside[0].last - one.last) <= NEAR_FRAMES:
-            told += f" Here they are called {_KINDS.get(beside[0].kind, 'something else')}."
+            told += f" The list calls it {_KINDS.get(beside[0].kind, 'something else')}."
     elif len(shots) > len(truth.shots):
-        told += f" {plural(len(shots) - len(truth.shots), 'shot')} too many."
+        told += f" The list has {plural(len(shots) - len(truth.shots), 'shot')} too many."
     done = not wrong and len(shots) == len(truth.shots)
     return RecordingLesson(
         "shots",
-        "One cut is missing from the list of shots, and one shot is called what it is not. Make the list right.",
-        "Step through the film with the arrows. S splits the shot at the frame on screen, 1 to 4 say what a shot is.",
+        "One cut is missing from the list of shots, and one shot has the wrong kind. Correct the list.",
+        "Step through the film with the arrow keys. S splits the shot at the frame on screen; 1 to 4 set its kind.",
         "right" if done else "open",
         told,
         (wrong[0] if wrong else truth.shots[0]).first,
@@ -147,14 +147,14 @@ def judge_cameras(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Record
     middle = float(np.median(list(off.values()))) if off else None
     if middle is not None:
         worst = max(off, key=lambda number: off[number])
-        told += f" The grass lies {middle:.1f} px from where it is (median; {off[worst]:.1f} px in frame {worst})."
+        told += f" Pitch error in the picture: {middle:.1f} px in the median, {off[worst]:.1f} px in frame {worst}."
     state: State = "right" if len(right) == len(numbers) else "open"
     if state == "open" and len(right) >= 0.95 * len(numbers):
         state = "almost"
     return RecordingLesson(
         "cameras",
-        "The camera of this shot is lost for a while. Mend one of these frames, and let the shot follow.",
-        "N goes to a lost frame, E draws its lines; when they are saved, T tracks the shot again.",
+        "The camera of this shot is lost for a while. Draw the lines in one of these frames, and track the shot again.",
+        "N goes to a lost frame, E opens it to draw its lines; when they are saved, T tracks the shot again.",
         state,
         told,
         lost[0] if lost else shot.first,
@@ -181,16 +181,18 @@ def judge_side(truth: FilmTruth, frames: Mapping[int, FrameCamera]) -> Recording
     if not away:
         told = "The replay has no cameras: track it."
     elif is_right:
-        told = f"The camera of the replay stands {np.median(away):.2f} m from where it is (median)."
+        told = (
+            f"The camera of the replay stands {np.median(away):.2f} m from its true place (median)."
+        )
     else:
         told = (
-            f"The camera of the replay stands {np.median(away):.0f} m from where it is; turned by half it would be "
-            f"{np.median(turned):.2f} m."
+            f"The camera of the replay stands {np.median(away):.0f} m from its true place; on the other side it would be "
+            f"{np.median(turned):.2f} m from it."
         )
     return RecordingLesson(
         "side",
-        "The paint of a pitch is the same from both sides. On which side does the camera of the replay stand?",
-        "Compare stands, benches and the goal that is attacked with the live shot. Shift T turns the cameras by half.",
+        "The lines of a pitch look the same from both sides. On which side does the camera of the replay stand?",
+        "Compare stands, benches and the attacked goal with the live shot. Shift T turns the cameras to the other side.",
         "right" if is_right else "open",
         told,
         shot.first,
@@ -211,29 +213,27 @@ def judge_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingLesson:
     if known is None:
         told = "The replay is not linked yet."
         if fitting:
-            told = "The replay is linked to the right shot; no instant says its times yet."
+            told = "The replay is linked to the right shot, but no instant is linked yet."
         elif mine:
-            told = f"The replay does not show frames {mine[0].live.first} to {mine[0].live.last}."
+            told = f"It is linked to frames {mine[0].live.first} to {mine[0].live.last}, which the replay does not show."
     else:
         middle = (replay.first + replay.last) / 2
         shown = known.map.live(np.array([(middle - known.replay.first) / truth.fps]))[0]
         shown += known.live.first / truth.fps
         off = float(abs(shown - truth.offset_s - truth.speed * middle / truth.fps) * truth.fps)
-        told = f"In its middle the replay is {off:.1f} live frames off."
+        told = f"In the middle of the replay its time is off by {off:.1f} live frames."
         speed = known.map.speed
         if known.map.outcome == "offset":
             told += " Its speed is assumed: link a second instant."
         elif speed is not None:
             percent = 100 * abs(speed / truth.speed - 1)
-            told += (
-                f" Its speed is {speed:.3f}; in truth it is {truth.speed:g} ({percent:.1f} % off)."
-            )
+            told += f" Its speed is {speed:.3f}; the true speed is {truth.speed:g} ({percent:.1f} % off)."
             near = off <= NEAR_LIVE_FRAMES and percent <= NEAR_PERCENT
             state = "right" if near else "almost"
     return RecordingLesson(
         "link",
         "Which live shot does the replay show, from when, and how slowly?",
-        "Link to live beside the replay. Scrub both sides to the same instant and press I, twice, far apart.",
+        "Open the replay and link it to its live shot. Go to the same instant in both and press I; do it twice, far apart.",
         state,
         told,
         replay.first,

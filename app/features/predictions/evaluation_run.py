@@ -106,7 +106,7 @@ class AcceptedTruth:
         own = f", {self.own} of them from the very set that is evaluated" if self.own else ""
         warning = (
             f"Warning: the ball of {self.frames} of {self.of} frames is an accepted "
-            f"prediction{own}; such a truth flatters what predicted it."
+            f"prediction{own}; this makes the detector that predicted it look too good."
         )
         return [
             replace(table, note=f"{table.note} {warning}".strip())

@@ -90,20 +90,20 @@ _HIDDEN_FIELDS = (
     ),
     QueryField("reason", "text", "why it was rejected", values=(*WHETHER, *REASONS)),
     _flag_field("stale", "changed after its verdict"),
-    _flag_field("solved", "has numbers"),
+    _flag_field("solved", "is solved"),
     _flag_field("passes", "passes every gate"),
     _flag_field("fixed", "edited before it was accepted"),
     QueryField("pictures", "choice", "whether its views have a picture", values=("none", "any", "all")),
     QueryField(
-        "proposal", "choice", "what was proposed from a view's paint, as long as its lines stay",
+        "proposal", "choice", "what was proposed from a view's paint, until its lines change",
         values=(*WHETHER, *PROPOSAL_OUTCOMES),
     ),
-    _text_field("split", "train, test and so on, all of it"),
+    _text_field("split", "train, test and so on, the whole name"),
     _text_field("match", "part of the match's name", ()),
     _text_field("reviewer", "person who decided"),
     _text_field("view", "key of a view, or how many views there are", ()),
-    _text_field("label", "part of the label or of the key, as a bare word", ()),
-    _text_field("key", "key of the group, all of it"),
+    _text_field("label", "part of the label or of the key, like a word without a field", ()),
+    _text_field("key", "key of the group, the whole key"),
     _text_field("override", "gate that an acceptance overrides"),
     QueryField(
         "comments", "choice", "comments on it",
@@ -127,7 +127,7 @@ _HIDDEN_FIELDS = (
         "least agreement of the views' cameras with their paint, 0 to 1; none: no paint was read",
     ),
     _number_field("error", "error_px", "larger reprojection error of the best pair, as its gate judges it", "px"),
-    _number_field("error_percent", "error_percent", "the same", "% of the image diagonal"),
+    _number_field("error_percent", "error_percent", "the same error", "% of the image diagonal"),
     _number_field("sigma", "sigma_m", "standard deviation of the ball along its worst axis", "m"),
     _number_field("parallax", "parallax_degrees", "largest angle between two rays at the ball", "degrees"),
     _number_field("size_ratio", "size_ratio", "diameter of the ball's box by the expected one", "", "ratio"),
@@ -141,7 +141,7 @@ _HIDDEN_FIELDS = (
         "how far the deciding gate is from its threshold: 0.1 is 10 % of it, below 0 fails", "share",
     ),
     _number_field(
-        "value", "value", "the margin without its sign: small where a small mistake decides", "share"
+        "value", "value", "the margin without its sign: small where a small change decides", "share"
     ),
     _number_field("views", "views", "how many views"),
     _number_field("number", "number", "place in the dataset, from 1"),

@@ -69,7 +69,7 @@ def request_turn(
     found = require_turnable(store, recording_id, frame, turned)
     return jobs.submit(
         KIND,
-        f"Turn the camera of frames {found.first} to {found.last} of {recording.name} by half",
+        f"Turn the camera of frames {found.first} to {found.last} of {recording.name} to the other side",
         partial(cameras_work, jobs, store),
         dataset_id=recording.dataset_id,
         actor=actor,

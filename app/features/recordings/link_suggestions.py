@@ -161,18 +161,16 @@ def _rank(like: PathComparison | None) -> tuple[float, float]:
 
 def _why(one: _Candidate, short: bool, like: PathComparison | None) -> str:
     if one.before is None:
-        told = f"Main camera of {one.recording.name}; when that was, nothing says"
+        told = f"Main camera of {one.recording.name}; the time of this shot is not known"
     else:
         told = f"Main camera, {one.seconds:.1f} s long, ends {one.before:.1f} s before the replay"
     told += ", shorter than a replay of this length shows." if short else "."
     if like is None:
         return told
     if like.apart_m > UNLIKE_M:
-        return f"{told} It looks elsewhere: {like.apart_m:.0f} m away at best."
-    turned = ", once the replay is turned by half" if like.turned else ""
-    return (
-        f"{told} Both look at places {like.apart_m:.0f} m apart{turned}, at speed {like.speed:.2g}."
-    )
+        return f"{told} It shows another part of the pitch, at least {like.apart_m:.0f} m away."
+    turned = ", if the replay is turned to the other side" if like.turned else ""
+    return f"{told} At speed {like.speed:.2g}, both show places {like.apart_m:.0f} m apart{turned}."
 
 
 class _Paths:

@@ -86,8 +86,8 @@ def contradiction_sentence(off: Mapping[str, float], where: str, how: str) -> st
     return (
         f"The lines of {', '.join(sorted(off))} do not fit the given "
         f"calibration (JaC {low if low == high else f'{low} to {high}'}): "
-        f"{where}. Were they drawn on another day, {how} takes the given cameras as they are and "
-        "leaves their lines aside."
+        f"{where}. If they were drawn for another day, {how} uses the given cameras as they are and "
+        "ignores the lines."
     )
 
 

@@ -170,5 +170,5 @@ def _nothing(rate: float, first: int, last: int) -> tuple[BallTrack, TrackInputs
     frames = np.arange(first, last + 1)
     times, empty = frames / rate, np.zeros(0)
     measured = BallMeasurements(np.zeros(0, dtype=np.int64), empty, (), np.zeros((0, 2)), empty, ())
-    reason = "No group around this frame takes part."
+    reason = "No group near this frame is part of the track."
     return BallTrack.none(frames, times, reason), TrackInputs(frames, times, Pitch(), measured)

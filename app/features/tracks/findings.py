@@ -175,8 +175,8 @@ def _notices(
         key = None if known is None else _view_of(known, item)
         if known is not None and key is not None:
             sentence = (
-                f"It lies {item.px:.0f} px beside the track of the ball over time: "
-                "another ball, or a slip."
+                f"It lies {item.px:.0f} px from the track of the ball over time: "
+                "another ball, or a wrong click."
             )
             found.append(
                 BallNotice(known.id, key, sentence, item.px, item.place, known.inputs_hash)

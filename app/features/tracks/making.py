@@ -225,7 +225,7 @@ def jumps_sentence(jumps: Sequence[ViewJump]) -> str | None:
         return None
     metres = sorted(jump.metres for jump in jumps)
     return (
-        f"The ball jumps where other views take over, {plural(len(jumps), 'time')}, by {metres[len(metres) // 2]:.1f} m "
+        f"The ball jumps where the views change, {plural(len(jumps), 'time')}, by {metres[len(metres) // 2]:.1f} m "
         f"in the median and {metres[-1]:.1f} m at most: their cameras contradict each other there."
     )
 

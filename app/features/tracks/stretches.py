@@ -252,7 +252,7 @@ def _row(record: ExportRecord, instant: Instant, known: dict[bytes, Camera]) -> 
             unused["view left out"] += ball
             continue
         if _taken_from(view).get("repeated"):
-            unused["frame that shows the one before once more"] += ball
+            unused["frame that repeats the one before"] += ball
             continue
         views.append(view)
         # A static camera's equal values are one object, so that a solver sees six and not thousands.

@@ -25,11 +25,11 @@ LABELS = {
     "jac": "Field lines fit",
     "agreement": "Paint agrees",
     "two_views": "Two calibrated views",
-    "ball": "Ball in two of them",
-    "baseline": "Cameras apart",
-    "reprojection": "Views meet in one ball",
+    "ball": "Ball in two of these views",
+    "baseline": "Cameras far enough apart",
+    "reprojection": "Views agree on one ball",
     "parallax": "Enough parallax",
-    "sigma": "Certain enough",
+    "sigma": "Position certain enough",
     "chi_square": "Residuals small enough",
 }
 """What a step of the funnel asks, for people."""

@@ -214,7 +214,7 @@ class TestPropose:
         # Twice as narrow as it was taken: the grass is foreshortened as from farther up.
         blank = np.full((800, 800, 3), 60, np.uint8)
         reason = why_not_square(blank, TRUE, PITCH)
-        assert reason is not None and "shape of a broadcast" in reason
+        assert reason is not None and "aspect ratio is not that of a broadcast" in reason
         assert why_not_square(np.full((540, 960, 3), 60, np.uint8), TRUE, PITCH) is None
 
     def test_three_lines_say_too_little_of_the_camera(self):

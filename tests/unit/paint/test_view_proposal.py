@@ -65,7 +65,7 @@ def test_a_picture_that_cannot_be_solved_gets_a_sentence(monkeypatch: pytest.Mon
     monkeypatch.setattr(view_proposal, "propose_camera", fail)
     found = propose_lines_in_image(lawn(drawn(TRUE, 3)), SMALL, (), PITCH, POLICY)
     assert (found.outcome, found.lines) == ("nothing", {})
-    assert found.sentence == "The paint of this picture cannot be solved."
+    assert found.sentence == "No camera can be computed from the paint of this picture."
 
 
 def test_cameras_of_other_frames_are_what_is_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -152,7 +152,7 @@ class TestGivenCameras:
         assert (gate.passed, gate.value) == (True, None)
         assert "no known uncertainty" in gate.sentence
         item = next(item for item in solution.findings if item.kind == "views_contradict")
-        assert "Nobody says how exact the given cameras are" in item.sentence
+        assert "The accuracy of the given cameras is not known" in item.sentence
 
     def test_with_a_sigma_gate_and_finding_speak(self) -> None:
         solution = self.judged(replace(self.ASKED, given_sigma_px=1.0), 1, 15.0)

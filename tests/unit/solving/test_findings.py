@@ -101,7 +101,7 @@ class TestViewDisagrees:
         assert item.threshold == pytest.approx(TAU)
         assert item.fix == Fix("exclude_view", "c")
         here = "at best 35.0 px apart here and 20.0 px in B"
-        assert f"{here}, {TAU:.1f} px are allowed" in item.sentence
+        assert f"{here}; at most {TAU:.1f} px is allowed" in item.sentence
 
     def test_a_view_that_was_not_judged_does_not_disagree(self) -> None:
         views = [solved("a"), solved("b"), solved("c", included=False)]
@@ -136,7 +136,9 @@ class TestMissesBall:
         assert (one.kind, one.view, one.number) == ("view_disagrees", "a", 37.7)
         assert (other.view, other.number) == ("c", 61.1)
         assert other.threshold == pytest.approx(TAU)
-        assert f"61.1 px from the ball of this view, {TAU:.1f} px are allowed" in other.sentence
+        assert (
+            f"61.1 px from the ball of this view; at most {TAU:.1f} px is allowed" in other.sentence
+        )
         assert other.fix == Fix("exclude_view", "c")
 
     @pytest.mark.parametrize("error_px", [None, 0.0, TAU])
@@ -202,27 +204,29 @@ class TestViewsContradict:
         assert (item.kind, item.view, item.fix) == ("views_contradict", None, None)
         assert (item.number, item.threshold) == (0.00016, 0.002)
         assert "by chance" not in item.sentence and "1 of 6,200 groups" in item.sentence
-        assert "about 80 ms (10 to 170)" in item.sentence
+        assert "about 80 ms apart (10 to 170)" in item.sentence
 
     def test_the_numbers_of_the_contradiction_and_of_the_wider_sigma_are_told(self) -> None:
         wide = replace(GOOD, sigma_m=0.94)
         test = ChiSquare(350.0, 1, 4e-78, ("a", "b"))
         (item, _) = found(made("ab"), torn=Contradiction(test, None, None), ball=wide)
         assert "(χ² 350.0, 1 degree of freedom) in only less than 1 of a million" in item.sentence
-        assert "Sigma is widened 18.7 times for it, to 0.94 m" in item.sentence
+        assert "Because of this, sigma is 18.7 times larger: 0.94 m" in item.sentence
 
     def test_where_nobody_knows_the_cameras_the_way_to_their_noise_is_told(self) -> None:
         for known in (True, False):
             torn = Contradiction(self.TWO, None, None, is_known=known)
             (item,) = found(made("ab"), torn=torn)
-            assert ("Nobody says how exact the given cameras are" in item.sentence) == (not known)
+            assert ("The accuracy of the given cameras is not known" in item.sentence) == (
+                not known
+            )
 
     def test_the_view_without_which_the_others_agree_is_to_be_left_out(self) -> None:
         torn = Contradiction(self.THREE, "c", 0.97, 0.35, None)
         (item,) = found(made("abc"), torn=torn)
         assert (item.view, item.confidence) == ("c", 0.97)
         assert item.fix == Fix("exclude_view", "c")
-        assert "by at least 10 ms" in item.sentence
+        assert "at least 10 ms apart" in item.sentence
 
     def test_no_instant_is_named_where_no_ball_moves_as_far(self) -> None:
         (item,) = found(made("ab"), torn=Contradiction(self.TWO, None, None, 0.35, 60.0))
@@ -249,7 +253,10 @@ class TestOfTheBall:
 
     def test_the_words_of_uncertainty_do_not_say_that_contradicting_views_agree(self) -> None:
         torn = Contradiction(TestViewsContradict.TWO, None, None)
-        for contradiction, words in ((None, "although the views agree"), (torn, "contradict it")):
+        for contradiction, words in (
+            (None, "although the views agree"),
+            (torn, "contradict each other"),
+        ):
             items = found(made("ab"), ball=replace(GOOD, sigma_m=0.9), torn=contradiction)
             assert words in next(one for one in items if one.kind == "high_uncertainty").sentence
 
@@ -258,14 +265,14 @@ class TestOfTheBall:
         (item,) = found(made("ab"), ball=replace(GOOD, sigma_m=sigma))
         assert (item.number, item.is_unusable_ball) == (sigma, unusable)
         assert item.threshold == (2.0 if unusable else 0.25)
-        assert (f"known to ± {sigma:.2f} m only" in item.sentence) == unusable
+        assert (f"known only to ± {sigma:.2f} m" in item.sentence) == unusable
 
     def test_an_implausible_place_of_which_nothing_is_known_says_so(self) -> None:
         ball = replace(GOOD, point=(0.0, 42.0, -14.0), sigma_m=64.6, parallax_degrees=0.2)
         item = found(made("ab"), ball=ball)[0]
         assert (item.kind, item.number, item.threshold) == ("implausible_ball", 8.0, 6.5)
         assert (
-            "is 8 m outside the pitch at a height of 14.00 m, known to ± 64.60 m only, with rays that "
+            "is 8 m outside the pitch at a height of 14.00 m, known only to ± 64.60 m, with rays that "
             "meet at 0.2°"
         ) in item.sentence
 

@@ -129,7 +129,7 @@ class TestUnobservable:
         planted = plant(BALL, 1, speed=0.5, noise_px=0.5, stand=OPPOSITE)
         made = find_time_map(planted.live.rays(), planted.replay.rays().turned())
         assert made.turned and made.pieces == ()
-        assert "stand on the other side" in (made.reason or "")
+        assert "turned to the other side of the pitch" in (made.reason or "")
         assert not linked(planted).turned
 
     def test_exchanged_cameras(self) -> None:
@@ -147,7 +147,7 @@ class TestUnobservable:
     def test_too_few_rays(self) -> None:
         planted = plant(BALL, 1)
         few = planted.replay.rays().part(np.arange(10))
-        assert "replay view has 10 rays" in find_time_map(planted.live.rays(), few).reason
+        assert "replay has 10 rays" in find_time_map(planted.live.rays(), few).reason
 
     def test_half_a_second_is_too_short(self) -> None:
         planted = plant(BALL, 1, speed=0.25, noise_px=0.3, missing=0.0, stand=OPPOSITE)

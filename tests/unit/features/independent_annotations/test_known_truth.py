@@ -125,7 +125,7 @@ class TestSample:
             assert set_gold_start(store, 1, "imported", actor="lea").source is TruthSource.SAMPLE
         audit = read_audit(store, AuditQuery(), EVERYTHING).items
         assert [one.sentence for one in audit if one.kind == "gold"] == [
-            "lets annotators of gold group 1 begin with the imported annotations",
+            "set what annotators of gold group 1 begin with: the imported annotations",
             "marked 1 group of a sample as gold",
         ]
 

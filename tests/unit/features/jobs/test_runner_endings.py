@@ -112,18 +112,18 @@ RESULTS = [
             "linked_views": 3,
             "outside": 1,
         },
-        "1 group made of half.mp4; 2 groups got views of replays; 3 views of linked replays, 1 outside "
-        "of them.",
+        "1 group made of half.mp4; 2 groups got views of replays; 3 views of linked replays "
+        "added, 1 missing.",
     ),
     (
         "link",
         {"reason": None, "rays": (90, 140), "left_out": 0},
-        "The ball tells the times (90 live rays, 140 of the replay).",
+        "The times were found (90 rays of the live shot, 140 of the replay).",
     ),
     (
         "link",
         {"reason": "The ball hardly moves.", "rays": (90, 140), "left_out": 3},
-        "The ball hardly moves (90 live rays, 140 of the replay, 3 left out).",
+        "The ball hardly moves (90 rays of the live shot, 140 of the replay, 3 left out).",
     ),
     (
         "ball",

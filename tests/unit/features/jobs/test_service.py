@@ -332,7 +332,7 @@ class TestRestart:
         assert found.state == state
         if state == "failed":
             assert found.problem["detail"] == (
-                "The server died 2 times at this, so it is not begun again."
+                "The server crashed 2 times during this job, so it is not started again."
             )
         later.close()
 

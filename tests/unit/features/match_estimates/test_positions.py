@@ -138,7 +138,7 @@ class TestSharePositions:
         assert load(shared, 1).solution is not None
         assert stale_groups(shared, "demo") == []
         assert state(shared).current is False
-        assert "what it was estimated from has changed" in state(shared).sentence
+        assert "the data that it was estimated from has changed" in state(shared).sentence
         assert "share it again" in state(shared).sentence
 
     def test_it_is_renewed_when_somebody_asks_and_the_others_follow(self, shared):
@@ -196,7 +196,9 @@ class TestSharePositions:
         assert "keep a shared position" in state(shared).sentence
         assert state(shared).sentence.endswith("the policy does not use it")
         draw(shared, 1)
-        assert "does not use it, and what it was estimated from has" in state(shared).sentence
+        assert (
+            "does not use it, and the data that it was estimated from has" in state(shared).sentence
+        )
 
     def test_a_view_whose_picture_was_changed_takes_no_part(self, shared):
         edit = SetPicture(load(shared, 1).group.views[0].key, OPEN)

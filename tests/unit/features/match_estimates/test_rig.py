@@ -109,7 +109,7 @@ class TestPropose:
         # Not the mean: which of two comes first says nothing.
         none = said((0.05, 0.01), (-0.05, 0.02))
         assert none.startswith("no camera is ahead")
-        assert f"{first.b} of {first.a} by +0.050 +- 0.010 frames" in none
+        assert f"{first.b} and {first.a}, differs by +0.050 +- 0.010 frames" in none
         assert said() == "too few moving balls to see whether a camera is ahead of another"
 
     def test_a_ball_that_was_put_where_others_see_it_says_nothing(self, store, fill) -> None:

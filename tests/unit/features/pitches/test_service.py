@@ -102,7 +102,7 @@ class TestEstimatePitches:
         assert found["group"] == f"{SMALL}/0.png"
         listed = list_groups(solved, dataset_id(solved, "demo"), "finding:pitch_size").items
         assert [row.key for row in listed] == [found["group"]]
-        assert "solved as 105 x 68 m" in found["sentence"]
+        assert "solved with 105 x 68 m" in found["sentence"]
 
     def test_what_is_known_is_not_computed_again(self, solved, monkeypatch):
         from app.features.pitches import service as pitches
@@ -293,7 +293,7 @@ class TestReadPitches:
         assert small.proposed.length == pytest.approx(103.0, abs=0.3)
         assert right.proposed.length == pytest.approx(105.0, abs=0.3)
         assert (small.previous, right.previous) == (Pitch(), Pitch())
-        assert "solved as several sizes" in right.sentence
+        assert "solved with several sizes" in right.sentence
 
     def test_a_minority_of_another_size_is_told(self, solved):
         accept(solved)

@@ -80,7 +80,7 @@ class TestSoundGroup:
         said = told(scene, scene.group, rejected("bad_field_lines"))
         assert said.state == "wrong"
         assert said.sentence is not None
-        assert said.sentence.startswith("Look again: a good group was lost.")
+        assert said.sentence.startswith("Look again: you rejected a good group.")
 
     def test_accepting_it_after_spoiling_it_is_wrong(self, scenes: dict[str, Scene]):
         scene = scenes[CLEAN]
@@ -120,7 +120,7 @@ class TestMendable:
         said = told(scene, turned, NONE)
         assert said.state == "open"
         assert said.sentence is not None
-        assert "view A was labelled rightly" in said.sentence
+        assert "view A was labelled correctly" in said.sentence
         # The solver sees two views that agree: only the truth knows better.
         assert told(scene, turned, ACCEPTED).state == "wrong"
 

@@ -68,12 +68,12 @@ def test_the_shot_that_looks_where_the_replay_looks_comes_before_a_nearer_one(
     track(store, 3, replay)
     one, *others = suggested(api, match)
     assert (one["first"], one["turned"]) == (0, True) and one["apart_m"] < 6
-    assert "once the replay is turned by half, at speed 0.5" in one["why"]
+    assert "At speed 0.5, both show places" in one["why"]
     assert [other["apart_m"] for other in others] == [None, None]
     track(store, 2, follow(15.0, stand))
     found = suggested(api, match)
     assert found[0]["first"] == 0 and found[-1]["first"] == 150
-    assert "It looks elsewhere" in found[-1]["why"]
+    assert "It shows another part of the pitch" in found[-1]["why"]
 
 
 def test_shots_of_another_half_are_no_partners(api: Any, match: str) -> None:

@@ -418,7 +418,7 @@ class TestSuggestions:
         told = [(one["recording"], one["first"], one["link"]) for one in found]
         assert told == [(1, 20, None), (1, 0, link), (other, 0, None)]
         assert found[0]["why"] == "Main camera, 0.4 s long, ends 0.0 s before the replay."
-        assert found[2]["why"] == "Main camera of other; when that was, nothing says."
+        assert found[2]["why"] == "Main camera of other; the time of this shot is not known."
 
     def test_a_frame_in_no_shot_is_refused(self, api: Any, recording: str) -> None:
         answer = api.get(f"{recording}/links/suggestions/60")

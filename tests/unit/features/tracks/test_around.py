@@ -89,7 +89,7 @@ class TestTrackAround:
                 if_match=load(store, group).etag, actor="ann",
             )  # fmt: skip
         detail = track_around(store, track, FIRST + AT)
-        assert detail.ball.reason == "No group around this frame takes part."
+        assert detail.ball.reason == "No group near this frame is part of the track."
 
     def test_is_of_the_worst_frame_where_none_is_named(self, store: Store, track: int) -> None:
         (worst,) = [found.summary.worst for found in list_tracks(store, "demo")]

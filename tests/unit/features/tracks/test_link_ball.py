@@ -128,7 +128,7 @@ class TestLinkByBall:
         finished(api.post(f"{link}/ball", json=sent))
         found = api.get(link).json()["map"]
         assert (found["outcome"], found["turned"]) == ("unobservable", True)
-        assert "turned by half a turn of the pitch" in found["reason"]
+        assert "turned to the other side of the pitch" in found["reason"]
         at = link.partition("/links")[0]
         job = finished(api.patch(f"{at}/cameras/{LIVE}", json={"turned": True}))
         assert (job.state, job.result["turned"]) == ("done", True)

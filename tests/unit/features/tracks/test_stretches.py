@@ -121,7 +121,7 @@ class TestGatherStretches:
             "final": [100],
             "final link 3": [100],
         }
-        assert stretch.unused == {"frame that shows the one before once more": 1}
+        assert stretch.unused == {"frame that repeats the one before": 1}
 
     @pytest.mark.parametrize("known", [True, False])
     def test_a_slow_replay_of_a_panning_camera_measures_the_ball_at_its_own_times(
