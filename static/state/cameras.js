@@ -11,8 +11,8 @@ import { pitchMarkings } from '../geometry/pitch.js';
 
 /** @type {{[letter: string]: {name: string, meaning: string}}} */
 export const OUTCOMES = {
-	T: { name: 'tracked', meaning: 'the camera lies on the paint' },
-	B: { name: 'bridged', meaning: 'the background carries the camera' },
+	T: { name: 'tracked', meaning: 'the camera was fitted to the painted lines' },
+	B: { name: 'bridged', meaning: 'the camera was computed from the background' },
 	L: { name: 'lost', meaning: 'no camera' },
 };
 

@@ -42,7 +42,7 @@ export function isPainted(one) {
 
 /** What is said beside σ where the policy assumes how noisy clicks are; nothing where its dataset's are estimated. @param {PolicyJson | undefined} policy */
 export function noiseWords(policy) {
-	return policy && policy.noise !== 'estimated' ? 'noise assumed' : '';
+	return policy && policy.noise !== 'estimated' ? 'assumed noise' : '';
 }
 
 /** What these words mean. */

@@ -130,7 +130,7 @@ export function describe(group, edit) {
 	if (edit.kind === 'include') return `View ${letter} ${edit.included ? 'included' : leftOutText(leftOutBy(edit))}`;
 	if (edit.kind === 'ball' && edit.prediction) return `Ball of ${letter} accepted from ${edit.ball?.predicted_by}`;
 	if (edit.kind === 'ball') return `Ball of ${letter} changed`;
-	if (edit.kind === 'picture') return `Picture of ${letter} ${edit.picture ? 'taken as stretched or cropped' : 'taken as it is'}`;
+	if (edit.kind === 'picture') return `Picture of ${letter} ${edit.picture ? 'treated as stretched or cropped' : 'treated as unchanged'}`;
 	const drawn = Object.keys(edit.lines).filter((marking) => edit.lines[marking]);
 	const markings = drawn.length ? drawn : Object.keys(edit.lines);
 	if (edit.notVisible?.length && edit.notVisible.length === markings.length) return `${markings.join(', ')} of ${letter} marked as not visible`;

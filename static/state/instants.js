@@ -50,7 +50,7 @@ async function show(view, items, by) {
 	const ahead = items.map(({ offset }) => offset).concat(0).filter((offset) => (offset - present) * by > 0);
 	const offset = ahead.sort((a, b) => (a - b) * by)[0];
 	if (offset === undefined) {
-		inform(`There is no frame ${by < 0 ? 'before' : 'after'} this one to show: at most five before and after, as far as they are on disk.`);
+		inform(`No more frames ${by < 0 ? 'before' : 'after'} this one can be shown. At most five are shown, if they are on disk.`);
 		return;
 	}
 	const next = items.find((item) => item.offset === offset);
@@ -60,13 +60,13 @@ async function show(view, items, by) {
 	if (drawing.value) endDrawing();
 	selected.value = null;
 	otherInstant.value = next ? { view: view.id, offset, label: next.label, image: next.image } : null;
-	announce(next ? `View ${view.letter} shows ${next.label}. It can only be looked at.` : `View ${view.letter} shows its own frame again.`);
+	announce(next ? `View ${view.letter} shows ${next.label}. You can look at it, but not edit it.` : `View ${view.letter} shows its own frame again.`);
 }
 
 /** Show the view's own frame again. */
 export function backToInstant() {
 	otherInstant.value = null;
-	announce('Back at the instant of the group.');
+	announce('The view shows the instant of the group again.');
 }
 
 // Whoever changes something must see what they change.

@@ -5,7 +5,7 @@
 
 /** How fast a replay runs, in words. @param {number} speed */
 export function speedText(speed) {
-	if (Math.abs(speed - 1) < 0.02) return 'as fast as live';
+	if (Math.abs(speed - 1) < 0.02) return 'at live speed';
 	return speed < 1 ? `${(1 / speed).toFixed(1)} times slower than live` : `${speed.toFixed(1)} times faster than live`;
 }
 
@@ -30,7 +30,7 @@ function timesText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, mis
 	if (outcome === 'offset' && tooClose && reason) return [reason];
 	if (outcome === 'offset') return [`One linked instant tells the time of the replay, not its speed. The replay is assumed to run ${speedText(speed ?? 1)}.`, 'Link a second instant, as far from the first as you can.'];
 	const known = sigma_s === null ? '' : ` Its times are known to ± ${sigmaText(sigma_s * fps)} live frames (one sigma, in the middle of the replay).`;
-	const missed = miss_m === null ? '' : ` The ball's rays miss each other by ${miss_m.toFixed(2)} m.`;
+	const missed = miss_m === null ? '' : ` The rays to the ball miss each other by ${miss_m.toFixed(2)} m.`;
 	return [`The replay runs ${speedText(speed ?? 1)} (speed ${(speed ?? 1).toFixed(3)}${speed_sigma === null ? '' : ` ± ${sigmaText(speed_sigma)}`}). ${source}.${known}${missed}`];
 }
 

@@ -153,7 +153,7 @@ export function goBy(step, count) {
 /** Go to the next or previous group of this queue that has a finding. @param {1 | -1} step */
 export function goFlagged(step) {
 	const words = step > 0 ? 'after' : 'before';
-	return far(`No flagged group comes ${words} this one.`, async (from) => {
+	return far(`No group with a finding comes ${words} this one.`, async (from) => {
 		const found = await getNeighbours(from, `${query.value} ${FLAGGED}`.trim());
 		return (step > 0 ? found.next : found.previous)[0];
 	});

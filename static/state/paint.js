@@ -100,12 +100,12 @@ export async function snapToPaint(only = null) {
 
 /** @param {ReturnType<typeof linesOntoPaint>} snapped @param {string | null} only */
 function stage({ lines: next, moved, left }, only) {
-	const stayed = left ? `; ${plural(left, 'point')} without paint ${left === 1 ? 'stays' : 'stay'}` : '';
+	const stayed = left ? `; ${plural(left, 'point')} without paint nearby ${left === 1 ? 'was' : 'were'} not moved` : '';
 	if (moved.length === 0) {
 		announce(`Nothing was moved${stayed}.`);
 		return;
 	}
-	stageLines(next, only ? `${only} onto the paint` : 'Points onto the paint');
+	stageLines(next, only ? `${only} moved onto the paint` : 'Points moved onto the paint');
 	const median = [...moved].sort((a, b) => a - b)[moved.length >> 1];
 	announce(`${plural(moved.length, 'point')} moved onto the paint, median move ${pixelText(median)}${stayed}.`);
 }
@@ -136,7 +136,7 @@ export async function proposeFromPaint() {
 	const at = view.value;
 	if (!at || asking.value !== null) return;
 	if (!isWaiting.value) {
-		announce('Lines are proposed where those of a view determine no camera: this one has a camera.');
+		announce('Lines are proposed only while a view has no camera; this view has one.');
 		return;
 	}
 	const known = proposals.peek().get(at.key);

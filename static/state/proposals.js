@@ -92,7 +92,7 @@ export async function proposeNow(view) {
 	const id = group.peek()?.id;
 	if (id === undefined || lookedAt.peek().has(view.id)) return;
 	lookedAt.value = new Set([...lookedAt.peek(), view.id]);
-	announce(`Looking at the picture of view ${view.letter}…`);
+	announce(`Searching the picture of view ${view.letter} for lines…`);
 	try {
 		const found = await proposeLines(view.id, {});
 		const before = own.peek().group === id ? own.peek().items : [];
@@ -117,8 +117,8 @@ export function acceptProposal(view) {
 		const names = Object.keys(item.lines);
 		submit({ kind: 'lines', view: view.key, lines: item.lines, proposed: names });
 		const drawn = Object.keys(view.lines).length;
-		const beside = drawn ? `, beside the ${plural(drawn, 'marking')} that ${drawn === 1 ? 'is' : 'are'} drawn` : '';
-		announce(`${plural(names.length, 'marking')} of view ${view.letter} accepted as proposed${beside}. Undo removes them; M swaps left and right.`);
+		const beside = drawn ? `; the ${plural(drawn, 'marking')} drawn before ${drawn === 1 ? 'is' : 'are'} kept` : '';
+		announce(`${plural(names.length, 'marking')} of view ${view.letter} accepted as proposed${beside}. Undo removes the proposed lines; M swaps left and right.`);
 	}
 }
 

@@ -67,7 +67,7 @@ export function lengthText(seconds) {
 	return `${Math.floor(Math.round(seconds) / 60)}:${String(Math.round(seconds) % 60).padStart(2, '0')}`;
 }
 
-export const HALVES = ['1st half', '2nd half', '1st extra', '2nd extra'];
+export const HALVES = ['1st half', '2nd half', 'extra time 1', 'extra time 2'];
 
 /** Seconds of what a clock shows: 12:40; null: it is none. @param {string} text */
 export function clockSeconds(text) {

@@ -78,5 +78,5 @@ export function rebase(staging, base) {
 		if (points) lines[marking] = points;
 		else delete lines[marking];
 	}
-	return stage(begin(base), lines, 'Changes made before theirs');
+	return stage(begin(base), lines, 'Your staged changes, on top of theirs');
 }

@@ -70,7 +70,7 @@ function missingBalls(shown, solved) {
 		if (solved.ball ? !(place && inPicture(view, place)) : solved.passes) return [];
 		const seen = shown.views.some((other) => other !== view && other.balls.length > 0 && solved.views.some((one) => one.view === other.key && one.calibration.camera));
 		const where = seen ? 'The dotted line is the ray of another view: the ball lies on it.' : 'No other view shows where the ball is.';
-		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With a ball, ${view.letter} may form the missing pair of views.` : '';
+		const why = NEEDS_A_PAIR.has(solved.first_failing?.gate ?? '') ? ` With a ball in view ${view.letter}, the group may get the valid pair that it needs.` : '';
 		return [{
 			view: view.key, caption: '',
 			...(place ? { label: 'Place it there', run: placeExpected } : { label: 'Draw it', guide: { ball: true } }),
@@ -103,7 +103,7 @@ function proposedLines(shown, proposed) {
 			view: view.key, label: 'Accept the lines', caption: '', passes: false,
 			run: (at) => import('./proposals.js').then(({ acceptProposal }) => acceptProposal(at)),
 			title: `${plural(Object.keys(item.lines).length, 'line')} ${Object.keys(item.lines).length === 1 ? 'is' : 'are'} proposed for ${view.letter}`,
-			sentence: [`Violet and dashed, read from its paint: ${scoreWords(item)}.${drawn}`, item.sentence].filter(Boolean).join(' '),
+			sentence: [`Violet and dashed, read from its painted lines: ${scoreWords(item)}.${drawn}`, item.sentence].filter(Boolean).join(' '),
 		}];
 	});
 }

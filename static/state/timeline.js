@@ -140,7 +140,7 @@ export function goToWorst() {
 	const target = jumped === position.value ? next : order[0];
 	jumped = target;
 	scrubTo(target);
-	announce(`Frame ${columns.value?.frame[target] ?? target + 1}, number ${order.indexOf(target) + 1} of the worst.`);
+	announce(`Frame ${columns.value?.frame[target] ?? target + 1}: number ${order.indexOf(target) + 1} by size of the error.`);
 }
 
 let jumped = -1;

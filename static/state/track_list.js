@@ -9,16 +9,16 @@ import { getTracks } from '../api/tracks.js';
 /** What of a list is shown; the first is all. */
 export const SHOWN = /** @type {{show: string, label: string, choice: TrackChoice}[]} */ ([
 	{ show: '', label: 'all', choice: {} },
-	{ show: 'open', label: 'not judged', choice: { verdict: 'none' } },
+	{ show: 'open', label: 'no verdict yet', choice: { verdict: 'none' } },
 	{ show: 'stale', label: 'stale', choice: { stale: true } },
 	{ show: 'accepted', label: 'accepted', choice: { verdict: 'accepted' } },
 	{ show: 'rejected', label: 'rejected', choice: { verdict: 'rejected' } },
 ]);
 /** Orders of a list; the first stands in no address. */
 export const SORTS = /** @type {{sort: NonNullable<TrackChoice['sort']>, label: string}[]} */ ([
-	{ sort: 'match', label: 'match and frame' },
+	{ sort: 'match', label: 'by match and frame' },
 	{ sort: 'worst', label: 'largest left-out error first' },
-	{ sort: 'gaps', label: 'least known first' },
+	{ sort: 'gaps', label: 'most frames without a known ball first' },
 ]);
 
 /** Parameters of an address that say which tracks. */

@@ -12,7 +12,7 @@ export const STATES = /** @type {Record<BallState, string>} */ ({
 });
 /** What the ball does. */
 export const MODES = /** @type {Record<BallMode, {name: string, letter: string}>} */ ({
-	roll: { name: 'rolls', letter: 'R' }, flight: { name: 'flies', letter: 'F' }, held: { name: 'is held', letter: 'H' }, out: { name: 'is out', letter: 'O' }, '': { name: 'not known', letter: '' },
+	roll: { name: 'rolls', letter: 'R' }, flight: { name: 'flies', letter: 'F' }, held: { name: 'is held', letter: 'H' }, out: { name: 'is out of play', letter: 'O' }, '': { name: 'not known', letter: '' },
 });
 export const EVENTS = /** @type {{kind: EventKind, key: string, letter: string}[]} */ ([
 	{ kind: 'kick', key: '1', letter: 'K' }, { kind: 'bounce', key: '2', letter: 'B' }, { kind: 'out', key: '3', letter: 'O' },
@@ -72,7 +72,7 @@ export function partOf(frames, from, to) {
 
 /** A jump where other views take over, in words. @param {TrackJump} jump */
 export function jumpText({ frame, metres, views }) {
-	return `jump of ${metres.toFixed(1)} m in frame ${frame}, where ${views.join(', ')} take over`;
+	return `jump of ${metres.toFixed(1)} m in frame ${frame}, where the views change to ${views.join(', ')}`;
 }
 
 /** The next event from a frame on, or the one before. @param {TrackEvent[]} events @param {number} frame @param {1 | -1} way @returns {TrackEvent | undefined} */

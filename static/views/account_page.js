@@ -77,7 +77,7 @@ export function AccountPage() {
 					<section class="card card--flush" aria-labelledby="account-sessions">
 						<h2 id="account-sessions">Sessions of ${me.value?.name} (${me.value?.role})</h2>
 						<table class="table">
-							<thead><tr><th>Browser</th><th>Since</th><th>Used</th><td></td></tr></thead>
+							<thead><tr><th>Browser</th><th>Logged in</th><th>Last used</th><td></td></tr></thead>
 							<tbody>${sessions.map((one) => html`<${SessionRow} key=${one.id} one=${one} end=${end} />`)}</tbody>
 						</table>
 						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>End all other sessions</button></p>` : null}

@@ -29,7 +29,7 @@ const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: s
 	{ name: 'passing', label: 'Passing', note: 'all passing, not rejected' },
 ]);
 const SPLITS = /** @type {{kind: SplitRequest['kind'], label: string, note: string}[]} */ ([
-	{ kind: 'given', label: 'As given', note: 'the split of the source' },
+	{ kind: 'given', label: 'As imported', note: 'the split that the imported files give' },
 	{ kind: 'match', label: 'By match', note: 'random by seed; each match is on one side' },
 	{ kind: 'camera', label: 'By camera', note: 'the views of some static cameras are for testing' },
 ]);

@@ -51,7 +51,7 @@ export function HeatMap({ positions, dataset, q }) {
 	}
 	return html`
 		<section class="card heat-map" aria-labelledby="heat-title">
-			<h2 id="heat-title">Where the balls were on the pitch <span class="card__aside">${count(all)} · most in one cell ${count(most)}</span></h2>
+			<h2 id="heat-title">Where the balls were on the pitch <span class="card__aside">${plural(all, 'ball')}, at most ${count(most)} in one cell</span></h2>
 			<svg viewBox=${`${left} ${top} ${width} ${height}`} role="group" aria-label="The pitch from above" ref=${drawing} onKeyDown=${key}>
 				<rect class="heat-map__grass" x=${left} y=${top} width=${width} height=${height} />
 				${LINES.map((line) => html`<path class="heat-map__line" d=${line} />`)}

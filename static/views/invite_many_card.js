@@ -65,7 +65,7 @@ export function InviteManyCard({ mail, invited }) {
 			<h2 id="people-many">Invite many</h2>
 			<form class="form" onSubmit=${(/** @type {Event} */ event) => event.preventDefault()}>
 				<div class="form__row">
-					<label for="people-list">People, one a line: name, role, e-mail</label>
+					<label for="people-list">People, one per line: name, role, e-mail</label>
 					<textarea class="field" id="people-list" rows="5" spellcheck=${false} placeholder=${'anna,reviewer,anna@example.org\nben,annotator'} value=${text} onInput=${withValue(write)}></textarea>
 					<small>${mail ? 'Where there is an address, the link goes by mail and is not shown.' : 'This server sends no mail: all links are shown here.'}</small>
 				</div>

@@ -46,7 +46,7 @@ export function JobProgress({ job, cancellable = true }) {
 	return html`
 		<div class="job" role="status">
 			<div class="job__line">
-				<span class="pill" data-state=${toneOf(job)}>${toneOf(job) === 'partial' ? 'done in part' : job.state}</span>
+				<span class="pill" data-state=${toneOf(job)}>${toneOf(job) === 'partial' ? 'partly done' : job.state}</span>
 				<strong>${job.title}</strong>
 				<span class="job__sentence">${jobText(job)}</span>
 				${cancellable && !isOver(job) ? html`<button class="button button--small" type="button" data-needs="lead" data-of=${job.dataset ?? ''} onClick=${cancel}>Cancel<span class="hidden-text"> ${job.title}</span></button>` : null}

@@ -164,7 +164,7 @@ function Numbers({ solution, noise }) {
 			<div><dt>height</dt><dd data-number="height">${metres(ball.height_m)}</dd></div>
 			<div><dt>σ</dt><dd data-number="sigma">${metres(ball.sigma_m)}</dd></div>
 			<div><dt title="Parallax: angle between the rays">β</dt><dd data-number="parallax">${degrees(ball.parallax_degrees)}</dd></div>
-			${noise ? html`<div class="mini-pitch__noise" title=${NOISE_ASSUMED}><dt>of σ:</dt><dd>${noise}</dd></div>` : null}
+			${noise ? html`<div class="mini-pitch__noise" title=${NOISE_ASSUMED}><dt>σ:</dt><dd>${noise}</dd></div>` : null}
 		</dl>
 	`;
 }

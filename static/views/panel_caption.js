@@ -34,7 +34,7 @@ export function PanelCaption({ picture, frame }) {
 				${jac !== null ? html`<span data-number="jac">${sentence ? ' · ' : ''}JaC ${jac.toFixed(2)}</span>` : null}
 				${error.px === null ? null : html`<span data-number="error"> · ball ${pixelText(error.px)}${SHORT[error.from]}</span>`}
 			</span>
-			${shape ? html`<span class="caption__state" data-grade="warn" title=${shape}>! other shape</span>` : null}
+			${shape ? html`<span class="caption__state" data-grade="warn" title=${shape}>! other aspect ratio</span>` : null}
 		</figcaption>
 	`;
 }

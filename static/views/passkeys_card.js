@@ -40,7 +40,7 @@ function usePasskeys(changed) {
 function Table({ items, leave }) {
 	return html`
 		<table class="table">
-			<thead><tr><th>Name</th><th>Since</th><th>Used</th><td></td></tr></thead>
+			<thead><tr><th>Name</th><th>Added</th><th>Last used</th><td></td></tr></thead>
 			<tbody>${items.map((one) => html`
 				<tr key=${one.id}>
 					<th scope="row">${one.name}</th>

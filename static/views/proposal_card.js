@@ -12,6 +12,11 @@ import { Term } from './term.js';
 /** @import {ViewProposalJson} from '../api/proposals.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
 
+/** What a search for lines in a picture found. @param {Pick<ViewProposalJson, 'outcome'>} item */
+export function outcomeWords({ outcome }) {
+	return outcome === 'nothing' ? 'nothing found' : outcome;
+}
+
 /** The scores of a proposal in a line. @param {{item: ViewProposalJson}} props */
 export function ProposalScores({ item }) {
 	const { supported, explained, error_px: error, runner_up: lead } = item;
@@ -19,7 +24,7 @@ export function ProposalScores({ item }) {
 		supported === null ? null : html`<${Term} word="supported">supported<//> ${sharePercent(supported)}`,
 		explained === null ? null : html`<${Term} word="explained">explained<//> ${sharePercent(explained)}`,
 		error === null ? null : html`${fixed(error, 2)} px off`,
-		lead === null ? null : html`runner-up scores ${fixed(lead, 2)} less`,
+		lead === null ? null : html`second-best camera scores ${fixed(lead, 2)} less`,
 	].filter((part) => part !== null);
 	return html`<span class="proposals__scores">${parts.map((part, i) => html`<span key=${i}>${part}</span>`)}</span>`;
 }
@@ -31,7 +36,7 @@ function Row({ picture: { view }, item }) {
 		<li data-proposal=${view.letter} data-outcome=${item.outcome}>
 			<button class="row-button" type="button" title=${`Show ${view.label}`} aria-label=${`Show the proposal for view ${view.letter}`} onClick=${() => focusView(view.letter)}><${Letter} letter=${view.letter} /></button>
 			<span class="proposals__what">
-				<strong>${item.outcome === 'proposed' ? `${plural(Object.keys(item.lines).length, 'marking')} proposed` : item.outcome}</strong>
+				<strong>${item.outcome === 'proposed' ? `${plural(Object.keys(item.lines).length, 'marking')} proposed` : outcomeWords(item)}</strong>
 				${why ? html`<span>${why}</span>` : null}
 				<${ProposalScores} item=${item} />
 			</span>

@@ -41,8 +41,8 @@ function Outcome({ job }) {
 	const found = job.state === 'done' ? job.result : null;
 	if (!found) return null;
 	const parts = [
-		`${plural(found.views, 'view')}: ${count(found.proposed)} proposed, ${count(found.unsure)} unsure, ${count(found.nothing)} nothing`,
-		found.left ? `${count(found.left)} as before` : '',
+		`${plural(found.views, 'view')}: ${count(found.proposed)} proposed, ${count(found.unsure)} unsure, ${count(found.nothing)} with nothing found`,
+		found.left ? `${count(found.left)} unchanged since the last search` : '',
 		found.changed ? `${plural(found.changed, 'picture')} changed` : '',
 		found.missing ? `${plural(found.missing, 'picture')} missing or unreadable` : '',
 	];
@@ -76,7 +76,7 @@ export function Proposals({ dataset, name }) {
 			<h2 id="proposals-title" tabindex="-1"><${Term} word="proposal">Proposed lines<//></h2>
 			<p>Touchline can propose lines, read from the painted lines in the picture, for views without a camera. A proposal is not used until a person accepts it, in review or in the calibration editor.</p>
 			<table class="table">
-				<thead><tr><th>match</th><th data-numeric="true">no camera</th><th data-numeric="true">proposed</th><th data-numeric="true">unsure</th><th data-numeric="true">nothing</th><th data-numeric="true">accepted</th></tr></thead>
+				<thead><tr><th>match</th><th data-numeric="true">no camera</th><th data-numeric="true">proposed</th><th data-numeric="true">unsure</th><th data-numeric="true">nothing found</th><th data-numeric="true">accepted</th></tr></thead>
 				<tbody>${items.map((one) => html`<${MatchProposals} key=${one.match} one=${one} dataset=${name} />`)}</tbody>
 			</table>
 			<p class="table__actions">

@@ -224,8 +224,8 @@ const NAVIGATE = [
 	{ keys: ['Shift+r'], label: 'Apply an independent annotation to its group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
 	{ keys: ['v'], label: 'Ten groups forward', group: 'Navigate', run: () => { goBy(1, FAR); } },
 	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', run: () => { goBy(-1, FAR); } },
-	{ keys: ['r'], label: 'Next flagged group', group: 'Navigate', run: () => { goFlagged(1); } },
-	{ keys: ['e'], label: 'Previous flagged group', group: 'Navigate', run: () => { goFlagged(-1); } },
+	{ keys: ['r'], label: 'Next group with a finding', group: 'Navigate', run: () => { goFlagged(1); } },
+	{ keys: ['e'], label: 'Previous group with a finding', group: 'Navigate', run: () => { goFlagged(-1); } },
 ];
 
 /** @type {Binding[]} */
@@ -303,7 +303,7 @@ const EDIT = [
 	},
 	{
 		// Where the card offers nothing, Enter leads in.
-		keys: ['i', 'Enter'], label: 'Walk through the objects of the view', group: 'Edit',
+		keys: ['i', 'Enter'], label: 'Step through the objects of the view', group: 'Edit',
 		when: () => !editing.value,
 		run: () => { editing.value = true; },
 	},

@@ -21,7 +21,7 @@ export function sizeText(bytes) {
 	return `${(bytes / 1000 ** power).toFixed(power === 0 ? 0 : 1)} ${units[power]}`;
 }
 
-const ELSEWHERE = 'Add it on the Recordings page: its shots are found there, and frames that you choose become groups.';
+const ELSEWHERE = 'Add it on the page Recordings: Touchline finds its shots there, and frames that you choose become groups.';
 
 /** One file to send: the only one as it is, several in a zip. @param {PathFile[]} files @param {AbortSignal} signal */
 async function toSend(files, signal) {

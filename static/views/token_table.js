@@ -14,7 +14,7 @@ const dayOf = (at) => new Date(at).toLocaleDateString('en-GB', { day: 'numeric',
 export function TokenTable({ tokens, end }) {
 	return html`
 		<div class="table__scroll"><table class="table">
-			<thead><tr><th>Name</th><th>May</th><th>Of</th><th>Used</th><th>Until</th><td></td></tr></thead>
+			<thead><tr><th>Name</th><th>Scopes</th><th>Dataset</th><th>Last used</th><th>Valid until</th><td></td></tr></thead>
 			<tbody>${tokens.map((one) => html`
 				<tr key=${one.id}>
 					<th scope="row">${one.name}<small>${one.start}…</small></th>

@@ -39,10 +39,10 @@ function Now({ around, frame }) {
 		<dl class="facts" data-around=${frame}>
 			<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(-z, 2)} m up`}</dd>
 			<dt>Sigma</dt><dd>${sigma === null ? '–' : `${fixed(sigma, 2)} m`}</dd>
-			<dt>Known</dt><dd>${STATES[around.state[place]]}</dd>
-			<dt>Left out</dt><dd>${left === null ? '–' : pixelText(left)}</dd>
+			<dt>Source</dt><dd>${STATES[around.state[place]]}</dd>
+			<dt>Left-out error</dt><dd>${left === null ? '–' : pixelText(left)}</dd>
 		</dl>
-		<p class="note">${against.length ? `${against.map(({ view }) => view).join(', ')} ${against.length > 1 ? 'contradict' : 'contradicts'} it.` : 'No ball of this frame contradicts it.'} Frames ${around.frame[0]} to ${around.frame.at(-1)} with the groups as they are now; the saved track is out of date until it is made again.</p>
+		<p class="note">${against.length ? `${against.map(({ view }) => view).join(', ')} ${against.length > 1 ? 'contradict' : 'contradicts'} the track.` : 'No ball in this frame contradicts the track.'} Frames ${around.frame[0]} to ${around.frame.at(-1)} with the groups as they are now; the saved track is out of date until it is made again.</p>
 	`;
 }
 

@@ -25,7 +25,7 @@ import { When } from './when.js';
 function splitText(split) {
 	if (split?.kind === 'match') return `by match, seed ${split.seed}, ${sharePercent(split.test_share)} of the matches test`;
 	if (split?.kind === 'camera') return `by camera, ${split.test_cameras.join(' ')} test`;
-	return 'as given';
+	return 'as imported';
 }
 
 /** @param {{version: VersionJson}} props */

@@ -113,7 +113,7 @@ function WebhookItem({ dataset, one, act, show }) {
 				<div><strong class="webhooks__url">${one.url}</strong><small>${one.kinds.join(', ')} · ${counts}</small>${one.off ? html`<small class="form__error">Off: ${one.off}.</small>` : null}</div>
 				<span class="table__actions">
 					<button class="button button--small" type="button" aria-expanded=${open} onClick=${() => setOpen(!open)}>Messages<span class="hidden-text"> to ${one.url}</span></button>
-					${one.off ? null : html`<button class="button button--small" type="button" onClick=${() => { setOpen(true); act(pingWebhook(dataset, one.id)); }}>Try<span class="hidden-text"> ${one.url}</span></button>`}
+					${one.off ? null : html`<button class="button button--small" type="button" onClick=${() => { setOpen(true); act(pingWebhook(dataset, one.id)); }}>Send a test<span class="hidden-text"> to ${one.url}</span></button>`}
 					<button class="button button--small" type="button" onClick=${() => act(patchWebhook(dataset, one.id, { on: one.off !== null }))}>${one.off ? 'Turn on' : 'Turn off'}<span class="hidden-text"> ${one.url}</span></button>
 					<button class="button button--small" type="button" onClick=${renew}>New secret<span class="hidden-text"> for ${one.url}</span></button>
 					<button class="button button--small button--danger" type="button" onClick=${() => act(deleteWebhook(dataset, one.id))}>Delete<span class="hidden-text"> ${one.url}</span></button>

@@ -284,9 +284,9 @@ class TestPaint:
         chip = editor.page.locator(".paint-chip")
         expect(chip).to_contain_text("Markings with paint")
         editor.press("k")
-        expect(editor.page.locator(".commit__state")).to_contain_text("Points onto the paint")
+        expect(editor.page.locator(".commit__state")).to_contain_text("Points moved onto the paint")
         editor.previewed()
-        expect(editor.page.locator(".comparison")).to_contain_text("Median point")
+        expect(editor.page.locator(".comparison")).to_contain_text("Median error")
         had, has = (float(text.split()[0]) for text in editor.compared("median")[:2])
         assert has < had / 2
         assert serious_in_both(editor.page) == []

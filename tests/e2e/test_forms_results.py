@@ -202,7 +202,7 @@ class TestJobs:
         ended = failed.locator("time").last
         expect(ended).to_have_attribute("datetime", ENDED)
         part = page.get_by_role("region", name=f"Job {ids['partial']}: Import a part")
-        expect(part.locator(".pill")).to_have_text("done in part")
+        expect(part.locator(".pill")).to_have_text("partly done")
         expect(part).to_contain_text("6 groups · 7 records left out · 1 group without any picture")
         cursor = read(page, "/jobs?limit=50")["next"]
         expect(oldest).to_have_count(0)

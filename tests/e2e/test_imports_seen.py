@@ -236,7 +236,7 @@ class TestGroupsWithoutAPicture:
         # Another import would not change it.
         expect(page.get_by_label("Policy")).to_be_disabled()
         # Done in part, in orange, with counts.
-        expect(page.locator(".pill").first).to_have_text("done in part")
+        expect(page.locator(".pill").first).to_have_text("partly done")
         assert colour(page, '.pill[data-state="partial"]', "--warn")
         report = page.get_by_role("region", name="What happened")
         expect(report).to_contain_text("1 record is left out")

@@ -107,7 +107,7 @@ class TestInstants:
         expect(stage).to_have_attribute("data-offset", "1")
         until(page, lambda: colours(page) == {180})
         screen.press(".")
-        expect(page.locator(".bar")).to_contain_text("There is no frame after this one")
+        expect(page.locator(".bar")).to_contain_text("No more frames after this one can be shown")
         screen.press(",")
         expect(chip).to_have_count(0)
         until(page, lambda: len(colours(page)) > 1)

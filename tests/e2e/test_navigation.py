@@ -95,12 +95,12 @@ class TestFlaggedKeys:
             screen.press("r")
             stands(page, queue, queue.index(group))
         screen.press("r")
-        expect(page.get_by_text("No flagged group comes after this one.")).to_be_attached()
+        expect(page.get_by_text("No group with a finding comes after this one.")).to_be_attached()
         for group in reversed(flagged[:-1]):
             screen.press("e")
             stands(page, queue, queue.index(group))
         screen.press("e")
-        expect(page.get_by_text("No flagged group comes before this one.")).to_be_attached()
+        expect(page.get_by_text("No group with a finding comes before this one.")).to_be_attached()
 
     def test_a_group_without_a_finding_leads_to_the_nearest_with_one(self, page: Page) -> None:
         queue, flagged = ids(page, QUERY), ids(page, f"{QUERY} -finding:none")

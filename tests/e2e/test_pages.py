@@ -291,7 +291,7 @@ class TestNoise:
         for address, sigma in sigma_of.items():
             page.goto(address)
             expect(page.locator(sigma)).to_be_visible()
-            expect(page.get_by_text("noise assumed")).to_have_count(said)
+            expect(page.get_by_text("assumed noise")).to_have_count(said)
 
     def test_the_button_says_what_it_changes_and_the_noise_is_asked_once_for_each_policy(
         self, open_page: OpenPage

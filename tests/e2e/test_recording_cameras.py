@@ -170,7 +170,7 @@ def test_cameras_are_turned_by_half_and_back_by_key(recording: int, open_page: O
         return found
 
     before = place()
-    button = page.get_by_role("button", name="Turn by half")
+    button = page.get_by_role("button", name="Turn to the other side")
     expect(button).to_have_attribute("aria-pressed", "false")
     page.keyboard.press("Shift+t")
     expect(button).to_have_attribute("aria-pressed", "true")
@@ -215,7 +215,7 @@ def test_the_page_is_usable_by_everybody_and_fits(recording: int, open_page: Ope
     page.keyboard.press("?")
     dialog = page.get_by_role("dialog")
     expect(dialog).to_contain_text("Track the camera of the shot")
-    expect(dialog).to_contain_text("Next frames that are lost or bridged")
+    expect(dialog).to_contain_text("Next frame that is bridged or lost")
 
 
 def test_the_pitch_that_a_shot_shows_is_taken_for_its_match(

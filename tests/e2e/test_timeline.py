@@ -53,7 +53,9 @@ class TestTimeline:
         shown = open_timeline(page, film, FRAMES[0])
         page.keyboard.press("j")
         expect_frame(page, WORST)
-        expect(page.locator(".timeline__words")).to_contain_text("fails reprojection")
+        expect(page.locator(".timeline__words")).to_contain_text(
+            "fails: the views do not agree on one ball"
+        )
         page.keyboard.press("j")
         errors = sorted(zip(shown["error_px"], shown["frame"], strict=True), reverse=True)
         expect_frame(page, errors[1][1])

@@ -120,7 +120,7 @@ class TestFinding:
         expect(titles).to_have_count(0)
         around = flights.locator(f'.track-card [data-around="{SLIP}"]')
         expect(around).to_be_visible()
-        expect(flights.locator(".track-card")).to_contain_text("No ball of this frame contradicts")
+        expect(flights.locator(".track-card")).to_contain_text("No ball in this frame contradicts")
         expect(flights.locator(".track-card")).to_have_attribute("data-stale", "true")
         flights.keyboard.press("Control+z")
         expect(titles.first).to_be_visible()
@@ -148,7 +148,7 @@ class TestFinding:
         flights.goto(f"/tracks/{early['id']}")
         flights.wait_for_selector(".track__band")
         flights.keyboard.press("u")
-        expect(flights.get_by_text("not judged")).to_be_visible()
+        expect(flights.get_by_text("no verdict yet")).to_be_visible()
         assert slipped(flights) == group
 
 

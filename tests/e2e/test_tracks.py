@@ -76,7 +76,7 @@ def track(flight: str, open_page: OpenPage) -> Page:
 class TestTracks:
     def test_are_looked_at_corrected_and_judged_by_key(self, track: Page) -> None:
         page = track
-        expect(page.get_by_text("not judged")).to_be_visible()
+        expect(page.get_by_text("no verdict yet")).to_be_visible()
         page.keyboard.press("w")
         worst = page.locator(".track__rail [data-frame]").get_attribute("data-frame")
         page.keyboard.press("Shift+ArrowLeft")
@@ -104,7 +104,7 @@ class TestTracks:
         page.keyboard.press("x")
         expect(page.get_by_role("button", name="Reject")).to_have_attribute("aria-pressed", "true")
         page.keyboard.press("u")
-        expect(page.get_by_text("not judged")).to_be_visible()
+        expect(page.get_by_text("no verdict yet")).to_be_visible()
 
     def test_a_frame_leads_to_its_group(self, track: Page) -> None:
         track.keyboard.press("ArrowRight")

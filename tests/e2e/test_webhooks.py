@@ -26,7 +26,7 @@ def test_a_lead_sees_that_nobody_takes_the_messages(
     expect(card.get_by_label("Secret")).to_have_value(re.compile("^whsec_"))
     secret = card.get_by_label("Secret").input_value()
     card.get_by_role("button", name="Done").click()
-    card.get_by_role("button", name="Try").click()
+    card.get_by_role("button", name="Send a test").click()
     expect(card.get_by_text("it could not be reached")).to_be_visible()
     expect(card.get_by_text("will be retried")).to_be_visible()
     card.get_by_role("button", name="Turn off").click()

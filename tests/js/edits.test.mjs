@@ -131,7 +131,7 @@ describe('editOf', () => {
 			assert.deepEqual(applyEdit(group, edit).views[0].station.picture, said);
 			assert.deepEqual(previewBody(edit), { views: { '7.png': { picture: said } } });
 		}
-		assert.equal(describe_(group, editOf({ edit: 'set_picture', view: '7.png', picture })), 'Picture of A taken as stretched or cropped');
+		assert.equal(describe_(group, editOf({ edit: 'set_picture', view: '7.png', picture })), 'Picture of A treated as stretched or cropped');
 	});
 });
 

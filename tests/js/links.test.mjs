@@ -8,7 +8,7 @@ const FRAMES = { first: 4, replay: [null, 20, 22], off_s: [null, 0, 0], repeated
 const MAP = /** @type {const} */ ({ outcome: 'linked', found_by: 'instants', reason: null, speed: 0.25, speed_sigma: 0.004, sigma_s: 0.02, miss_m: null, pieces: [], misses: [], ball_reason: null, turned: false, too_close: false });
 
 test('a speed is told as times slower or faster', () => {
-	assert.deepEqual([0.25, 1, 0.99, 2].map(speedText), ['4.0 times slower than live', 'as fast as live', 'as fast as live', '2.0 times faster than live']);
+	assert.deepEqual([0.25, 1, 0.99, 2].map(speedText), ['4.0 times slower than live', 'at live speed', 'at live speed', '2.0 times faster than live']);
 });
 
 test('a map says its speed and how well its times are known', () => {
@@ -17,7 +17,7 @@ test('a map says its speed and how well its times are known', () => {
 	const piece = { first: 3, last: 9, first_s: 0, last_s: 1, offset_s: 0, speed: 0.5, speed_sigma: 0.1 };
 	const pieces = mapText({ ...MAP, speed: null, pieces: [piece, { ...piece, first: 9, last: 20, speed: 1 }] }, 50);
 	assert.equal(pieces.length, 3);
-	assert.match(pieces[2], /Frames 9 to 20 of the replay run as fast as live/);
+	assert.match(pieces[2], /Frames 9 to 20 of the replay run at live speed/);
 	assert.deepEqual(mapText({ ...MAP, ball_reason: 'The ball rests.' }, 50).slice(1), ['The times could not be found from the ball. The ball rests.']);
 	const close = mapText({ ...MAP, outcome: 'offset', reason: 'Too close together; 1 is assumed.', speed: 1, too_close: true }, 50);
 	assert.deepEqual(close, ['Too close together; 1 is assumed.']);

@@ -19,7 +19,7 @@ export function pickMarking(name) {
 	if (mode.value === 'relabel' && chosen) {
 		mode.value = 'select';
 		if (chosen.marking === name) return;
-		stageLines(relabelled(lines.value, chosen.marking, name), `${chosen.marking} is ${name}`);
+		stageLines(relabelled(lines.value, chosen.marking, name), `${chosen.marking} relabelled as ${name}`);
 		choice.value = { marking: name, index: null };
 		announce(`${chosen.marking} relabelled as ${name}.`);
 		return;
@@ -63,12 +63,12 @@ export function insertPoint() {
 	if (a && b) {
 		const index = (chosen.index ?? 0) + 1;
 		const middle = { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2 };
-		stageLines(withInserted(lines.value, chosen.marking, index, middle), `Point on ${chosen.marking}`);
+		stageLines(withInserted(lines.value, chosen.marking, index, middle), `Point added to ${chosen.marking}`);
 		choice.value = { marking: chosen.marking, index };
 		return;
 	}
 	const added = withAdded(lines.value, chosen.marking, middleOf(at));
-	stageLines(added.lines, `Point on ${chosen.marking}`);
+	stageLines(added.lines, `Point added to ${chosen.marking}`);
 	choice.value = { marking: chosen.marking, index: added.index };
 }
 

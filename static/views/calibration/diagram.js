@@ -68,8 +68,8 @@ export function PitchDiagram({ pitch, fits }) {
 
 	return html`
 		<section class="card diagram" aria-label="Markings of the pitch" data-mode=${mode.value}>
-			<h2>${mode.value === 'relabel' ? `${choice.value?.marking}: it is…` : 'Markings'}
-				<span class="card__aside">${hovered.value ?? choice.value?.marking ?? 'point at a line'}</span>
+			<h2>${mode.value === 'relabel' ? `Relabel ${choice.value?.marking} as…` : 'Markings'}
+				<span class="card__aside">${hovered.value ?? choice.value?.marking ?? 'point at a marking'}</span>
 			</h2>
 			<svg ref=${svg} viewBox=${`${-l - 9} ${-w - 2} ${2 * l + 18} ${2 * w + 4}`} role="group" aria-label="The pitch from above, goals unfolded">
 				<rect class="diagram__grass" x=${-l} y=${-w} width=${2 * l} height=${2 * w} />

@@ -14,7 +14,7 @@ import { fitPanel, panPanel, viewportOf, zoomPanel } from '../../state/viewports
 import { gain, overlaysHidden, projections } from '../../state/workspace.js';
 import { useFrame } from '../frame.js';
 import { PanelCaption } from '../panel_caption.js';
-import { ProposalScores } from '../proposal_card.js';
+import { ProposalScores, outcomeWords } from '../proposal_card.js';
 import { drawEditorMarks } from './marks.js';
 import { PaintChip } from './paint_chip.js';
 import { panelKey } from './panel_key.js';
@@ -45,7 +45,7 @@ function ProposalChip({ item }) {
 	const found = item.outcome === 'proposed';
 	return html`
 		<div class="paint-chip proposal-chip" role="status" data-outcome=${item.outcome}>
-			<p>${found ? `${plural(Object.keys(item.lines).length, 'marking')} proposed. ${item.sentence}` : `Searched before: ${item.outcome}. ${item.sentence}`}</p>
+			<p>${found ? `${plural(Object.keys(item.lines).length, 'marking')} proposed. ${item.sentence}` : `Searched before: ${outcomeWords(item)}. ${item.sentence}`}</p>
 			<${ProposalScores} item=${item} />
 		</div>
 	`;

@@ -77,7 +77,7 @@ function arrow(name, x, y) {
 
 /** @type {Binding[]} */
 export const EDITOR_KEYS = [
-	{ keys: ['n'], label: 'Draw: set points on the marking', group: 'Edit', run: toggleDrawing },
+	{ keys: ['n'], label: 'Draw the marking: click to set its points', group: 'Edit', run: toggleDrawing },
 	{ keys: ['i'], label: 'Insert a point after the selected one', group: 'Edit', run: insertPoint },
 	{ keys: ['r'], label: 'Relabel the marking', group: 'Edit', run: toggleRelabelling },
 	{ keys: ['m'], label: 'Swap sides', group: 'Edit', run: swapAllSides },
@@ -103,8 +103,8 @@ export const EDITOR_KEYS = [
 	{ keys: ['e'], label: 'Show the paint found in the picture', group: 'View', run: togglePaint },
 	{ keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Error lines are drawn ${gain.value} times as long.`); } },
 	{ keys: ['Ctrl+s', 'Ctrl+Enter'], label: 'Save everything staged as one edit', group: 'Save', typing: true, run: save },
-	{ keys: ['Ctrl+z'], label: 'Undo: staged edits first', group: 'Save', run: undo },
+	{ keys: ['Ctrl+z'], label: 'Undo; staged changes first', group: 'Save', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Save', run: redo },
 	{ keys: ['Ctrl+Delete', 'Ctrl+Backspace'], label: 'Discard everything staged', group: 'Save', run: discardStaged },
-	{ keys: ['Escape'], label: 'Leave, then back to the review', group: 'Save', typing: true, run: escape },
+	{ keys: ['Escape'], label: 'Cancel the current step; again: back to the review', group: 'Save', typing: true, run: escape },
 ];

@@ -82,9 +82,9 @@ export function LineTable({ picture, influences }) {
 						<tr>
 							<th scope="col"><span class="hidden-text">state</span></th><th scope="col">marking</th>
 							<th scope="col" title="Annotated points">n</th>
-							<th scope="col" title="Worst point; ticks at 0.5 and 1 %, the end is 2 % of the diagonal">to 2 %</th>
+							<th scope="col" title="Worst point; ticks at 0.5 and 1 %, the end is 2 % of the diagonal">worst</th>
 							<th scope="col" title="Worst point, pixels">px</th>
-							${known ? html`<th scope="col" title=${`Change of JaC 0.5 % when the camera is found without this line${changed.value ? '; for the saved lines' : ''}`}>JaC without</th>` : null}
+							${known ? html`<th scope="col" title=${`Change of JaC 0.5 % when the camera is found without this line${changed.value ? '; for the saved lines' : ''}`}>ΔJaC</th>` : null}
 						</tr>
 					</thead>
 					<tbody>

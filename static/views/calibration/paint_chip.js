@@ -13,7 +13,7 @@ function numbersOf({ supported, explained, error_px: error, moved_px: moved }) {
 	return [
 		['Markings with paint', supported === null ? null : sharePercent(supported)],
 		['Paint with a marking', explained === null ? null : sharePercent(explained)],
-		['Paint off its marking', error === null ? null : fixed(error, 2, ' px')],
+		['Distance from paint to marking', error === null ? null : fixed(error, 2, ' px')],
 		['Camera off the paint', moved === null ? null : fixed(moved, 1, ' px')],
 	].filter(([, value]) => value !== null);
 }

@@ -57,7 +57,7 @@ export function attachEditor(element, panel) {
 		const added = withAdded(before, marking, place);
 		held.value = added.lines;
 		choice.value = { marking, index: added.index };
-		return pointDrag(added.lines, marking, added.index, `Point on ${marking}`, { x: 0, y: 0 });
+		return pointDrag(added.lines, marking, added.index, `Point added to ${marking}`, { x: 0, y: 0 });
 	}
 
 	/** @param {ScreenPoint} place */
@@ -79,7 +79,7 @@ export function attachEditor(element, panel) {
 		if (!found || found.index !== null) return;
 		const added = withAdded(lines.value, found.marking, toImage(panel.viewport(), place));
 		choice.value = { marking: found.marking, index: added.index };
-		stageLines(added.lines, `Point on ${found.marking}`);
+		stageLines(added.lines, `Point added to ${found.marking}`);
 	}
 
 	return attachGestures(element, { ...panel, press, hover, over, twice });

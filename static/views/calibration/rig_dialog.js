@@ -33,7 +33,7 @@ function Proposal({ proposal }) {
 	return html`
 		<div class="table__scroll" tabindex="0" role="region" aria-label="Cameras and pairs, before and after">
 			<table class="table">
-				<thead><tr><th>Camera</th><th data-numeric="true">Moves</th><th data-numeric="true">Grass moves in the picture</th><th data-numeric="true">Field lines</th></tr></thead>
+				<thead><tr><th>Camera</th><th data-numeric="true">Moves</th><th data-numeric="true" title="How far points on the pitch move in the picture of this camera">Shift in the picture</th><th data-numeric="true">Field lines</th></tr></thead>
 				<tbody>${proposal.cameras.map((camera) => html`
 					<tr key=${camera.key} data-camera=${camera.key}>
 						<th scope="row">${camera.key}</th>

@@ -139,8 +139,8 @@ function LimitsCard({ limits, dataset, saved }) {
 /** Whose annotation is used, and who chose it or continued from it. @param {GroupAgreementJson} one */
 function takenText({ taken, state, outcome, decided_by: by }) {
 	const way = outcome === 'start' ? 'continued' : 'chosen';
-	if (state === 'decided') return `${taken}’s, ${way} by ${by}`;
-	return outcome === 'start' ? `${taken}’s, ${way}` : `${taken}’s`;
+	if (state === 'decided') return `${taken}’s annotation, ${way} by ${by}`;
+	return outcome === 'start' ? `${taken}’s annotation, ${way}` : `${taken}’s annotation`;
 }
 
 /** @param {{one: GroupAgreementJson}} props */

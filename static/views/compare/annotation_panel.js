@@ -94,7 +94,7 @@ export function AnnotationPanel({ picture, other, number, name, image: url, chos
 		<section class="compare__one" aria-label=${`Annotation ${number}, ${name}`} data-chosen=${chosen}>
 			<header class="compare__who">
 				<kbd>${number}</kbd><strong>${name}</strong>
-				${choose ? html`<button class="button" type="button" aria-pressed=${chosen} onClick=${choose}>${chosen ? '✓ Taken' : `Take ${number}`}</button>` : null}
+				${choose ? html`<button class="button" type="button" aria-pressed=${chosen} onClick=${choose}>${chosen ? '✓ Chosen' : `Choose ${number}`}</button>` : null}
 			</header>
 			<figure class="image-panel compare__panel" data-view=${view.letter} tabindex="0" aria-label=${`View ${view.letter} as ${name} annotated it`}>
 				<div class="image-panel__stage" data-ready=${Boolean(image)} ref=${ref}></div>

@@ -17,7 +17,7 @@ import { Cell, number } from './cell.js';
 /** @import {ComparisonJson, EvaluationJson} from '../../api/evaluations.js' */
 
 const FIELDS = [
-	{ name: 'error_m', label: 'error of the ball’s place, m' }, { name: 'iou', label: 'IoU of the box with the highest score' }, { name: 'hit_iou', label: 'IoU of the hit' },
+	{ name: 'error_m', label: 'error of the ball position, m' }, { name: 'iou', label: 'IoU of the box with the highest score' }, { name: 'hit_iou', label: 'IoU of the box that counts as found' },
 	{ name: 'predicted_error_m', label: 'error with predicted cameras, m' }, { name: 'predicted_jac', label: 'JaC of predicted cameras' },
 ];
 
@@ -87,8 +87,8 @@ export function Comparison({ run, other, onClose }) {
 			<h2 id="comparison-title">Compared with ${found.value?.first.name ?? '…'} <button class="card__aside link-button" type="button" onClick=${onClose}>Close<span class="hidden-text"> the comparison</span></button></h2>
 			${found.error ? html`<p class="form__error" role="alert">${sentenceOf(found.error)}</p>` : null}
 			${!found.value && !found.error ? html`<${Loading} what="the comparison" />` : null}
-			${found.value && !found.value.same_truth ? html`<p class="yield__note" data-grade="warn">The runs judged other frames, or under other thresholds: their numbers cannot be compared straight away.</p>` : null}
-			${found.value?.differs.length ? html`<p class="note">Pinned differently: ${found.value.differs.map(words).join(', ')}.</p>` : null}
+			${found.value && !found.value.same_truth ? html`<p class="yield__note" data-grade="warn">The runs judged other frames, or under other thresholds: their numbers are not directly comparable.</p>` : null}
+			${found.value?.differs.length ? html`<p class="note">The runs differ in: ${found.value.differs.map(words).join(', ')}.</p>` : null}
 			${found.value ? html`
 				<${Numbers} found=${found.value} />
 				<div class="form__row comparison__field"><label for="comparison-field">Frame by frame</label>

@@ -24,7 +24,7 @@ const COLUMNS = [
 /** Those of the number that was clicked; the first is the number itself. @type {{[field: string]: Column[]}} */
 const ASKED = {
 	detections: [{ field: 'detections', label: 'detections' }],
-	hit_iou: [{ field: 'hit_iou', label: 'IoU of the hit' }],
+	hit_iou: [{ field: 'hit_iou', label: 'IoU of the box that counts as found' }],
 	size_error_percent: [{ field: 'size_error_percent', label: 'size error, %' }],
 	any_error_m: [{ field: 'any_error_m', label: 'error of the detection with the highest score, m' }],
 	predicted_error_m: [{ field: 'predicted_error_m', label: 'predicted camera: error, m' }, { field: 'predicted_error_percent', label: 'predicted camera: error, %' }],

@@ -40,8 +40,8 @@ function RunForm({ sets, versions, why, send }) {
 	const choices = sets.map(({ id, name }) => html`<option key=${id} value=${String(id)}>${name}</option>`);
 	return html`
 		<form class="form run-form" onSubmit=${withForm((said) => { if (!why) send(said); })}>
-			<div class="form__row"><label for="run-predictions">Predictions</label><select class="field" id="run-predictions" name="predictions">${choices}<option value="">none: reference boxes alone</option></select></div>
-			<div class="form__row"><label for="run-against">Against</label><select class="field" id="run-against" name="against">
+			<div class="form__row"><label for="run-predictions">Predictions</label><select class="field" id="run-predictions" name="predictions">${choices}<option value="">none: compare reference boxes only</option></select></div>
+			<div class="form__row"><label for="run-against">Evaluate against</label><select class="field" id="run-against" name="against">
 				${versions.map(({ id, name }) => html`<option key=${id} value=${String(id)}>version ${name}</option>`)}
 				${LIVE.map(({ name, label }) => html`<option key=${name} value=${name}>${label}</option>`)}
 			</select></div>

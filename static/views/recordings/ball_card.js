@@ -16,7 +16,7 @@ import { FormError } from '../form_error.js';
 /** @import {Balls, Place} from './ball_state.js' */
 /** @import {Cameras} from './camera_state.js' */
 
-const ENDS = { lost: 'lost', left: 'out of the picture', limit: 'followed no further' };
+const ENDS = { lost: 'until it was lost', left: 'until it left the picture', limit: 'to the end of the shot, or 250 frames' };
 const WORDS = { followed: 'followed', uncertain: 'uncertain', confirmed: 'confirmed', lost: 'lost' };
 /** Frames of the way that is drawn to either side. */
 const WAY = 12;
@@ -113,21 +113,21 @@ export function BallCard({ one, shot, balls }) {
 		<section class="card ball" aria-label="Ball" aria-busy=${busy}>
 			<h2>Ball${run ? html`<span class="card__aside">frames ${run.first} to ${run.last}</span>` : null}</h2>
 			${run ? html`
-				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}: the ball was added to ${plural(run.placed ?? 0, 'view')}${run.kept ? `; ${plural(run.kept, 'view')} already had one and ${run.kept === 1 ? 'keeps' : 'keep'} it` : ''}. ` : null}Begins: ${ENDS[run.before]}; ends: ${ENDS[run.after]}. ${left ? `${plural(left, 'frame')} uncertain.` : 'No frame is uncertain.'}</p>
-				<p data-ball-state=${ball?.state ?? 'lost'}>${ball ? html`Frame ${wanted.value}: <strong>${WORDS[ball.state]}</strong>, ${ball.diameter.toFixed(1)} px wide, centre known to ${ball.sigma.toFixed(1)} px, ${Math.round(100 * ball.confidence)} % sure.` : html`Frame ${wanted.value}: <strong>lost</strong>. Click the ball where it is seen.`}</p>
+				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}: the ball was added to ${plural(run.placed ?? 0, 'view')}${run.kept ? `; ${plural(run.kept, 'view')} already had one and ${run.kept === 1 ? 'keeps' : 'keep'} it` : ''}. ` : null}Followed backwards ${ENDS[run.before]}, forwards ${ENDS[run.after]}. ${left ? `${plural(left, 'frame')} uncertain.` : 'No frame is uncertain.'}</p>
+				<p data-ball-state=${ball?.state ?? 'lost'}>${ball ? html`Frame ${wanted.value}: <strong>${WORDS[ball.state]}</strong>, ${ball.diameter.toFixed(1)} px wide, centre ± ${ball.sigma.toFixed(1)} px, ${Math.round(100 * ball.confidence)} % sure.` : html`Frame ${wanted.value}: <strong>lost</strong>. Click the ball where it is seen.`}</p>
 				${run.stale ? html`<p class="form__error">The video file has changed since then.</p>` : null}`
-			: html`<p>${runs.length ? 'No ball is followed in this frame. ' : ''}Click the ball in the picture: it is followed both ways until it is lost.</p>`}
+			: html`<p>${runs.length ? 'No ball is followed in this frame. ' : ''}Click the ball in the picture: it is followed forwards and backwards until it is lost.</p>`}
 			${shot && runs.length ? html`
 				<div class="ball__band" onClick=${jump}>
 					<${BallBand} runs=${runs} first=${shot.first} frames=${shot.last - shot.first + 1} />
 					<span class="film__head" style=${{ left: `${(100 * (wanted.value - shot.first + 0.5)) / (shot.last - shot.first + 1)}%` }}></span>
 				</div>` : null}
-			<div class="film__kinds" role="group" aria-label="Ball of this run">
-				<button class="button ${run && !accepted && !left ? 'button--primary' : ''}" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || accepted} title=${why || (accepted ? 'It is accepted' : 'Adds the ball to the views of its frames')} onClick=${balls.accept}>Accept <kbd>Y</kbd></button>
-				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || !accepted} title=${why || (accepted ? 'Removes these balls again' : 'It is not accepted')} onClick=${balls.takeBack}>Take back <kbd>U</kbd></button>
-				<button class="button" type="button" aria-disabled=${runs.length === 0} title=${runs.length ? '' : 'No ball is followed in this shot'} onClick=${balls.next}>Next unsure <kbd>V</kbd></button>
+			<div class="film__kinds" role="group" aria-label="Followed ball">
+				<button class="button ${run && !accepted && !left ? 'button--primary' : ''}" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || accepted} title=${why || (accepted ? 'This ball is accepted already' : 'Adds the ball to the views that show these frames')} onClick=${balls.accept}>Accept <kbd>Y</kbd></button>
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || !accepted} title=${why || (accepted ? 'Removes the balls that accepting added' : 'This ball is not accepted')} onClick=${balls.takeBack}>Withdraw <kbd>U</kbd></button>
+				<button class="button" type="button" aria-disabled=${runs.length === 0} title=${runs.length ? '' : 'No ball is followed in this shot'} onClick=${balls.next}>Next uncertain <kbd>V</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || sure !== '' || accepted} title=${why || sure || 'Confirm that these uncertain frames are right'} onClick=${balls.confirm}>Confirm <kbd>O</kbd></button>
-				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${balls.cross !== null} title="A cross that the arrow keys move; Enter clicks" onClick=${balls.turnCross} onKeyDown=${enter}>Cross <kbd>F</kbd></button>
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${balls.cross !== null} title="Shows a cross that the arrow keys move; Enter follows the ball from there" onClick=${balls.turnCross} onKeyDown=${enter}>Cross <kbd>F</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${balls.remove}>Delete <kbd>Del</kbd></button>
 			</div>
 			<p role="status">${busy ? 'Following the ball…' : ''}</p>

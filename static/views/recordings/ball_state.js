@@ -85,17 +85,17 @@ export function useBalls(one, shot) {
 		setCross(null);
 		const open = run && !run.accepted_by ? run : null;
 		ask(open ? postBallClick(one.id, open, said) : postBallRun(one.id, said), ({ first, last, uncertain }) => (
-			`The ball is followed from frame ${first} to ${last}; ${uncertain ? `${plural(uncertain, 'frame')} uncertain` : 'every frame is sure'}.`
+			`The ball is followed from frame ${first} to ${last}; ${uncertain ? `${plural(uncertain, 'frame')} uncertain` : 'no frame is uncertain'}.`
 		));
 	}
 	/** @param {boolean} accepted */
 	function decide(accepted) {
 		if (busy) return;
 		if (!run) announce('No ball is followed in this frame.');
-		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This run is accepted.' : 'This run is not accepted.');
+		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This ball is accepted already.' : 'This ball is not accepted.');
 		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept }) => (accepted
 			? `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}.`
-			: 'Taken back.'));
+			: 'Withdrawn: the balls that accepting added are removed.'));
 	}
 	function confirm() {
 		const around = run ? uncertainAround(run, frame) : [];
@@ -105,7 +105,7 @@ export function useBalls(one, shot) {
 	}
 	function remove() {
 		if (busy || !run) return;
-		attempt(deleteBallRun(one.id, run.id), () => { list.reload(); announce('The run is deleted.'); });
+		attempt(deleteBallRun(one.id, run.id), () => { list.reload(); announce('The followed ball is deleted.'); });
 	}
 	function next() {
 		const place = nextUncertain(runs, frame);
@@ -132,12 +132,12 @@ export function useBallKeys(balls) {
 	const latest = useRef(balls);
 	latest.current = balls;
 	const keys = useRef(/** @type {Binding[]} */ ([
-		{ keys: ['f'], label: 'Click the ball by keyboard: a cross that the arrows move', group: 'Ball', needs: 'annotate', run: () => latest.current.turnCross() },
-		{ keys: ['y'], label: 'Accept the ball of this run', group: 'Ball', needs: 'annotate', run: () => latest.current.accept() },
-		{ keys: ['u'], label: 'Take the acceptance back', group: 'Ball', needs: 'annotate', run: () => latest.current.takeBack() },
+		{ keys: ['f'], label: 'Show a cross to click the ball by keyboard; arrow keys move it', group: 'Ball', needs: 'annotate', run: () => latest.current.turnCross() },
+		{ keys: ['y'], label: 'Accept the followed ball', group: 'Ball', needs: 'annotate', run: () => latest.current.accept() },
+		{ keys: ['u'], label: 'Withdraw the acceptance', group: 'Ball', needs: 'annotate', run: () => latest.current.takeBack() },
 		{ keys: ['v'], label: 'Next uncertain or lost frame', group: 'Ball', run: () => latest.current.next() },
 		{ keys: ['o'], label: 'Confirm these uncertain frames', group: 'Ball', needs: 'annotate', run: () => latest.current.confirm() },
-		{ keys: ['Delete'], label: 'Delete the run', group: 'Ball', needs: 'annotate', run: () => latest.current.remove() },
+		{ keys: ['Delete'], label: 'Delete the followed ball', group: 'Ball', needs: 'annotate', run: () => latest.current.remove() },
 	]));
 	useKeys(keys.current);
 	const crossed = useRef(/** @type {Binding[]} */ (crossKeys(latest)));

@@ -15,7 +15,7 @@ import { JobProgress } from '../job_progress.js';
 
 const FILES = [['soccernet', 'SoccerNet JSON'], ['npz', 'npz'], ['opentrackio', 'OpenTrackIO']];
 /** @param {CameraSummary} summary */
-const worstOf = ({ worst_frame: frame, worst_px: error }) => (frame === null || error === null ? '–' : `${error.toFixed(2)} px at ${frame}`);
+const worstOf = ({ worst_frame: frame, worst_px: error }) => (frame === null || error === null ? '–' : `${error.toFixed(2)} px (frame ${frame})`);
 
 /** What became of the frames, beside what it was before. @param {{stretch: ShotCamerasJson, old: boolean}} props */
 function Counts({ stretch: { summary, before }, old }) {
@@ -39,11 +39,11 @@ export function CameraCard({ one, cameras }) {
 	const fresh = stretch ? stretch.drawn.filter((frame) => !stretch.summary.annotated.includes(frame)) : [];
 	const useless = stretch?.summary.unusable ?? [];
 	const shown = stretch?.summary.pitch;
-	const noGroup = one.groups ? '' : 'The match has no group yet: press I at a frame, and make a group of it';
+	const noGroup = one.groups ? '' : 'The match has no group yet: choose a frame (I) and make a group of it';
 	return html`
 		<section class="card camera" aria-label="Cameras">
 			<h2>Cameras${stretch ? html`<span class="card__aside">frames ${stretch.first} to ${stretch.last}</span>` : null}</h2>
-			${stretch ? html`<${Counts} stretch=${stretch} old=${before} />` : html`<p>A camera for each frame of this shot is found from its paint. Groups of its frames then need no proposal.</p>`}
+			${stretch ? html`<${Counts} stretch=${stretch} old=${before} />` : html`<p>Tracking finds a camera for each frame of this shot from the painted lines. Groups made of these frames then have a camera.</p>`}
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
 			${stretch?.stale ? html`<p class="form__error">The video file has changed since then: track the shot again.</p>` : null}
@@ -51,11 +51,11 @@ export function CameraCard({ one, cameras }) {
 			${useless.length ? html`<p class="form__error">Frame ${useless.join(', ')} has too few lines for a camera, and was not used.</p>` : null}
 			${shown?.other ? html`
 				<p role="status">The frames of this shot show another pitch size than the match has${frames ? ` (${pitchSize({ length: frames.pitch[0], width: frames.pitch[1] })})` : ''}: ${shownSize({ ...shown, length_sigma_m: shown.sigma.length, width_sigma_m: shown.sigma.width })}. If you use it, the groups of the match are solved again and the shot is tracked again.${noGroup ? ` ${noGroup}.` : ''}</p>
-				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== '' || noGroup !== ''} title=${busy || noGroup || 'Statistics restores the size before'} onClick=${noGroup ? undefined : cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
+				<p><button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== '' || noGroup !== ''} title=${busy || noGroup || 'The page Statistics can restore the previous size'} onClick=${noGroup ? undefined : cameras.takePitch}>Use ${pitchSize(shown.other)} for this match</button></p>` : null}
 			<p class="buttons">
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
-				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens its lines'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>
-				${stretch ? html`<button class="button" type="button" aria-pressed=${stretch.summary.turned} data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'The paint is the same from the other side: for a camera that stands opposite the main camera'} onClick=${cameras.turnHalf}>Turn by half <kbd>Shift T</kbd></button>` : null}
+				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens it in the calibration editor'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>
+				${stretch ? html`<button class="button" type="button" aria-pressed=${stretch.summary.turned} data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'The painted lines look the same from both sides of the pitch. Use this for a camera that stands opposite the main camera'} onClick=${cameras.turnHalf}>Turn to the other side <kbd>Shift T</kbd></button>` : null}
 			</p>
 			${stretch ? html`
 				<p class="camera__files">Save as ${FILES.map(([format, label], index) => html`${index ? ', ' : ''}<a key=${format} class="link" href=${camerasFile(one.id, stretch.first, format)} download>${label}</a>`)}</p>` : null}

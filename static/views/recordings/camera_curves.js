@@ -17,8 +17,8 @@ const [PAN, TILT, FOCAL] = [3, 4, 6];
 
 /** @type {Record<string, string>} */
 const REASONS = {
-	no_paint: 'no paint is found where its markings would be',
-	paint_disagrees: 'the paint lies beside the markings',
+	no_paint: 'no painted lines are found where they should be',
+	paint_disagrees: 'the painted lines lie beside the projected ones',
 	no_frame: 'its picture cannot be read',
 };
 
@@ -71,7 +71,7 @@ function ThisFrame({ cameras: { frames } }) {
 	const error = frames.error_px[place];
 	const reason = frames.reason[place];
 	const key = frames.keyframe.includes(wanted.value) ? ' Key frame.' : '';
-	const more = error === null ? `${reason ? `: ${REASONS[reason] ?? reason.replaceAll('_', ' ')}` : `: ${meaning}`}.` : `, paint ${error.toFixed(2)} px from its markings.`;
+	const more = error === null ? `${reason ? `: ${REASONS[reason] ?? reason.replaceAll('_', ' ')}` : `: ${meaning}`}.` : `: the painted lines lie ${error.toFixed(2)} px from the projected ones.`;
 	return html`<p class="camera__frame">Frame ${wanted.value} is <strong>${name}</strong>${more}${key}</p>`;
 }
 
@@ -79,10 +79,10 @@ function ThisFrame({ cameras: { frames } }) {
 function Tools({ cameras }) {
 	return html`
 		<div class="camera__tools">
-			<button class="button button--small" type="button" onClick=${cameras.worst}>Worst <kbd>W</kbd></button>
-			<button class="button button--small" type="button" onClick=${cameras.untracked}>Next lost <kbd>N</kbd></button>
-			<button class="button button--small" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Lines <kbd>P</kbd></button>
-			${cameras.stretch?.before ? html`<button class="button button--small" type="button" aria-pressed=${cameras.before} onClick=${cameras.turnBefore}>Before <kbd>B</kbd></button>` : null}
+			<button class="button button--small" type="button" onClick=${cameras.worst}>Worst frame <kbd>W</kbd></button>
+			<button class="button button--small" type="button" onClick=${cameras.untracked}>Next untracked <kbd>N</kbd></button>
+			<button class="button button--small" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Projected lines <kbd>P</kbd></button>
+			${cameras.stretch?.before ? html`<button class="button button--small" type="button" aria-pressed=${cameras.before} onClick=${cameras.turnBefore}>Previous cameras <kbd>B</kbd></button>` : null}
 			<${ThisFrame} cameras=${cameras} />
 			${cameras.before ? html`<strong>These are the cameras before the last change.</strong>` : null}
 		</div>

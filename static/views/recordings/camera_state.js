@@ -76,7 +76,7 @@ export function useCameras(one, shot, { jobs, watch }) {
 		const turned = !stretch.summary.turned;
 		attempt(turnCameras(one.id, stretch.first, turned), async (begun) => {
 			const over = await watch(begun);
-			if (over.state === 'done') announce(turned ? 'The cameras stand on the other side now. Shift T turns them back.' : 'The cameras are turned back.');
+			if (over.state === 'done') announce(turned ? 'The cameras are on the other side of the pitch now. Shift T turns them back.' : 'The cameras are back on their first side.');
 		});
 	}
 	function takePitch() {
@@ -85,7 +85,7 @@ export function useCameras(one, shot, { jobs, watch }) {
 		// Both at once: whoever leaves the page meanwhile finds the shot tracked on its pitch.
 		const size = getPitches(one.dataset).then(({ etag }) => setPitch(one.dataset, one.name, other, etag));
 		attempt(size.then(() => postCameras(one.id, stretch)), async (begun) => {
-			announce(`The match is played on ${pitchSize(other)} now. Its cameras are tracked again on that pitch.`);
+			announce(`The pitch of this match is ${pitchSize(other)} now. The shot is tracked again on that pitch.`);
 			const over = await watch(begun);
 			if (over.state === 'done') announce(over.sentence ?? 'The shot is tracked.');
 		});
@@ -101,7 +101,7 @@ export function useCameras(one, shot, { jobs, watch }) {
 			const open = () => navigate(address(`/review/${over.result.group}/calibration`, { recording: String(one.id), ...place }));
 			const there = page.peek();
 			if (there.page !== 'recording' || there.recording !== one.id) {
-				inform(`Frame ${frame} of ${one.name} is a group now.`, { label: 'Draw its lines', run: open });
+				inform(`A group was made of frame ${frame} of ${one.name}.`, { label: 'Draw its lines', run: open });
 				return;
 			}
 			navigate(address(`/recordings/${one.id}`, place), { replace: true });
@@ -136,11 +136,11 @@ export function useCameraKeys(cameras) {
 	latest.current = cameras;
 	const keys = useRef(/** @type {Binding[]} */ ([
 		{ keys: ['t'], label: 'Track the camera of the shot', group: 'Cameras', needs: 'lead', run: () => latest.current.track() },
-		{ keys: ['Shift+t'], label: 'Turn the cameras by half a turn of the pitch, or back', group: 'Cameras', needs: 'lead', run: () => latest.current.turnHalf() },
+		{ keys: ['Shift+t'], label: 'Turn the cameras to the other side of the pitch, or back', group: 'Cameras', needs: 'lead', run: () => latest.current.turnHalf() },
 		{ keys: ['e'], label: 'Draw the lines of this frame', group: 'Cameras', needs: 'lead', run: () => latest.current.correct() },
 		{ keys: ['w'], label: 'Worst frame of the shot', group: 'Cameras', run: () => latest.current.worst() },
-		{ keys: ['n'], label: 'Next frames that are lost or bridged', group: 'Cameras', run: () => latest.current.untracked() },
-		{ keys: ['b'], label: 'Cameras before the last change, or the present ones', group: 'Cameras', run: () => latest.current.turnBefore() },
+		{ keys: ['n'], label: 'Next frame that is bridged or lost', group: 'Cameras', run: () => latest.current.untracked() },
+		{ keys: ['b'], label: 'Show the cameras before the last change, or the present ones', group: 'Cameras', run: () => latest.current.turnBefore() },
 		{ keys: ['p'], label: 'Projected lines', group: 'Cameras', run: () => latest.current.turnLines() },
 	]));
 	useKeys(keys.current);

@@ -29,7 +29,7 @@ export function ClockCard({ one, reload }) {
 				<select class="field" id="clock-half" name="half">${HALVES.map((name, index) => html`<option key=${name} value=${String(index + 1)}>${name}</option>`)}</select>
 				<label class="hidden-text" for="clock-time">What the clock shows in this frame</label>
 				<input class="field film__step" id="clock-time" name="time" placeholder="12:40" pattern="[0-9]{1,3}:[0-5][0-9]" title="Minutes and seconds, such as 12:40" required autocomplete="off" />
-				<button class="button button--small" type="submit" data-needs="annotate" data-of=${one.dataset}>Set here</button>
+				<button class="button button--small" type="submit" data-needs="annotate" data-of=${one.dataset}>Set for this frame</button>
 			</form>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${one.clocks.length ? html`
@@ -39,7 +39,7 @@ export function ClockCard({ one, reload }) {
 							<button class="link-button" type="button" onClick=${() => goTo(clock.frame)}>frame ${clock.frame}</button> ${clockText(clock.half, clock.seconds)}
 							<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} onClick=${() => send(one.clocks.filter((other) => other !== clock))}>Remove<span class="hidden-text"> the clock of frame ${clock.frame}</span></button>
 						</li>`)}
-				</ul>` : html`<p class="empty-note">Go to a frame in which the clock changes, and say what it shows.</p>`}
+				</ul>` : html`<p class="empty-note">Go to a frame in which the match clock changes, and enter the time that it shows.</p>`}
 		</section>
 	`;
 }

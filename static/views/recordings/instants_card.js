@@ -28,8 +28,8 @@ function madeText({ new: made, changed, unchanged, linked_views: views, outside,
 		`${plural(made, 'group')} made.`,
 		changed ? `${plural(changed, 'group')} got views of replays.` : '',
 		unchanged ? `${plural(unchanged, 'frame')} ${unchanged === 1 ? 'was already a group and was not changed' : 'were already groups and were not changed'}.` : '',
-		views ? `${plural(views, 'view')} of linked replays.` : '',
-		outside ? `${plural(outside, 'view')} fewer, outside of a replay.` : '',
+		views ? `${plural(views, 'view')} of linked replays added.` : '',
+		outside ? `${plural(outside, 'view')} missing, because the replay does not show the instant.` : '',
 	].filter(Boolean).join(' ');
 }
 
@@ -57,14 +57,14 @@ export function InstantsCard({ one, running: { jobs, watch }, shot, instants, li
 		<section class="card form" aria-label="Instants">
 			<h2>Instants<span class="card__aside">${plural(chosen.size, 'frame')} chosen</span></h2>
 			<p class="buttons">
-				<button class="button" type="button" aria-pressed=${chosen.has(wanted.value)} onClick=${() => instants.turn(wanted.value)}>This frame <kbd>I</kbd></button>
-				<button class="button" type="button" aria-disabled=${chosen.size === 0} onClick=${instants.clear}>None</button>
+				<button class="button" type="button" aria-pressed=${chosen.has(wanted.value)} onClick=${() => instants.turn(wanted.value)}>Choose this frame <kbd>I</kbd></button>
+				<button class="button" type="button" aria-disabled=${chosen.size === 0} onClick=${instants.clear}>Clear</button>
 			</p>
 			<form class="buttons" onSubmit=${every}>
 				<label for="instants-step">Every</label>
 				<input class="field film__step" id="instants-step" name="step" type="number" min="1" max="100000" required defaultValue=${Math.round(one.fps ?? 25)} />
 				<span>frames</span>
-				<button class="button" type="submit">of this shot</button>
+				<button class="button" type="submit" title="Chooses every so many frames of this shot">Choose</button>
 			</form>
 			<label class="form__check"><input type="checkbox" checked=${propose} onChange=${withTick(setPropose)} />Propose cameras afterwards</label>
 			${usable ? html`<label class="form__check"><input type="checkbox" checked=${linked} onChange=${withTick(setLinked)} />With the views of ${plural(usable, 'linked replay')}</label>` : null}

@@ -58,7 +58,7 @@ export function BallCard({ link, dataset, reload }) {
 			<h2>Ball</h2>
 			<p>Rays of the ball meet where both frames show the same instant. Both shots need tracked cameras, and the ball: marked in groups that were taken from them, or in a file <code>ball.csv</code> (<code>frame,time_s,x,y</code>).</p>
 			${turned ? html`
-				<p role="status">The replay was tracked from the wrong side of the pitch: its rays meet the live ones once its cameras are turned by half a turn.
+				<p role="status">The replay was tracked from the wrong side of the pitch: its rays meet the live ones once its cameras are turned to the other side.
 					<button class="button button--small" type="button" data-needs="lead" data-of=${dataset} aria-disabled=${runs} onClick=${turn}>Turn the replay’s cameras</button></p>` : null}
 			<form class="linking__files" ref=${form} onSubmit=${(/** @type {SubmitEvent} */ event) => { event.preventDefault(); if (!runs) look(); }}>
 				<label>ball.csv of the live recording <input type="file" name="live" accept=".csv" /></label>
@@ -69,8 +69,8 @@ export function BallCard({ link, dataset, reload }) {
 			${job ? html`<${JobProgress} job=${job} />` : null}
 			${misses.length ? html`
 				<${Chart}
-					name="How far the rays of the ball miss those of the live shot, by frame of the replay" xLabel="frame of the replay" yLabel="miss, m" height=${150}
-					x=${misses.map(({ frame }) => frame)} curves=${[{ label: 'miss of the rays', values: misses.map(({ miss_m: miss }) => miss), colour: 'chart-a', points: true }]}
+					name="Distance between the ray of the replay and that of the live shot, by frame of the replay" xLabel="frame of the replay" yLabel="distance, m" height=${150}
+					x=${misses.map(({ frame }) => frame)} curves=${[{ label: 'distance between the rays', values: misses.map(({ miss_m: miss }) => miss), colour: 'chart-a', points: true }]}
 					yRange=${[0, null]} format=${(/** @type {number} */ value) => `${value.toFixed(2)} m`}
 				/>` : null}
 		</section>

@@ -40,10 +40,10 @@ function Suggestions({ one, shots, shot }) {
 	const others = shots.map((live, index) => ({ live, index })).filter(({ live }) => live !== shot);
 	const chosen = others.find(({ index }) => String(index) === other)?.live;
 	return html`
-		<h3>Link to live</h3>
+		<h3>Link to the live shot</h3>
 		${found.error ? html`<${FormError} error=${found.error} />` : null}
 		${error ? html`<${FormError} error=${error} />` : null}
-		${found.value && !items.length ? html`<p class="empty-note">No shot of the main camera is before this replay. Choose the live shot by hand.</p>` : null}
+		${found.value && !items.length ? html`<p class="empty-note">No shot of the main camera comes before this replay. Choose the live shot from the list.</p>` : null}
 		<ul class="linking__choices">
 			${items.map((item) => html`
 				<li key=${`${item.recording}-${item.first}`}>
@@ -57,7 +57,7 @@ function Suggestions({ one, shots, shot }) {
 				<option value="">Another shot…</option>
 				${others.map(({ live, index }) => html`<option key=${index} value=${String(index)}>Shot ${index + 1}: ${kindOf(live.kind).label}, ${timecode(live.first / (one.fps ?? 25), one.fps ?? 25)}</option>`)}
 			</select>
-			<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${!chosen} title=${chosen ? '' : 'Choose a shot first'} onClick=${() => { if (chosen) link({ recording: one.id, first: chosen.first, last: chosen.last }); }}>Link to it</button>
+			<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${!chosen} title=${chosen ? '' : 'Choose a shot first'} onClick=${() => { if (chosen) link({ recording: one.id, first: chosen.first, last: chosen.last }); }}>Link</button>
 		</div>
 	`;
 }

@@ -53,7 +53,7 @@ function useLink(first) {
 				announce(told);
 			} catch (problem) {
 				if (!(problem instanceof ApiError)) throw problem;
-				complain(problem.status === 412 ? 'Somebody else has changed this link: this is how it is now.' : problem.message);
+				complain(problem.status === 412 ? 'Another person changed this link; the page shows the new state.' : problem.message);
 				if (problem.status !== 412) return;
 				before.current = [];
 				keep(await getLink(recording, id));
@@ -61,7 +61,7 @@ function useLink(first) {
 		});
 	}
 	const reload = async () => keep(await getLink(recording, id));
-	return { link, change, reload, undo: () => change(() => before.current.pop() ?? null, 'Taken back.', false) };
+	return { link, change, reload, undo: () => change(() => before.current.pop() ?? null, 'Undone.', false) };
 }
 
 /** @param {{side: Side, shot: LinkedShot, player: Player, one: RecordingJson, focused: boolean, focus: () => void, mark: string}} props */
@@ -178,12 +178,12 @@ function Both({ first, recordings }) {
 				/>`)}
 			<${TimesCard} link=${link} frames=${frames.value} fps=${recordings.live.fps ?? 25} dataset=${dataset} assume=${(/** @type {number} */ speed) => change(({ instants }) => ({ instants, assumed_speed: speed }), 'The speed is assumed.')}>
 				<p class="buttons">
-					<button class="button button--primary" type="button" data-needs="annotate" data-of=${dataset} aria-disabled=${Boolean(here)} title=${here ? 'These two frames are linked already' : ''} onClick=${() => { if (!here) linkHere(); }}>Same instant <kbd>I</kbd></button>
+					<button class="button button--primary" type="button" data-needs="annotate" data-of=${dataset} aria-disabled=${Boolean(here)} title=${here ? 'These two frames are linked already' : 'Link these two frames: both show the same instant'} onClick=${() => { if (!here) linkHere(); }}>Same instant <kbd>I</kbd></button>
 					<button class="button" type="button" aria-pressed=${together} aria-disabled=${!usable} title=${usable ? '' : 'Link two instants first'} onClick=${playTogether}>Play together <kbd>P</kbd></button>
 				</p>
 			<//>
 			<${InstantsList} link=${link} dataset=${dataset} show=${show} remove=${remove}>
-				<button class="button button--small linking__remove" type="button" data-needs="annotate" data-of=${dataset} title="Groups that were made of it stay" onClick=${() => attempt(deleteLink(link.live.recording, link.id), () => navigate(`/recordings/${link.replay.recording}`))}>Remove this link</button>
+				<button class="button button--small linking__remove" type="button" data-needs="annotate" data-of=${dataset} title="Groups that were made with this link stay" onClick=${() => attempt(deleteLink(link.live.recording, link.id), () => navigate(`/recordings/${link.replay.recording}`))}>Remove this link</button>
 				${error ? html`<${FormError} error=${error} />` : null}
 			<//>
 			<${BallCard} link=${link} dataset=${dataset} reload=${reload} />
@@ -205,7 +205,7 @@ export function LinkPage() {
 		<${PageFrame} current="recordings" title="Link a replay" where=${html`<a href="/recordings">Recordings</a>${back ? html` / <a href=${`/recordings/${back.recording}`}>${back.name}</a> / <strong>replay ${back.first} to ${back.last}</strong>` : null}`}>
 			${found.error ? html`<${Trouble} title="This link cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${!one && !found.error ? html`<${Loading} what="the link" />` : null}
-			${why ? html`<section class="card empty" role="alert"><h2>Its frames cannot be read now</h2><p>${why}</p></section>` : null}
+			${why ? html`<section class="card empty" role="alert"><h2>The frames cannot be read now</h2><p>${why}</p></section>` : null}
 			${one && !why ? html`<${Both} key=${one.first.id} first=${one.first} recordings=${one.recordings} />` : null}
 		<//>
 	`;

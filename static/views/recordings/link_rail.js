@@ -22,12 +22,12 @@ export function TimesCard({ link, frames, fps, dataset, assume, children }) {
 			<div role="status">${mapText(map, fps).map((sentence) => html`<p key=${sentence}>${sentence}</p>`)}</div>
 			${map.outcome === 'offset' ? html`
 				<form class="buttons" onSubmit=${slow}>
-					<label for="link-slow">Assume that it is</label>
+					<label for="link-slow">Assume that the replay is</label>
 					<input class="field linking__slow" id="link-slow" name="slow" type="number" min="0.25" max="50" step="any" required defaultValue=${(1 / (map.speed ?? 1)).toFixed(2)} />
 					<span>times slower</span>
 					<button class="button button--small" type="submit" data-needs="annotate" data-of=${dataset}>Assume</button>
 				</form>` : null}
-			${repeats || blends ? html`<p class="empty-note">${[repeats ? `${plural(repeats, 'frame')} of the replay ${repeats === 1 ? 'repeats' : 'repeat'} the one before` : '', blends ? `${plural(blends, 'frame')} ${blends === 1 ? 'is a mix' : 'are mixes'} of two` : ''].filter(Boolean).join('; ')}. Others are preferred.</p>` : null}
+			${repeats || blends ? html`<p class="empty-note">${[repeats ? `${plural(repeats, 'frame')} of the replay ${repeats === 1 ? 'repeats' : 'repeat'} the one before` : '', blends ? `${plural(blends, 'frame')} ${blends === 1 ? 'is a mix' : 'are mixes'} of two` : ''].filter(Boolean).join('; ')}. Groups use other frames if they can.</p>` : null}
 		</section>
 	`;
 }

@@ -28,24 +28,24 @@ export function keysOfRecording(one, shots, doing) {
 	const second = Math.round(one.fps ?? 25);
 	const [look, edit] = ['Recording', 'Shots'];
 	return [
-		{ keys: [' '], label: 'Play, or stop', group: look, shown: 'Space', run: toggleRunning },
+		{ keys: [' '], label: 'Play or stop', group: look, shown: 'Space', run: toggleRunning },
 		{ keys: ['l'], label: 'Play forwards; again: twice as fast', group: look, run: () => run(1) },
 		{ keys: ['k'], label: 'Stop', group: look, run: stand },
 		{ keys: ['j'], label: 'Play backwards; again: twice as fast', group: look, run: () => run(-1) },
 		{ keys: ['ArrowRight'], label: 'Next frame', group: look, run: () => { stepBy(1); } },
-		{ keys: ['ArrowLeft'], label: 'Frame before', group: look, run: () => { stepBy(-1); } },
-		{ keys: ['Shift+ArrowRight'], label: 'A second on', group: look, run: () => { stepBy(second); } },
-		{ keys: ['Shift+ArrowLeft'], label: 'A second back', group: look, run: () => { stepBy(-second); } },
+		{ keys: ['ArrowLeft'], label: 'Previous frame', group: look, run: () => { stepBy(-1); } },
+		{ keys: ['Shift+ArrowRight'], label: 'One second forward', group: look, run: () => { stepBy(second); } },
+		{ keys: ['Shift+ArrowLeft'], label: 'One second back', group: look, run: () => { stepBy(-second); } },
 		{ keys: ['ArrowDown'], label: 'Next shot', group: look, run: () => shotBy(1) },
-		{ keys: ['ArrowUp'], label: 'Shot before', group: look, run: () => shotBy(-1) },
+		{ keys: ['ArrowUp'], label: 'Previous shot', group: look, run: () => shotBy(-1) },
 		{ keys: ['s'], label: 'Split the shot at this frame', group: edit, needs: 'annotate', run: () => doing.current.change(splitAt(shots(), wanted.value), 'Split.') },
 		{ keys: ['m'], label: 'Merge the shot with the next', group: edit, needs: 'annotate', run: () => doing.current.change(mergedWithNext(shots(), at()), 'Merged with the next shot.') },
 		...SHOT_KINDS.map(({ kind, label }, index) => /** @type {Binding} */ ({
-			keys: [String(index + 1)], label: `The shot is ${label === 'other' ? 'something else' : `a ${label}`}`, group: edit, needs: 'annotate', run: () => set({ kind }, `The kind of this shot is now ${label}.`),
+			keys: [String(index + 1)], label: `Set the kind of the shot: ${label}`, group: edit, needs: 'annotate', run: () => set({ kind }, `The kind of this shot is now ${label}.`),
 		})),
 		{ keys: ['a'], label: 'Keep the shot', group: edit, needs: 'annotate', run: () => set({ kept: true }, 'The shot is kept.') },
 		{ keys: ['x'], label: 'Drop the shot', group: edit, needs: 'annotate', run: () => set({ kept: false }, 'The shot is dropped.') },
-		{ keys: ['Ctrl+z'], label: 'Take the last change of the shots back', group: edit, needs: 'annotate', run: () => doing.current.undo() },
-		{ keys: ['i'], label: 'Choose this frame as an instant, or not', group: edit, run: () => doing.current.turn(wanted.value) },
+		{ keys: ['Ctrl+z'], label: 'Undo the last change of the shots', group: edit, needs: 'annotate', run: () => doing.current.undo() },
+		{ keys: ['i'], label: 'Choose this frame as an instant, or clear it', group: edit, run: () => doing.current.turn(wanted.value) },
 	];
 }

@@ -67,7 +67,7 @@ function useShots(id) {
 				if (newest) keep({ items: newest.items === items ? saved.items : newest.items, etag: saved.etag });
 			} catch (problem) {
 				if (!(problem instanceof ApiError)) throw problem;
-				complain(problem.status === 412 ? 'Somebody else has changed the shots: this is how they are now.' : problem.message);
+				complain(problem.status === 412 ? 'Another person changed the shots; the page shows the new state.' : problem.message);
 				before.current = [];
 				await read();
 			}
@@ -85,7 +85,7 @@ function useShots(id) {
 		const last = before.current.pop();
 		if (!last) return;
 		send(last);
-		announce('Taken back.');
+		announce('Undone.');
 	}
 	return { list, latest, error, read, change, undo, remember };
 }
@@ -115,7 +115,7 @@ function Stage({ one, seconds, cameras, balls }) {
 	const { frame, address } = seen.value;
 	return html`
 		<section class="film__stage" aria-label="Frame" data-frame=${frame}>
-			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}<${CameraLines} cameras=${cameras} /><${BallOverlay} one=${one} balls=${balls} cameras=${cameras} />${frame === wanted.value || playTrouble.value ? null : html`<p class="film__coming">Frame ${wanted.value} is on its way.</p>`}</div>
+			<div class="film__picture" ref=${ref}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${one.name}`} />` : null}<${CameraLines} cameras=${cameras} /><${BallOverlay} one=${one} balls=${balls} cameras=${cameras} />${frame === wanted.value || playTrouble.value ? null : html`<p class="film__coming">Frame ${wanted.value} is loading.</p>`}</div>
 			<p class="film__time">
 				<button class="button" type="button" aria-pressed=${speed.value !== 0} onClick=${toggleRunning}>${speed.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
 				<strong class="mono" data-timecode>${timecode(seconds(wanted.value), one.fps ?? 25)}</strong>
@@ -192,7 +192,7 @@ function Opened({ one, reload }) {
 	const running = useRunningJobs({ dataset: one.dataset }, ({ subject }) => subject?.recording === one.id);
 	const why = one.problem ?? (one.indexed ? null : 'It is not indexed yet.');
 	if (!why) return html`<${Film} one=${one} running=${running} reload=${reload} />`;
-	return html`<section class="card empty" role="alert"><h2>Its frames cannot be read now</h2><p>${why}</p><p>Groups that were taken from it still work. Put the file back, or index it again as it is now; shots stay if it is the same.</p><${FindAgain} one=${one} running=${running} label="Index it again" over=${reload} /></section>`;
+	return html`<section class="card empty" role="alert"><h2>The frames cannot be read now</h2><p>${why}</p><p>Groups that were made of it still work. Put the file back, or index it again as it is now; if the file is the same, its shots stay.</p><${FindAgain} one=${one} running=${running} label="Index it again" over=${reload} /></section>`;
 }
 
 export function RecordingPage() {

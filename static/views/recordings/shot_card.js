@@ -15,7 +15,7 @@ import { useEnded } from '../running_jobs.js';
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
 /** @import {RunningJobs} from '../running_jobs.js' */
 
-const ENTERED = { start: 'the beginning of the recording', cut: 'after a cut', dissolve: 'after a dissolve', wipe: 'after a wipe', fade: 'after a fade' };
+const ENTERED = { start: 'at the beginning of the recording', cut: 'after a cut', dissolve: 'after a dissolve', wipe: 'after a wipe', fade: 'after a fade' };
 
 /** Finds all shots anew, and indexes what is not indexed as it is now. @param {{one: RecordingJson, running: RunningJobs, label: string, before?: () => void, over?: () => void}} props */
 export function FindAgain({ one, running: { jobs, watch }, label, before = () => {}, over = () => {} }) {

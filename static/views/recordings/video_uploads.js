@@ -15,8 +15,8 @@ import { sizeText, UploadRoom } from '../source_choice.js';
 
 /** What a state is called, and the tone of its pill. @type {{[state in VideoUpload['state']]: [string, string]}} */
 const STATES = {
-	queued: ['next', 'waiting'], sending: ['sending', 'running'], waiting: ['waiting', 'waiting'], half: ['half sent', 'cancelled'],
-	here: ['uploaded', 'ready'], refused: ['stopped', 'failed'], added: ['uploaded', 'ready'],
+	queued: ['queued', 'waiting'], sending: ['sending', 'running'], waiting: ['waiting', 'waiting'], half: ['incomplete', 'cancelled'],
+	here: ['uploaded', 'ready'], refused: ['failed', 'failed'], added: ['uploaded', 'ready'],
 };
 
 /** @param {VideoUpload} one @returns {string} */
@@ -76,7 +76,7 @@ export function VideoField({ dropped, over }) {
 		<div class="form__row import__drop" data-over=${over}>
 			<label for="import-file">Videos</label>
 			<input class="field" id="import-file" type="file" multiple accept="video/*,.mkv,.ts,.mts,.m2ts" onChange=${choose} />
-			<small>Or drop them anywhere on this page. They are sent at once, one after the other, and go on where they were when the network or the server stops; after this page was closed, choose them again.</small>
+			<small>Or drop them anywhere on this page. They are uploaded one after the other. After a break of the network or the server they continue by themselves; if you close this page, choose them again to continue.</small>
 			${error ? html`<p class="form__error" role="alert">${error}</p>` : null}
 			${uploads.length ? html`<ul class="uploads" aria-label="Uploads">${uploads.map((one) => html`<${Row} key=${one.key} one=${one} />`)}</ul>` : null}
 			<${UploadRoom} sent=${uploads.filter(({ state }) => state === 'here').length} />

@@ -160,7 +160,7 @@ export function ScenePanel({ group, solution }) {
 	const hasBall = scene.ball !== null || scene.best !== null;
 	return html`
 		<${Stage} scene=${scene} images=${images} />
-		<div class="scene3d__toolbar" role="toolbar" aria-label="Standpoints">
+		<div class="scene3d__toolbar" role="toolbar" aria-label="Viewpoints">
 			<${Presets} hasBall=${hasBall} />
 			<button class="button" type="button" onClick=${toggleScene}>Images <kbd>\\</kbd></button>
 		</div>

@@ -79,7 +79,7 @@ function Plan({ scene, frames, place, rate }) {
 				${best ? stands.filter(({ letter }) => seen?.has(letter)).map(({ letter, camera }) => html`<path key=${letter} class="mini-pitch__ray" data-letter=${letter} d=${pathFromAbove([camera.C, best.point])} stroke-width=${pixel} />`) : null}
 				${best ? html`<circle class="mini-pitch__ball" cx=${best.point[0]} cy=${best.point[1]} r=${4 * pixel} stroke-width=${1.5 * pixel} />` : null}
 			</svg>
-			<p class="track-plan__key">${EVENTS.map(({ kind }) => html`<span key=${kind}><i data-kind=${kind}></i>${kind}</span>`)}<span>dashed: carried by physics</span></p>
+			<p class="track-plan__key">${EVENTS.map(({ kind }) => html`<span key=${kind}><i data-kind=${kind}></i>${kind}</span>`)}<span>dashed: predicted</span></p>
 		</div>
 	`;
 }
@@ -124,7 +124,7 @@ export function TrackScene({ track, frames, at, plays, leave }) {
 	if (!scene) return html`<p class="scene3d__missing" role="status">Reading the cameras…</p>`;
 	return html`
 		<${Stage} scene=${scene} images=${plays ? NO_IMAGES : images} habits=${habits} />
-		<div class="scene3d__toolbar" role="toolbar" aria-label="Standpoints"><${Presets} hasBall=${scene.best !== null} /></div>
+		<div class="scene3d__toolbar" role="toolbar" aria-label="Viewpoints"><${Presets} hasBall=${scene.best !== null} /></div>
 		<div class="scene3d__table" tabindex="0" role="group" aria-label="The track in words">
 			<${Plan} scene=${scene} frames=${frames} place=${place} rate=${track.summary.rate} />
 			<${Words} scene=${scene} frames=${frames} place=${place} />

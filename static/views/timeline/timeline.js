@@ -14,6 +14,7 @@ import { trackAround } from '../../state/group_track.js';
 import {
 	columns, goToWorst, keepInSight, playing, position, scrubTo, span, startTimeline, togglePlaying, trouble, zoomSpan,
 } from '../../state/timeline.js';
+import { GATE_TITLES } from '../gate_names.js';
 import { drawCurve, toIndex } from './drawing.js';
 
 /** @import {TrackAround} from '../../api/tracks.js' */
@@ -31,12 +32,18 @@ function look() {
 	};
 }
 
+/** Why a group fails, in words. @param {string | null} gate that fails first */
+function failure(gate) {
+	const title = GATE_TITLES[gate ?? ''] ?? (gate ?? '').replaceAll('_', ' ');
+	return title.charAt(0).toLowerCase() + title.slice(1);
+}
+
 /** One group in words. @param {TimelineJson} all @param {number} index */
 function words(all, index) {
 	const frame = all.frame[index] ?? all.number[index];
 	const verdict = all.status[index] === 'unreviewed' ? '' : `, ${all.status[index]}${all.stale[index] ? ', stale' : ''}`;
 	const passes = all.passes[index];
-	const state = passes === null ? 'not solved' : passes ? 'passes' : `fails ${(all.gate[index] ?? '').replaceAll('_', ' ')}`;
+	const state = passes === null ? 'not solved' : passes ? 'passes' : `fails: ${failure(all.gate[index])}`;
 	const error = all.error_px[index];
 	const point = all.point[index];
 	const place = point ? `, ${metres(-point[2])} high` : '';
@@ -145,10 +152,10 @@ export function Timeline() {
 			<h2>Reprojection error, frame by frame<span class="card__aside">${all ? totals(all) : ''}</span></h2>
 			<div class="timeline__tools" role="toolbar" aria-label="Timeline">
 				<button class="button" type="button" aria-pressed=${playing.value} onClick=${togglePlaying}>${playing.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
-				<button class="button" type="button" onClick=${goToWorst}>Worst <kbd>J</kbd></button>
+				<button class="button" type="button" onClick=${goToWorst}>Worst frame <kbd>J</kbd></button>
 				<button class="button" type="button" aria-label="Zoom in" title="Zoom in (wheel)" onClick=${() => zoomSpan(0.5)}>+</button>
 				<button class="button" type="button" aria-label="Zoom out" title="Zoom out (wheel)" onClick=${() => zoomSpan(2)}>−</button>
-				${trackAround.value ? html`<span class="timeline__track"><span aria-hidden="true">◆</span> left out by the track, as groups are now</span>` : null}
+				${trackAround.value ? html`<span class="timeline__track"><span aria-hidden="true">◆</span> left-out error of the track, with the groups as they are now</span>` : null}
 				<span class="timeline__key"><span aria-hidden="true">- -</span> limit ${pixelText(limit)}</span>
 			</div>
 			${all && all.id.length > 0 ? html`<${Curve} all=${all} limit=${limit} />` : html`<p class="empty-note" role="status">${trouble.value || 'Loading the frames…'}</p>`}

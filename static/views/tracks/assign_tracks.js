@@ -39,7 +39,7 @@ export function AssignTracks({ dataset, id, tracks, onClose, onDone }) {
 			title="Assign tracks" onClose=${onClose} onSubmit=${send}
 			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${busy}>Assign</button>`}
 		>
-			<p>${plural(tracks.length, 'track')} of the list that nobody judged, in its order.</p>
+			<p>${plural(tracks.length, 'track')} of the list without a verdict, in the order of the list.</p>
 			<div class="form__row"><label for="batch-name">Name</label><input class="field" id="batch-name" name="name" required maxlength="80" autocomplete="off" /></div>
 			<div class="form__columns">
 			<div class="form__row"><label for="batch-size">Number of tracks (the first of the list)</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${tracks.length}`} /></div>

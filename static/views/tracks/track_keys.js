@@ -35,19 +35,19 @@ export function keysOfTrack(doing) {
 	};
 	const second = () => Math.round(doing.current.track.summary.rate);
 	return [
-		{ keys: [' '], label: 'Play, or stop', group: look, shown: 'Space', run: () => doing.current.player.toggle() },
+		{ keys: [' '], label: 'Play or stop', group: look, shown: 'Space', run: () => doing.current.player.toggle() },
 		{ keys: ['l'], label: 'Play forwards; again: twice as fast', group: look, run: () => doing.current.player.run(1) },
 		{ keys: ['k'], label: 'Stop', group: look, run: () => doing.current.player.stand() },
 		{ keys: ['j'], label: 'Play backwards; again: twice as fast', group: look, run: () => doing.current.player.run(-1) },
 		{ keys: [','], label: 'Play more slowly', group: look, run: () => doing.current.player.changePace(-1) },
 		{ keys: ['.'], label: 'Play faster', group: look, run: () => doing.current.player.changePace(1) },
-		{ keys: ['\\'], label: '3D view and plan, or the curves', group: look, run: () => doing.current.switchView() },
+		{ keys: ['\\'], label: '3D and top view, or the curves', group: look, run: () => doing.current.switchView() },
 		{ keys: ['ArrowRight'], label: 'Next frame', group: look, run: () => stepBy(1) },
-		{ keys: ['ArrowLeft'], label: 'Frame before', group: look, run: () => stepBy(-1) },
-		{ keys: ['Shift+ArrowRight'], label: 'A second on', group: look, run: () => stepBy(second()) },
-		{ keys: ['Shift+ArrowLeft'], label: 'A second back', group: look, run: () => stepBy(-second()) },
+		{ keys: ['ArrowLeft'], label: 'Previous frame', group: look, run: () => stepBy(-1) },
+		{ keys: ['Shift+ArrowRight'], label: 'One second forward', group: look, run: () => stepBy(second()) },
+		{ keys: ['Shift+ArrowLeft'], label: 'One second back', group: look, run: () => stepBy(-second()) },
 		{ keys: ['n'], label: 'Next event', group: look, run: () => toEvent(1) },
-		{ keys: ['p'], label: 'Event before', group: look, run: () => toEvent(-1) },
+		{ keys: ['p'], label: 'Previous event', group: look, run: () => toEvent(-1) },
 		{ keys: ['w'], label: 'Worst frame: the largest left-out error', group: look, run: () => { const { worst } = doing.current.track.summary; if (worst !== null) goTo(worst); } },
 		{ keys: ['c'], label: 'Next frame with a ball that contradicts the track', group: look, run: () => {
 			const { frames, at } = doing.current;
@@ -63,7 +63,7 @@ export function keysOfTrack(doing) {
 		} },
 		{ keys: ['a'], label: 'Accept the track, and go to the next one', group: say, needs: 'review', run: () => doing.current.judge('accepted') },
 		{ keys: ['x'], label: 'Reject the track, and go to the next one', group: say, needs: 'review', run: () => doing.current.judge('rejected') },
-		{ keys: ['u'], label: 'Take the verdict back', group: say, needs: 'review', run: () => doing.current.judge('none') },
+		{ keys: ['u'], label: 'Withdraw the verdict', group: say, needs: 'review', run: () => doing.current.judge('none') },
 		{ keys: ['f'], label: 'Next track that waits for a verdict', group: say, run: () => { doing.current.goOn(); } },
 		...EVENTS.map(({ kind, key }) => /** @type {Binding} */ ({ keys: [key], label: `Add a ${kind === 'out' ? 'ball out' : kind} at this frame`, group: say, needs: 'review', run: () => doing.current.correct(kind, true) })),
 		{ keys: ['d'], label: 'Remove the event at this frame', group: say, needs: 'review', run: () => {

@@ -74,7 +74,7 @@ function Band({ frames, at, goTo, whole }) {
 			<ol class="track__events" aria-label="Events">
 				${inside.map((event) => html`<li key=${`${event.frame} ${event.kind}`} style=${{ left: left(event.frame) }} data-kind=${event.kind} data-added=${event.added} title=${`${event.kind} in frame ${event.frame}`}><span class="hidden-text">${event.kind} in frame ${event.frame}</span><span aria-hidden="true">${EVENTS.find(({ kind }) => kind === event.kind)?.letter}</span></li>`)}
 			</ol>
-			${jumps.length ? html`<ol class="track__jumps" aria-label="Jumps where other views take over">${jumps.map((jump) => html`<li key=${jump.frame} style=${{ left: left(jump.frame) }} title=${jumpText(jump)}><span class="hidden-text">${jumpText(jump)}</span><span aria-hidden="true">J</span></li>`)}</ol>` : null}
+			${jumps.length ? html`<ol class="track__jumps" aria-label="Jumps where the views change">${jumps.map((jump) => html`<li key=${jump.frame} style=${{ left: left(jump.frame) }} title=${jumpText(jump)}><span class="hidden-text">${jumpText(jump)}</span><span aria-hidden="true">J</span></li>`)}</ol>` : null}
 			<ol class="track__modes" aria-label="What the ball does">
 				${modes.map(({ value, from, to }) => html`<li key=${from} style=${{ flexGrow: to - from + 1 }} data-mode=${value || 'gap'} title=${`${MODES[value].name}: frames ${frames.frame[from]} to ${frames.frame[to]}`}><span class="hidden-text">${MODES[value].name}, frames ${frames.frame[from]} to ${frames.frame[to]}</span><span aria-hidden="true">${MODES[value].letter}</span></li>`)}
 			</ol>
@@ -99,7 +99,7 @@ function Tools({ player, switchView }) {
 			<span class="note">${plays ? `${player.speed.value < 0 ? 'backwards, ' : ''}${Math.abs(player.speed.value)} ×` : ''}</span>
 			<span class="track__views" role="group" aria-label="What is shown">
 				<button class="button" type="button" aria-pressed=${!space} onClick=${() => { if (space) switchView(); }}>Curves</button>
-				<button class="button" type="button" aria-pressed=${space} onClick=${() => { if (!space) switchView(); }}>3D and plan</button>
+				<button class="button" type="button" aria-pressed=${space} onClick=${() => { if (!space) switchView(); }}>3D and top view</button>
 				<kbd>\\</kbd>
 			</span>
 		</div>
@@ -131,8 +131,8 @@ function Now({ around, at }) {
 	const where = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' ? `${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(-z, 2)} m up` : null;
 	return html`
 		<div class="track__now" data-around=${at}>
-			<p><strong>As its groups are now:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left out ${fixed(left, 1)} px` : ''}.</p>
-			<p class="note">Dashed in the curves, frames ${around.frame[0]} to ${around.frame.at(-1)}. The track waits to be made again.</p>
+			<p><strong>As its groups are now:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left-out error ${fixed(left, 1)} px` : ''}.</p>
+			<p class="note">Dashed in the curves, frames ${around.frame[0]} to ${around.frame.at(-1)}. The saved track stays as it is until it is made again.</p>
 		</div>
 	`;
 }
@@ -154,15 +154,15 @@ function FrameCard({ track, frames, around, at, goTo }) {
 				<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(-z, 2)} m up`}</dd>
 				<dt>Sigma</dt><dd>${sigma === null ? '–' : `${fixed(sigma, 2)} m`}</dd>
 				<dt>Speed</dt><dd>${velocity ? `${fixed(3.6 * Math.hypot(...velocity), 0)} km/h` : '–'}</dd>
-				<dt>Known</dt><dd>${STATES[frames.state[place]]}${frames.views[place].length ? ` (${frames.views[place].join(', ')})` : ''}</dd>
-				<dt>Does</dt><dd>${MODES[frames.mode[place]].name}${event ? `; ${event.kind} in frame ${event.frame}` : ''}</dd>
+				<dt>Source</dt><dd>${STATES[frames.state[place]]}${frames.views[place].length ? ` (${frames.views[place].join(', ')})` : ''}</dd>
+				<dt>Motion</dt><dd>${MODES[frames.mode[place]].name}${event ? `; ${event.kind} in frame ${event.frame}` : ''}</dd>
 				${jump ? html`<dt>Jump</dt><dd>${jumpText(jump)}</dd>` : null}
-				<dt>Left out</dt><dd>${frames.left_out_px[place] === null ? '–' : `${fixed(frames.left_out_px[place], 1)} px`}</dd>
+				<dt>Left-out error</dt><dd>${frames.left_out_px[place] === null ? '–' : `${fixed(frames.left_out_px[place], 1)} px`}</dd>
 			</dl>
 			${against.map((one) => html`<div class="track__against" key=${one.view}><p><strong>${one.view}</strong> is ${fixed(one.px, 0)} px off. ${one.sentence}</p><p class="note">${one.fix}</p></div>`)}
 			${around ? html`<${Now} around=${around} at=${at} />` : null}
 			<p class="buttons">
-				${group === null ? html`<button class="button" type="button" aria-disabled="true" title="No group shows this frame">Open its group</button>` : html`<a class="button" href=${`/review/${group}`}>Open its group <kbd>Enter</kbd></a>`}
+				${group === null ? html`<button class="button" type="button" aria-disabled="true" title="No group shows this frame">Open the group</button>` : html`<a class="button" href=${`/review/${group}`}>Open the group <kbd>Enter</kbd></a>`}
 				${worst === null ? null : html`<button class="button" type="button" onClick=${() => goTo(worst)}>Worst frame <kbd>w</kbd></button>`}
 			</p>
 		</section>
@@ -172,14 +172,14 @@ function FrameCard({ track, frames, around, at, goTo }) {
 /** @param {{track: TrackJson, judge: (verdict: 'accepted' | 'rejected' | 'none') => void}} props */
 function VerdictCard({ track, judge }) {
 	const { summary } = track;
-	const why = track.stale ? 'Its groups have changed: make it again first' : '';
+	const why = track.stale ? 'Its groups have changed: make the track again first' : '';
 	/** @param {'accepted' | 'rejected'} verdict */
 	const press = (verdict) => judge(track.verdict === verdict ? 'none' : verdict);
 	return html`
 		<section class="card" aria-labelledby="track-title">
 			<h2 id="track-title">Track</h2>
 			<p>${verdictText(track)}${track.judged_by && track.verdict ? html` by ${track.judged_by}` : null}</p>
-			<p class="note">${summary.median_px === null ? 'Nothing could be left out' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? `; ${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track` : ''}.</p>
+			<p class="note">${summary.median_px === null ? 'No ball could be left out to measure the error' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? `; ${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track` : ''}.</p>
 			${(summary.median_px ?? 0) > CLICK_PX ? html`<p class="note">Left-out balls are predicted less exactly than a click: the cameras contradict each other. An adjustment to lines and balls (<code>touchline rig</code>) may bring them together.</p>` : null}
 			<p class="buttons">
 				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'accepted'} aria-disabled=${why !== ''} title=${why} onClick=${() => { if (!why) press('accepted'); }}>Accept <kbd>a</kbd></button>
@@ -284,7 +284,7 @@ function Track({ track, setTrack }) {
 		}
 	}
 	/** @param {'accepted' | 'rejected' | 'none'} verdict */
-	const judge = (verdict) => send({ verdict }, verdict === 'none' ? 'The verdict is taken back.' : `The track is ${verdict}.`);
+	const judge = (verdict) => send({ verdict }, verdict === 'none' ? 'The verdict is withdrawn.' : `The track is ${verdict}.`);
 	/** @param {EventKind} kind @param {boolean} added */
 	const correct = (kind, added) => {
 		const frame = added ? at : (eventAt(frames?.events ?? [], at)?.frame ?? at);

@@ -27,7 +27,7 @@ import { Loading, Trouble } from '../page_frame.js';
 /** What was said of it, in words. @param {TrackJson} track */
 export function verdictText({ verdict, stale, summary }) {
 	if (summary.reason) return 'no track';
-	return [verdict ?? 'not judged', stale ? 'stale' : ''].filter(Boolean).join(', ');
+	return [verdict ?? 'no verdict yet', stale ? 'stale' : ''].filter(Boolean).join(', ');
 }
 
 const AssignTracks = lazy(async () => (await import('./assign_tracks.js')).AssignTracks);
@@ -45,7 +45,7 @@ function ListTools({ values: { show, mine, batch, sort } }) {
 			<label>Show <select class="field" value=${show} onChange=${withValue((text) => listAs({ show: text }))}>${SHOWN.map((one) => html`<option key=${one.show} value=${one.show}>${one.label}</option>`)}</select></label>
 			<label>Order <select class="field" value=${sort || SORTS[0].sort} onChange=${withValue((text) => listAs({ sort: text === SORTS[0].sort ? '' : text }))}>${SORTS.map((one) => html`<option key=${one.sort} value=${one.sort}>${one.label}</option>`)}</select></label>
 			<button class="button" type="button" aria-pressed=${mine !== ''} onClick=${() => listAs({ mine: mine ? '' : '1' })}>Assigned to me</button>
-			${batch ? html`<button class="button" type="button" onClick=${() => listAs({ batch: '' })}>Of all batches</button>` : null}
+			${batch ? html`<button class="button" type="button" onClick=${() => listAs({ batch: '' })}>Show all batches</button>` : null}
 		</div>
 	`;
 }
@@ -87,7 +87,7 @@ function Tracks({ one }) {
 	return html`
 		<section class="card" aria-labelledby="tracks-title">
 			<h2 id="tracks-title">The ball over time</h2>
-			<p class="note">Groups that follow each other in time are a stretch: frames of static cameras, or of a shot of a recording. Over each the ball is tracked. Balls are left out in turn and predicted: that error tells how good a track is.</p>
+			<p class="note">A stretch is a series of groups that follow each other in time: frames of static cameras, or of one shot of a recording. The ball is tracked over each stretch. Its left-out error tells how good a track is: balls are left out in turn and predicted from the others.</p>
 			<p class="buttons"><${JobButton} kind="button--primary" busy=${job !== null && !isOver(job)} act=${make}>${items.length || chosen ? 'Make the tracks again' : 'Track the ball'}<//>${open.length ? html`<button class="button" type="button" data-needs="lead" onClick=${() => setGiving(true)}>Assign…</button>` : null}</p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}
@@ -101,7 +101,7 @@ function Tracks({ one }) {
 			<section class="card card--flush" aria-label="Tracks">
 				<div class="table__scroll" tabindex="0" role="region" aria-label="Table of tracks">
 					<table class="table">
-						<thead><tr><th>${plural(items.length, 'stretch').replace(/hs$/, 'hes')}</th><th>verdict</th><th data-numeric="true">ball known</th><th data-numeric="true">events</th><th data-numeric="true" title="Median error of balls that were left out and predicted">left out, px</th><th data-numeric="true">95 %</th><th data-numeric="true" title="Balls that the track does not explain">contradict</th><th>assigned to</th></tr></thead>
+						<thead><tr><th>${plural(items.length, 'stretch').replace(/hs$/, 'hes')}</th><th>verdict</th><th data-numeric="true">ball known</th><th data-numeric="true">events</th><th data-numeric="true" title="Median error of balls that were left out and predicted from the others">left-out error, px</th><th data-numeric="true">95 %</th><th data-numeric="true" title="Balls that lie too far from the track">contradicting balls</th><th>assigned to</th></tr></thead>
 						<tbody>${items.map((track) => html`<${Row} key=${track.id} track=${track} values=${values} />`)}</tbody>
 					</table>
 				</div>
