@@ -127,9 +127,10 @@ class Settings(BaseSettings):
     home: Path = Field(default_factory=_user_data_folder)
     """The folder that holds the database, the media cache and the exports."""
     database_url: str | None = Field(default=None, repr=False)
-    """Another database than the SQLite file in ``home``: ``postgresql://USER:PASSWORD@HOST/NAME``."""
+    """Database to use instead of the SQLite file in ``home``:
+    ``postgresql://USER:PASSWORD@HOST/NAME``."""
     database_url_file: Path | None = None
-    """Or a file with that address, which its owner alone may read (``chmod 600``)."""
+    """Or a file with that address, which only its owner may read (``chmod 600``)."""
     host: str = "127.0.0.1"
     """Address the server listens on."""
     port: int = 8000
@@ -139,49 +140,49 @@ class Settings(BaseSettings):
     log_format: LogFormat = "text"
     """Lines of the log: ``text`` (name=value) or ``json`` (an object a line, for a log collector)."""
     team: bool = False
-    """People log in; without it everybody who reaches the server is the one user ``local``."""
+    """People log in; without it everybody who reaches the server is the same user ``local``."""
     url: str | None = None
-    """The address that people open, such as https://touchline.example.org, where a proxy with TLS
+    """The address that people open, such as https://touchline.example.org, if a proxy with TLS
     stands in front."""
     proxies: list[str] = ["127.0.0.1", "::1"]
-    """Addresses of proxies that are believed whom they forward (X-Forwarded-For), once ``url`` is set."""
+    """Addresses of proxies whose X-Forwarded-For header is trusted, once ``url`` is set."""
     webhooks: list[str] = []
-    """Addresses such as https://hooks.example.org/touchline: webhooks may be sent to them and to what
-    lies below them, and nowhere else."""
+    """Allowed addresses of webhooks, such as https://hooks.example.org/touchline, including
+    addresses below them."""
     stalled_hours: float = Field(default=24.0, gt=0, le=8760)
-    """An unfinished batch without activity for so long is stalled; one whose due
-    day is over, in any case."""
+    """Hours without activity after which an unfinished batch is stalled. A batch after its due
+    day is always stalled."""
     sso_issuer: str | None = None
-    """Address of the OpenID Connect provider by which people log in (single sign-on), as it calls itself:
-    https://accounts.example.org."""
+    """Address of the OpenID Connect provider with which people log in (single sign-on), as the
+    provider gives it: https://accounts.example.org."""
     sso_client_id: str | None = None
-    """Under which name the provider knows this server."""
+    """Client id of this server at the provider."""
     sso_client_secret: SecretStr | None = None
-    """The secret that the provider has given it."""
+    """Client secret of this server at the provider."""
     sso_client_secret_file: Path | None = None
-    """Or a file with that secret, which its owner alone may read (``chmod 600``)."""
+    """Or a file with that secret, which only its owner may read (``chmod 600``)."""
     sso_label: str = Field("single sign-on", min_length=1, max_length=40)
-    """What people call the provider: the button says *Log in with* this."""
+    """Name of the provider for people: the button says *Log in with* this."""
     sso_hosts: list[str] = []
-    """Beginnings of addresses, such as https://oauth2.googleapis.com, that the provider has beside its own;
-    nothing is asked of any other."""
+    """Beginnings of further addresses of the provider, such as https://oauth2.googleapis.com; the
+    server sends requests to no others."""
     sso_scope: str = "openid email profile"
-    """What the provider is asked to tell of people."""
+    """Scopes that are requested from the provider."""
     sso_name_claim: str = "preferred_username"
     """Claim with the name of a new person."""
     sso_domains: list[str] = []
-    """Who may come in: whose verified e-mail address is of one of these domains; empty: of any, or none."""
+    """Allowed domains of verified e-mail addresses; empty: any address, or none."""
     sso_group_claim: str | None = None
     """Claim that lists the person's groups."""
     sso_groups: list[str] = []
-    """Who may come in: whoever is in one of these groups; empty: everybody."""
+    """Allowed groups: people in one of them may log in; empty: everybody."""
     sso_new_role: str | None = None
-    """Role of unknown people at their first login, such as ``viewer``; empty: they do not come in."""
+    """Role of new people at their first login, such as ``viewer``; empty: they are refused."""
     sso_only: bool = False
-    """Login by password or passkey is off."""
+    """Only single sign-on: login by password or passkey is off."""
     sso_second_factor: list[str] = []
-    """Values of the claims ``amr`` and ``acr`` by which the provider says that it has asked for a second
-    factor: with one of them ours is not asked for; empty: it always is."""
+    """Values of the claims ``amr`` and ``acr`` that mean that the provider has required a
+    second factor: then Touchline requires none; empty: it always requires its own."""
     smtp_host: str | None = None
     """Mail server by which invitations are sent, such as smtp.example.org; empty: no mail is sent, and links
     are shown."""
@@ -191,47 +192,49 @@ class Settings(BaseSettings):
     """``starttls`` or ``tls``: the connection is encrypted, and the server's certificate checked; ``none``
     only for a mail server on this machine."""
     smtp_user: str | None = None
-    """The account at the mail server, if it wants one."""
+    """The account at the mail server, if it requires one."""
     smtp_password: SecretStr | None = Field(default=None, repr=False)
     """Its password."""
     smtp_password_file: Path | None = Field(default=None, repr=False)
-    """Or a file with that password, which its owner alone may read (``chmod 600``)."""
+    """Or a file with that password, which only its owner may read (``chmod 600``)."""
     smtp_from: str | None = None
-    """Address that mail is from, such as touchline@example.org."""
+    """Sender address of mails, such as touchline@example.org."""
     workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
     """Processes that solve in batches."""
     web_workers: int = Field(default=1, ge=1, le=64)
-    """Processes that answer requests, on PostgreSQL alone."""
+    """Processes that answer requests; more than one only on PostgreSQL."""
     cluster: str | None = None
-    """Address of a scheduler, such as tls://solve.example.org:8786, whose workers solve in batches in
-    place of processes of this machine."""
+    """Address of a scheduler, such as tls://solve.example.org:8786, whose workers solve batches
+    instead of processes of this machine."""
     cluster_keys: Path | None = None
-    """Folder with ca.pem, cert.pem and key.pem, by which scheduler, workers and servers know each other."""
+    """Folder with ca.pem, cert.pem and key.pem, with which scheduler, workers and servers
+    authenticate each other."""
     image_workers: int = Field(default_factory=lambda: min(os.cpu_count() or 1, 4), ge=1)
     """Processes that make pictures of frames."""
     max_upload_bytes: int = 8 * 1024**3
     """Largest uploaded file, such as the recording of a match; a JSON body is smaller still."""
     upload_days: int = 7
-    """After so many days an uploaded file that no dataset reads its frames from is deleted."""
+    """Days after which an uploaded file is deleted, unless a dataset reads frames from it."""
     upload_quota_bytes: int = Field(default=20 * 1024**3, ge=0)
-    """Bytes that the uploads of one person may have together on a team's server; 0: no limit."""
+    """Bytes that the uploads of one person may use together on a team's server; 0: no limit."""
     export_days: int = Field(default=0, ge=0)
-    """After so many days the file of a finished export is deleted; 0: never. Of a version the same export can
-    be made again; another one has the dataset as it is then."""
+    """Days after which the file of a finished export is deleted; 0: never. The export of a
+    version can be made again; other exports would have the present state of the dataset."""
     answer_bytes: int = 64 * 2**20
-    """Room for answers under Idempotency-Keys; beyond it the oldest lose their text, not their
-    key."""
+    """Space for responses stored under Idempotency-Keys; beyond it the oldest lose their
+    content, not their key."""
     job_days: int = 90
-    """After so many days a job that is over is forgotten, unless it made an export."""
+    """Days after which a job that has ended is deleted, unless it made an export."""
     cache_days: int = 30
-    """After so many days a derived image is made anew."""
+    """Days after which a derived image is made again."""
     import_folders: Annotated[list[Path], NoDecode] = []
     """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
     stores: dict[StoreName, StoreSettings] = {}
     """Object stores by the name that people use for them (``s3://NAME/...``), as JSON: ``url`` with
     ``key`` and ``secret``, ``key_file`` or ``anonymous``; ``endpoint``, ``exports`` and more: [operations.md](operations.md)."""
     store_cache_bytes: int = Field(default=4 * 1024**3, ge=2**26)
-    """Room for frames of object stores that are kept on this disk; those not asked for longest go."""
+    """Space for frames of object stores that are cached on this disk; the least recently used
+    are deleted first."""
     max_file_bytes: int = 256 * 1024 * 1024
     """Largest single data file (JSON, XML, CSV) that an importer reads."""
     import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, memory_bytes() // 2))

@@ -442,7 +442,7 @@ PROPERTIES: Mapping[str, str] = {
     "GroupRow.views": "How many views the group has.",
     "PreviewRequest.views": "What is edited in each view, by its id.",
     "webhook": "The webhook.",
-    "weighed": "What weighs alike in a camera of clicks: `points`, or `markings`, whose points err together.",
+    "weighed": "What has equal weight in the fit of a camera to annotated lines: `points`, or `markings`, whose points err together.",
     "what": "What changed.",
     "why": "Why.",
     "width": "Width, pixels.",

@@ -97,7 +97,7 @@ class CalibrationPolicy:
     line_share: float | None = _threshold_field(
         None,
         CALIBRATION,
-        "Share of its variance common to a marking",
+        "Share of this variance common to a marking",
         "share",
         0.0,
         0.95,
@@ -121,7 +121,7 @@ class CalibrationPolicy:
     lone_frames: Literal["exact", "professional", "any"] = _threshold_field(
         "exact",
         CALIBRATION,
-        "Pitch and picture of a frame alone",
+        "Pitch and picture of single frames",
         choices=("exact", "professional", "any"),
         later=True,
         shown=False,
@@ -134,7 +134,7 @@ class CalibrationPolicy:
     goal: Literal["inner", "middle", "laws"] = _threshold_field(
         "inner",
         CALIBRATION,
-        "What people click of goals and lines",
+        "Clicked edge of goals and lines",
         choices=("inner", "middle", "laws"),
         later=True,
         shown=False,
@@ -147,7 +147,7 @@ class CalibrationPolicy:
     weighed: Literal["points", "markings"] = _threshold_field(
         "points",
         CALIBRATION,
-        "What weighs alike in a camera of clicks",
+        "Equal weight in a camera's fit for",
         choices=("points", "markings"),
         later=True,
         shown=False,
@@ -188,7 +188,9 @@ class Policy:
         5.0,
         choices=GAMMAS_PERCENT,
     )
-    min_jac: float = _threshold_field(0.75, "jac", "Share of field lines that fit", "", 0.0, 1.0)
+    min_jac: float = _threshold_field(
+        0.75, "jac", "Smallest share of field lines that fit", "", 0.0, 1.0
+    )
     """A view qualifies strictly above."""
     min_agreement: float | None = _threshold_field(
         None, "agreement", "Smallest agreement with the paint", "", 0.0, 1.0, later=True
@@ -228,11 +230,17 @@ class Policy:
     )
     """Standard deviation of an annotated ball centre at 1920 x 1080; grows with the diagonal."""
     box_sigma_share: float = _threshold_field(
-        0.04, NOISE, "Sigma of a ball, of its diameter", "share", 0.0, 0.5
+        0.04, NOISE, "Sigma of a ball, relative to its diameter", "share", 0.0, 0.5
     )
     """What the diameter of a ball's box adds to that standard deviation, as a share of it."""
     given_sigma_px: float = _threshold_field(
-        0.0, NOISE, "Sigma of a ball by a given camera", "px at 1920x1080", 0.0, 30.0, later=True
+        0.0,
+        NOISE,
+        "Sigma of a ball due to a given camera",
+        "px at 1920x1080",
+        0.0,
+        30.0,
+        later=True,
     )
     """What a given camera of unknown exactness adds to it, in pixels of the ball's image."""
     below_grass_m: float = _threshold_field(
@@ -243,10 +251,10 @@ class Policy:
         10.0, FINDINGS, "Finding: outside the pitch by more than", "m", 0.0, 50.0
     )
     pitch_length_m: float = _threshold_field(
-        105.0, PITCH, "Length of the pitch, where none is known", "m", 90.0, 120.0
+        105.0, PITCH, "Length of the pitch, if not known", "m", 90.0, 120.0
     )
     pitch_width_m: float = _threshold_field(
-        68.0, PITCH, "Width of the pitch, where none is known", "m", 45.0, 90.0
+        68.0, PITCH, "Width of the pitch, if not known", "m", 45.0, 90.0
     )
 
     def tau_px(self, diagonal: Pixels) -> Pixels:

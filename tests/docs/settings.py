@@ -25,12 +25,12 @@ INTRO = """
 Written from the code by `python -m tests.docs`.
 
 ## Of the installation
-Environment variables; `touchline serve` and every command read them. How they are used: [operations.md](operations.md).
+Environment variables, read by `touchline serve` and every command. [operations.md](operations.md) explains their use.
 """.strip()
 POLICY = """
 ## Of a dataset: the policy
-Thresholds are those of the policy that a dataset is judged by: `touchline policy show`, the page *Policy*, or `PUT /datasets/{id}/policy`
-([api.md](api.md)). Empty: not asked for. *paper* is what the paper says; *strict* asks for more where it says so;
+The thresholds of the policy of a dataset: `touchline policy show`, the page *Policy*, or `PUT /datasets/{id}/policy`
+([api.md](api.md)). Empty: not required. *paper* has the values of the paper; *strict* requires more where its column differs;
 *touchline* is *paper* with `calibration.source` `paint` and `calibration.shortest_marking_px` 5.
 """.strip()
 

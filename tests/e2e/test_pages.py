@@ -206,7 +206,7 @@ class TestYield:
         page.wait_for_selector(".funnel")
         expect(page.locator(".yield__difference")).to_contain_text("The saved policy")
         before = page.locator(".yield__difference").inner_text()
-        slider = page.get_by_label("Share of field lines that fit, slider")
+        slider = page.get_by_label("Smallest share of field lines that fit, slider")
         slider.press("End")
         expect(page.locator(".yield__difference")).to_contain_text("0 pass")
         expect(page.locator(".funnel tr").last).to_contain_text("0")
