@@ -149,7 +149,7 @@ class TestPictures:
         page.get_by_label("Dataset", exact=True).fill("film")
         drop(page, video)
         told = page.get_by_role("alert")
-        expect(told).to_contain_text("match.mp4 is a video. Add it on the Recordings page")
+        expect(told).to_contain_text("match.mp4 is a video. Add it on the page Recordings")
         expect(page.get_by_role("button", name="Import", exact=True)).to_have_attribute(
             "title", "Choose a file or folder first"
         )

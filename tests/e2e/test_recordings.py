@@ -341,7 +341,7 @@ class TestCutting:
         theirs = {"shots": [{"first": 0, "last": 119, "kind": "closeup"}]}
         assert page.request.put(path, data=theirs, headers={"If-Match": tag}).ok
         page.keyboard.press("1")
-        expect(page.get_by_text("Somebody else has changed the shots")).to_be_visible()
+        expect(page.get_by_text("Another person changed the shots")).to_be_visible()
         expect(page.get_by_role("region", name="Shots").get_by_role("button")).to_have_count(1)
         assert shots_of(page, recording)[0]["kind"] == "closeup"
 
@@ -532,7 +532,7 @@ class TestLinking:
         theirs = {"instants": [{"live": 10, "replay": 40}]}
         assert page.request.put(f"/api/v1{link}/instants", data=theirs, headers=tag).ok
         page.keyboard.press("i")
-        expect(page.get_by_text("Somebody else has changed this link")).to_be_visible()
+        expect(page.get_by_text("Another person changed this link")).to_be_visible()
         expect(page.get_by_role("region", name="Instants")).to_contain_text("1 instant")
         assert linked(page, link) == [(10, 40)]
 

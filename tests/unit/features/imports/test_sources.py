@@ -493,7 +493,7 @@ class TestLinesOfAnotherDay:
         )
         assert (
             f"`touchline import issia {source.path} --dataset old --lines {source.lines} "
-            "--calibration given` takes the given cameras"
+            "--calibration given` uses the given cameras"
         ) in told
         solved = solve_dataset(store, "old")
         assert (solved.passed, solved.failing) == (0, {"jac": 1})
