@@ -106,7 +106,7 @@ def read_pixels(
             picture = _decode_pixels(data, settings, name)
     if digest == known:
         return digest, None
-    return digest, _to_annotated_orientation(picture, flipped)
+    return digest, turn_as_annotated(picture, flipped)
 
 
 def cached_frame(
@@ -305,10 +305,10 @@ def decode_frame(media: Media, flipped: bool, settings: Settings) -> npt.NDArray
         TooLargeError: It is larger than the limits, in bytes, declared pixels or scans.
     """
     _require_contained(media, settings)
-    return _to_annotated_orientation(_decode_frame(media, settings), flipped)
+    return turn_as_annotated(_decode_frame(media, settings), flipped)
 
 
-def _to_annotated_orientation(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
+def turn_as_annotated(picture: Any, flipped: bool) -> npt.NDArray[np.uint8]:
     """Red green blue, and turned right where it is mirrored."""
     return np.ascontiguousarray((cv2.flip(picture, 1) if flipped else picture)[:, :, ::-1])
 

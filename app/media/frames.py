@@ -82,18 +82,25 @@ def _neighbours_in_video(media: Media, frame: int, count: int) -> Iterator[tuple
 
 
 def _neighbours_among_files(media: Media, group: str, static: bool) -> Iterator[tuple[int, Media]]:
-    found = split_frame_number(media, group, static)
-    if found is None:
-        return
-    name, head, digits = found
     for offset in _neighbour_offsets():
-        number = int(digits) + offset
-        # 100 may follow 099 or 99.
-        for text in dict.fromkeys((f"{number:0{len(digits)}d}", str(number))):
-            there = _existing_neighbour(media, str(name.with_name(f"{head}{text}{name.suffix}")))
-            if number >= 0 and there is not None:
-                yield offset, there
-                break
+        there = file_of_frame(media, group, static=static, later=offset)
+        if there is not None:
+            yield offset, there
+
+
+def file_of_frame(media: Media, group: str, *, static: bool, later: int) -> Media | None:
+    """The file of a frame so many frames later than another one's; None where there is none."""
+    found = split_frame_number(media, group, static)
+    number = -1 if found is None else int(found[2]) + later
+    if found is None or number < 0:
+        return None
+    name, head, digits = found
+    # 100 may follow 099 or 99.
+    for text in dict.fromkeys((f"{number:0{len(digits)}d}", str(number))):
+        there = _existing_neighbour(media, str(name.with_name(f"{head}{text}{name.suffix}")))
+        if there is not None:
+            return there
+    return None
 
 
 def _existing_neighbour(media: Media, name: str) -> Media | None:

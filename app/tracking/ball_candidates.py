@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -12,12 +12,14 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.tracking.ball_frames import Frame, inverse_of, moved_by
 from app.tracking.ball_picture import Grey, disc, likeness
-from app.tracking.ball_run import DetectedBall
+from app.tracking.ball_run import DetectedBall, ExpectedPlace
 
 CANDIDATES = 14
 """Places of a frame that are looked at."""
 CLICKED = 3.0
 """How much likelier a place where a person clicked is the ball than anything else, as a logarithm."""
+OTHERS_ERR, OTHERS_GAIN = 0.1, 2.0
+"""How often what other views say is wrong, and how much likelier places are where they say, as a logarithm."""
 STATIC_LAGS = (3, 6)
 """So many frames before it is looked whether a place looked the same."""
 
@@ -102,6 +104,21 @@ def find_candidates(
     looks = _looks(alike, contrast) + values[:, 6]
     static = _static(places, alike * np.maximum(contrast, 0.05), size, earlier)
     return Candidates(places, looks, static, parts, values[:, 4:6])
+
+
+def looks_with_others(found: Candidates, expected: Iterable[ExpectedPlace]) -> Candidates:
+    """The same places, each as much likelier or less as other views say."""
+    looks = found.looks
+    for one in expected:
+        there = OTHERS_GAIN - 0.5 * (one.away(found.places) / one.sigma_px) ** 2
+        looks = looks + np.logaddexp(np.log(OTHERS_ERR), np.log(1 - OTHERS_ERR) + there)
+    return replace(found, looks=looks)
+
+
+def no_places() -> Candidates:
+    """Of a frame that nobody can read."""
+    empty = np.zeros((0, 2))
+    return Candidates(empty, np.zeros(0), np.zeros((0, len(STATIC_LAGS))), [], empty)
 
 
 def clicked_place(frame: Frame, size: float, x: float, y: float) -> Candidates:

@@ -13,9 +13,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.errors import ImageError
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.geometry.camera import Camera
-from app.tracking.ball_candidates import STATIC_LAGS, Candidates, clicked_place, find_candidates
+from app.tracking.ball_candidates import (
+    STATIC_LAGS,
+    Candidates,
+    clicked_place,
+    find_candidates,
+    looks_with_others,
+    no_places,
+)
 from app.tracking.ball_frames import Frame, inverse_of, moved_by, turn_between
 from app.tracking.ball_picture import BallColour, BallSpot, Image, find_ball, find_like, fit_disc
 from app.tracking.ball_run import (
@@ -63,7 +71,7 @@ def expected_diameter(camera: Camera, x: float, y: float) -> float | None:
 
 
 def follow_ball(
-    read: Callable[[int], Image],
+    read: Callable[[int], Image | None],
     click: BallClick,
     before: Iterable[int],
     after: Iterable[int],
@@ -73,7 +81,8 @@ def follow_ball(
     """Follow a ball from a click.
 
     Args:
-        read: Gives a frame by its number: red green blue, shape (H, W, 3).
+        read: Gives a frame by its number: red green blue, shape (H, W, 3); None: nobody has it, and the ball goes on
+            unseen. Clicked frames can be read.
         click: Where the ball is.
         before: Numbers of the frames before it, the nearest first.
         after: Numbers of the frames behind it, the nearest first.
@@ -85,7 +94,7 @@ def follow_ball(
     """
     hints = hints or FollowHints()
     number, x, y = click.frame, click.x, click.y
-    image = read(number)
+    image = _needed(read, number)
     camera = hints.cameras.get(number)
     expected = None if camera is None else expected_diameter(camera, x, y)
     if hints.seen is None:
@@ -94,23 +103,26 @@ def follow_ball(
             return None
         spot, colour = found
     else:
-        spot, colour = _found_again(read(hints.seen.frame), image, click, expected, hints)
+        spot, colour = _found_again(_needed(read, hints.seen.frame), image, click, expected, hints)
     first = FollowedBall(number, spot.x, spot.y, spot.diameter, spot.sigma_px, 1.0, "followed")
     clicks = {one.frame: one for one in hints.clicks if one.frame != number} | {number: click}
     ways, ends = [], list[End]()
     done = 0
-    for numbers in (before, after):
-        wanted = list(numbers)
-        lead = _lead(click, clicks, -1 if wanted and wanted[0] < number else 1)
-        start = clicks[lead[0]] if lead else click
-        begin = image if start is click else read(start.frame)
-        at = spot if start is click else replace(spot, x=start.x, y=start.y)
+    sides = list(before), list(after)
+    for wanted, behind in (sides, sides[::-1]):
+        lead = _lead(click, clicks, behind)
+        begin = read(lead[0]) if lead else None
+        if begin is None:
+            start, at, begin, lead = click, spot, image, []
+        else:
+            start = clicks[lead[0]]
+            at = replace(spot, x=start.x, y=start.y)
         way = _Way(Frame.of(start.frame, begin, colour), at, hints, clicks)
         for each in lead[1:]:
-            way.step(Frame.of(each, read(each), colour))
+            way.step(each, read(each), colour)
         end: End = "limit"
         for each in wanted:
-            stopped = way.step(Frame.of(each, read(each), colour))
+            stopped = way.step(each, read(each), colour)
             done += 1
             if tell is not None:
                 tell(done)
@@ -124,17 +136,24 @@ def follow_ball(
     return BallRun((click,), (*reversed(ways[0]), first, *ways[1]), *ends)
 
 
-def _lead(click: BallClick, clicks: Mapping[int, BallClick], step: int) -> list[int]:
-    """Frames from the nearest other click behind a click to itself, which tell how the ball moves; empty without one."""
-    behind = [
-        frame
-        for frame in clicks
-        if 0 < step * (click.frame - frame) <= LEAD and frame != click.frame
-    ]
-    if not behind:
-        return []
-    nearest = min(behind, key=lambda frame: abs(frame - click.frame))
-    return list(range(nearest, click.frame + step, step))
+def _needed(read: Callable[[int], Image | None], number: int) -> Image:
+    image = read(number)
+    if image is None:
+        raise ImageError(f"frame {number} cannot be read")
+    return image
+
+
+def _lead(click: BallClick, clicks: Mapping[int, BallClick], behind: Sequence[int]) -> list[int]:
+    """Frames from the nearest other click behind a click to itself, which tell how the ball moves; empty without one.
+
+    Args:
+        click: Where the way begins.
+        clicks: All, by frame.
+        behind: Frames to the other side, the nearest first.
+    """
+    near = behind[:LEAD]
+    place = next((at for at, frame in enumerate(near) if frame in clicks), None)
+    return [] if place is None else [*reversed(near[: place + 1]), click.frame]
 
 
 def _found_again(
@@ -183,7 +202,6 @@ class _Way:
     ):
         self._last, self._hints, self._clicks = frame, hints, clicks
         self._diameter = spot.diameter
-        self._clicked = spot
         self._places = spot.center[None]
         self._speeds = np.zeros((1, 2))
         self._missed = np.zeros(1, np.int64)
@@ -194,13 +212,21 @@ class _Way:
         self._earlier: deque[tuple[Frame, FloatArray]] = deque(maxlen=longest)
         self._steps: list[_Step] = []
 
-    def step(self, frame: Frame) -> End | None:
-        """Look at the next frame; returns why the way ends there."""
-        turn = turn_between(self._last, frame, self._hints.cameras)
+    def step(self, number: int, image: Image | None, colour: BallColour) -> End | None:
+        """Look at the next frame, or pass one that nobody has; returns why the way ends there."""
+        still = self._hints.still or image is None
+        if image is None:
+            frame = replace(self._last, number=number)
+        else:
+            frame = Frame.of(number, image, colour)
+        turn = np.eye(3) if still else turn_between(self._last, frame, self._hints.cameras)
         self._carry(frame, turn)
-        click = self._clicks.get(frame.number)
-        if click is None:
-            candidates = self._look(frame)
+        click = self._clicks.get(number)
+        if image is None:
+            candidates = no_places()
+        elif click is None:
+            others = self._hints.expected.get(number, ())
+            candidates = looks_with_others(self._look(frame), others)
         else:
             candidates = clicked_place(frame, self._diameter, click.x, click.y)
         self._choose(frame, candidates)
@@ -290,7 +316,8 @@ class _Way:
         with np.errstate(invalid="ignore"):
             clutter = ((away > 1.5 * size) & (found.static[None] > STATIC_SHARE)).any(axis=2)
         total = self._scores[:, None] + moves + found.looks[None] - STATIC * clutter
-        unseen = self._scores + (-np.inf if frame.number in self._clicks else MISSED)
+        clicked = frame.number in self._clicks and count > 0
+        unseen = self._scores + (-np.inf if clicked else MISSED)
         every = np.concatenate([total.ravel(), unseen])
         order = np.argsort(-every)[: 8 * BEAM]
         parents = np.where(order < total.size, order // max(count, 1), order - total.size)

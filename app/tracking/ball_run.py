@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 
 State = Literal["followed", "uncertain"]
@@ -38,12 +39,35 @@ class DetectedBall:
 
 
 @dataclass(frozen=True)
+class ExpectedPlace:
+    """Where another view says that the ball is: on a segment of the picture, or at a place, whose ends are one.
+
+    Attributes:
+        start, end: Pixels, (x, y).
+        sigma_px: Standard deviation across it.
+    """
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    sigma_px: float
+
+    def away(self, places: FloatArray) -> FloatArray:
+        """How far places (N, 2) are from it, pixels, shape (N,)."""
+        start, along = np.array(self.start), np.subtract(self.end, self.start)
+        share = ((places - start) @ along) / max(float(along @ along), 1e-9)
+        nearest = start + np.clip(share, 0.0, 1.0)[:, None] * along
+        return np.asarray(np.hypot(*(places - nearest).T))
+
+
+@dataclass(frozen=True)
 class FollowHints:
     """What is known beside the pictures, by number of the frame.
 
     Attributes:
         cameras: They say how the background moves, and how large a ball is.
+        still: Whether the camera stands still, so that the background never moves.
         detected: Candidates of a detector; they take part with their score, as others do.
+        expected: Where other views of the same instant say that the ball is; each makes places there likelier.
         seen: The same ball in another frame, where a person clicked it: how it looks. A click that mends is the ball
             wherever it is; None: a click is refused where nothing looks like a ball.
         clicks: Other clicks on the same ball: it is there, whatever a frame looks like.
@@ -51,6 +75,8 @@ class FollowHints:
 
     cameras: Mapping[int, Camera] = field(default_factory=dict)
     detected: Mapping[int, Sequence[DetectedBall]] = field(default_factory=dict)
+    expected: Mapping[int, Sequence[ExpectedPlace]] = field(default_factory=dict)
+    still: bool = False
     seen: FollowedBall | None = None
     clicks: Sequence[BallClick] = ()
 

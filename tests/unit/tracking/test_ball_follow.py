@@ -14,6 +14,7 @@ from app.tracking.ball_run import (
     BallClick,
     BallRun,
     DetectedBall,
+    ExpectedPlace,
     FollowHints,
 )
 from app.video.frames import Image
@@ -142,6 +143,35 @@ class TestFollowBall:
         film = Film(straight(speed=9.0) + np.array([100.0, 0.0]))
         run = film.followed(5)
         assert run.after == "left"
+
+    def test_other_views_tell_it_from_another_ball_that_rolls_on_as_it_did(self) -> None:
+        other, way = straight(FRAMES, 4.0), straight(FRAMES, 4.0)
+        way[20:] += (0.0, 30.0)
+
+        def decoy(picture: Image, at: int) -> None:
+            if at >= 20:
+                x, y = other[at]
+                picture[:] = drawn([(x, y, 8.0)], size=SIZE, ground=picture, noise=0)
+
+        film = Film(way, before=decoy)
+        rays = {at: [ExpectedPlace((x - 40, y), (x + 40, y), 4.0)] for at, (x, y) in enumerate(way)}
+        run = film.followed(10, FollowHints(expected=rays, still=True))
+        assert film.off(run)[-10:].max() < 2.0
+        assert film.off(film.followed(10, FollowHints(still=True)))[-10:].max() > 10
+
+    def test_frames_that_nobody_has_are_passed(self) -> None:
+        film = Film(straight())
+        gone = {12, 13, 30}
+        x, y = film.way[20]
+        run = follow_ball(
+            lambda at: None if at in gone else film.read(at),
+            BallClick(20, x, y),
+            range(19, -1, -1),
+            range(21, FRAMES),
+        )
+        assert run is not None and (run.first, run.last) == (0, FRAMES - 1)
+        assert {ball.frame for ball in run.balls if ball.state == "uncertain"} == gone
+        assert film.off(run).max() < 4.0
 
     def test_grass_is_followed_nowhere(self) -> None:
         film = Film(straight())

@@ -1,0 +1,167 @@
+"""Frames of one camera by their numbers: those of its views, and those between them that are on disk.
+
+Frames of a video are decoded together where they lie before each other, which costs as much as one of them.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from app.config import Settings
+from app.errors import ImageError, NotFoundError, StorageError, TooLargeError
+from app.media.files import decode_frame, turn_as_annotated, video_times
+from app.media.frames import file_of_frame
+from app.media.object_frames import is_stored
+from app.media.video import FrameReader
+from app.soccer.frames import ImageSize
+from app.soccer.group import Media
+
+LONGEST_GAP = 250
+"""Frames between two views beyond which those between are not looked for."""
+BEHIND, KEPT = 16, 40
+"""How many frames of a video are decoded together where it goes backwards, and how many are kept: 1080p takes 6 MB."""
+Image = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class ViewFrame:
+    """The frame of a view of a camera that stands still.
+
+    Attributes:
+        number: Of its instant.
+        group: Key of its group.
+    """
+
+    number: int
+    group: str
+    media: Media
+
+
+def frames_between(views: Sequence[ViewFrame], settings: Settings) -> dict[int, Media]:
+    """The frames of views, and those between them that are on disk, by number.
+
+    Args:
+        views: In the order of their numbers.
+        settings: Where indices of videos are kept.
+    """
+    found = {view.number: view.media for view in views}
+    for here, there in pairwise(views):
+        gap = there.number - here.number
+        if 1 < gap <= LONGEST_GAP:
+            found |= dict(_between(here, there, settings))
+    return dict(sorted(found.items()))
+
+
+def _between(here: ViewFrame, there: ViewFrame, settings: Settings) -> Iterator[tuple[int, Media]]:
+    """Those between two views; none of a store, which would have to be asked for each."""
+    media, gap = here.media, there.number - here.number
+    if is_stored(media):
+        return
+    if media.frame is not None:
+        # Another rate of numbers than of frames leaves it open which frame is which.
+        if there.media == replace(media, frame=media.frame + gap):
+            for off in range(1, gap):
+                yield here.number + off, replace(media, frame=media.frame + off)
+        return
+    for off in range(1, gap):
+        between = file_of_frame(media, here.group, static=True, later=off)
+        if between is not None:
+            yield here.number + off, between
+
+
+class CameraFrames:
+    """Reads frames of a camera in the size that its annotations have.
+
+    Args:
+        media: Frames by number.
+        flipped: Turn the mirrored pictures of this camera right.
+        size: Of what is annotated.
+        settings: Limits.
+    """
+
+    def __init__(
+        self, media: Mapping[int, Media], flipped: bool, size: ImageSize, settings: Settings
+    ):
+        self._media, self._flipped, self._size, self._settings = media, flipped, size, settings
+        self._kept: OrderedDict[int, Image] = OrderedDict()
+        self._readers: dict[str, FrameReader] = {}
+
+    def read(self, number: int) -> Image:
+        """A frame: red green blue, shape (H, W, 3).
+
+        Raises:
+            NotFoundError: There is none of this number, or its file is gone.
+            ImageError, StorageError, TooLargeError: It cannot be read.
+        """
+        if number not in self._media:
+            raise NotFoundError(f"there is no frame {number}")
+        if number not in self._kept:
+            # Backwards: those before it are on the way to it.
+            back = number + 1 in self._kept and self._media[number].frame is not None
+            for each in range(number - BEHIND + 1 if back else number, number):
+                if each in self._media:
+                    self._try(each)
+            self._keep(number, self._decode(number))
+        return self._kept[number]
+
+    def read_or_none(self, number: int) -> Image | None:
+        """The same; None where it cannot be read."""
+        return self._attempt(self.read, number)
+
+    def close(self) -> None:
+        """Close the videos."""
+        for reader in self._readers.values():
+            reader.close()
+
+    def _try(self, number: int) -> None:
+        picture = self._attempt(self._decode, number)
+        if picture is not None:
+            self._keep(number, picture)
+
+    @staticmethod
+    def _attempt(read: Callable[[int], Image], number: int) -> Image | None:
+        try:
+            return read(number)
+        except (NotFoundError, ImageError, StorageError, TooLargeError):
+            return None
+
+    def _keep(self, number: int, picture: Image) -> None:
+        self._kept[number] = picture
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+
+    def _decode(self, number: int) -> Image:
+        media = self._media[number]
+        if media.frame is None:
+            picture = decode_frame(media, self._flipped, self._settings)
+        else:
+            found = self._video(media).read(media.frame)
+            if found is None:
+                raise NotFoundError(
+                    f"frame {media.frame} of {Path(media.path).name} cannot be decoded"
+                )
+            picture = turn_as_annotated(found, self._flipped)
+        size = self._size.width, self._size.height
+        if picture.shape[1::-1] == size:
+            return picture
+        smaller = picture.shape[1] > size[0]
+        how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+        return np.asarray(cv2.resize(picture, size, interpolation=how), np.uint8)
+
+    def _video(self, media: Media) -> Any:
+        reader = self._readers.get(media.path)
+        times = video_times(media, self._settings)
+        if not 0 <= (media.frame or 0) < len(times):
+            raise NotFoundError(f"{Path(media.path).name} has no frame {media.frame}")
+        if reader is None:
+            reader = self._readers[media.path] = FrameReader(Path(media.path), times)
+        return reader
