@@ -30,6 +30,7 @@ from app.features.policies import commands as policies
 from app.features.practice import commands as practice
 from app.features.predictions import commands as predictions
 from app.features.solve import commands as solve
+from app.features.tracks import commands as tracks
 from app.features.verdicts import commands as verdicts
 from app.features.versions import commands as versions
 from app.json_text import quoted
@@ -81,6 +82,7 @@ for part in (
     predictions,
     integrity,
     maintenance,
+    tracks,
     cluster,
 ):
     app.add_typer(part.commands)

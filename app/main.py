@@ -45,6 +45,7 @@ from app.features.recordings import link_routes as recording_links
 from app.features.recordings import routes as recordings
 from app.features.saved_views import routes as saved_views
 from app.features.stations import routes as stations
+from app.features.tracks import follow_routes as follow
 from app.features.tracks import routes as tracks
 from app.features.verdicts import routes as verdicts
 from app.features.versions import routes as versions
@@ -112,6 +113,7 @@ ROUTERS = (
     imports.imports_router,
     recordings.router,
     tracks.router,
+    follow.router,
     recording_balls.router,
     recording_cameras.router,
     recording_links.router,

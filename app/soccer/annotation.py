@@ -41,7 +41,8 @@ class BallAnnotation:
     occluded: bool = False
     out_of_view: bool = False
     predicted_by: str = ""
-    """The set of predictions that a person accepted it from; empty: a dataset or a person said it."""
+    """The set of predictions that a person accepted it from, or what it was followed from; empty: a dataset or a
+    person said it."""
     inferred: bool = False
     """Put where the 3D ball of the other views is seen: it is exported, and confirms nothing."""
 
@@ -51,6 +52,11 @@ class BallAnnotation:
         if self.out_of_view:
             return None
         return self.box.center if self.box is not None else self.point
+
+
+def followed_source(group: str) -> str:
+    """What a ball says it comes from that was followed from one of another group, by its key."""
+    return f"followed from {group}"
 
 
 @dataclass(frozen=True)

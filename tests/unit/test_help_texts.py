@@ -32,8 +32,8 @@ PLAIN_WORDS = """
     confirm constraints contact copy copying correct cross css csv cursor curve cuts database
     datasets day delete deps descriptions details detect devices diagram dialect dialog diff
     differences dismissals distance documents drags drawing durable editor empty enrol equations
-    errors estimates estimator evaluate event events executors export exports facets facts faults
-    fields figure figures files film filter finder first fit fixture follow form format formats
+    errors estimates estimator evaluate event events executors expected export exports facets facts faults
+    fields figure figures files film filter finder first fit fixture follow followed form format formats
     frozen gestures give glossary gold grass grid guess guide guideline guidelines header headers
     heat help histograms history hit home hooks idempotency identity if image images import imports
     index indexing init insert insight invitation invitations invite items jaccard join json kept

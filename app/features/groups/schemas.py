@@ -23,7 +23,7 @@ from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
 from app.features.policies.schemas import PolicyDocument
 from app.http.documents import Document, IdentityCache, ListDocument, document
-from app.soccer.annotation import BallAnnotation, Lines
+from app.soccer.annotation import BallAnnotation, Lines, followed_source
 from app.soccer.choices import CalibrationChoice, VerdictState
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
 from app.soccer.group import (
@@ -163,7 +163,9 @@ def _describe_ball_alternatives(schema: dict[str, Any]) -> None:
     schema["oneOf"] = [
         alternative("BallByBox", "box", box=box),
         alternative("BallByPoint", "point", point=point),
-        alternative("BallOutOfView", "out_of_view", out_of_view={"const": True}),
+        alternative(
+            "BallOutOfView", "out_of_view", out_of_view={"const": True}, followed_from=nowhere
+        ),
     ]
 
 
@@ -180,6 +182,11 @@ class BallEdit(BaseModel):
         default=False,
         description="Put where the 3D ball of the other views is seen: exported, and no evidence.",
     )
+    followed_from: Annotated[str, Field(min_length=1, max_length=1000)] | None = Field(
+        default=None,
+        description="Key of the group from whose ball it was followed through the frames of the camera: "
+        "that is its source. null: a person placed it.",
+    )
 
     @model_validator(mode="after")
     def _check_one_place(self) -> BallEdit:
@@ -188,6 +195,8 @@ class BallEdit(BaseModel):
             raise ValueError("give a box or a point, not both")
         if placed and self.out_of_view:
             raise ValueError("a ball that is out of view has neither a box nor a point")
+        if self.out_of_view and self.followed_from is not None:
+            raise ValueError("a ball that is out of view was not followed there")
         if not placed and not self.out_of_view:
             raise ValueError(
                 "give a box, a point or out_of_view: true; null in place of the whole ball "
@@ -203,6 +212,7 @@ class BallEdit(BaseModel):
             occluded=self.occluded,
             out_of_view=self.out_of_view,
             inferred=self.inferred and not self.out_of_view,
+            predicted_by="" if self.followed_from is None else followed_source(self.followed_from),
         )
 
 
@@ -216,7 +226,10 @@ class Ball(BaseModel):
     source: Literal["dataset", "person", "prediction"] = Field(
         description="Who says so; `prediction`: a person accepted it from `predicted_by`."
     )
-    predicted_by: str | None = Field(description="Name of the set of predictions.")
+    predicted_by: str | None = Field(
+        description="Name of the set of predictions, a `ball run` of a recording, or `followed from` with the "
+        "key of a group."
+    )
     inferred: bool = Field(
         description="Put where the 3D ball of the other views is seen; it confirms nothing."
     )

@@ -13,6 +13,7 @@ from app.db.json_columns import as_written, parse
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
 from app.features.groups.insert_queries import station_values
+from app.features.people.visibility_queries import visible_groups_condition
 from app.features.queue.queries import Condition
 from app.features.queue.tables import QueueModel
 from app.geometry.camera import Camera
@@ -152,6 +153,19 @@ def group_views(session: Session, group_id: int) -> list[StoredView]:
 def find_view(session: Session, view_id: int) -> StoredView | None:
     """One view by its id."""
     return next(iter(_read_views(session, ViewModel.id == view_id)), None)
+
+
+def views_of_camera(
+    session: Session, dataset_id: int, match: str, station_id: int
+) -> list[StoredView]:
+    """The views of a match that a camera shows, of groups that whoever asks may see."""
+    return _read_views(
+        session,
+        GroupModel.dataset_id == dataset_id,
+        GroupModel.match == match,
+        ViewModel.station_id == station_id,
+        *visible_groups_condition(dataset_id, GroupModel.id),
+    )
 
 
 def group_dataset(session: Session, group_id: int) -> int | None:

@@ -125,6 +125,7 @@ HARMLESS = {
     "clearMaintenance": "A notice that is taken away is away.",
     "deleteUpload": "It is written down before what goes: the rest is done, and the answer the same.",
     "releaseGroup": "A lease that has ended is ended.",
+    "followBallOfView": "Saves nothing.",
     "previewGroup": "Saves nothing.",
     "proposeLines": "Saves nothing.",
     "readPaint": "Saves nothing.",

@@ -1,0 +1,120 @@
+"""The command that follows a ball through the views of a camera that stands still."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from app.errors import NotFoundError
+from app.soccer.frames import ImagePoint
+from app.terminal.options import Dataset, Json, current_actor
+from app.terminal.server import opened_store
+from app.terminal.terminal import print_json, say
+from app.wording import plural
+
+commands = typer.Typer()
+ENDS = {
+    "lost": "the ball is lost",
+    "left": "the ball left the picture",
+    "known": "a group has a ball already",
+    "end": "there are no more groups",
+    "limit": "it was followed no further",
+}
+
+
+@commands.command()
+def follow(
+    group: Annotated[str, typer.Argument(metavar="GROUP", help="Key of the group.")],
+    camera: Annotated[str, typer.Argument(metavar="VIEW", help="Key of its view, such as cam3.")],
+    dataset: Dataset,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y", help="Where its ball is, pixels; default: as annotated."),
+    ] = None,
+    frames: Annotated[
+        int, typer.Option(min=1, max=250, help="Frames before and after, at most.")
+    ] = 100,
+    accept: Annotated[
+        bool, typer.Option("--accept", help="Place the balls that are not uncertain.")
+    ] = False,
+    undo: Annotated[
+        bool, typer.Option("--undo", help="Take away the balls that were followed from this one.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Follow the ball of a view through the groups before and after, where its camera stands still.
+
+    Views that have a ball keep it. Without --accept nothing is changed.
+    """
+    from app.features.tracks.follow import accept_followed, follow_view, take_back_followed
+    from app.media.frames import Frames
+
+    if accept and undo:
+        raise typer.BadParameter("place the balls or take them away, one at a time")
+    place = _parse_place(at)
+    with opened_store() as store:
+        view = _find(store, dataset, group, camera)
+        if undo:
+            changed = take_back_followed(store, view, actor=current_actor())
+            _print({"taken_back": changed}, json_, f"{plural(changed, 'ball')} taken away.")
+            return
+        pictures = Frames(store.settings)
+        try:
+            found = follow_view(store, pictures, view, place, frames)
+        finally:
+            pictures.close()
+        placed = accept_followed(store, found, actor=current_actor()) if accept else None
+    items = [
+        {
+            "group": item.key,
+            "frame": item.frame,
+            "x": round(item.ball.x, 3),
+            "y": round(item.ball.y, 3),
+            "diameter": round(item.ball.diameter, 3),
+            "sigma_px": round(item.ball.sigma_px, 3),
+            "confidence": round(item.ball.confidence, 3),
+            "state": item.ball.state,
+        }
+        for item in found.items
+    ]
+    unsure = sum(item["state"] == "uncertain" for item in items)
+    values = {
+        "first": found.first, "last": found.last, "before": found.before, "after": found.after,
+        "placed": placed, "items": items,
+    }  # fmt: skip
+    told = f"Frames {found.first} to {found.last}: {plural(len(items), 'view')} without a ball, {unsure} of them uncertain. "
+    told += f"Before, {ENDS[found.before]}; after, {ENDS[found.after]}."
+    if placed is not None:
+        told += f" {plural(placed, 'ball')} placed."
+    _print(values, json_, told)
+
+
+def _print(values: dict[str, Any], as_json: bool, sentence: str) -> None:
+    if as_json:
+        print_json(values)
+    else:
+        say(sentence)
+
+
+def _parse_place(text: str | None) -> ImagePoint | None:
+    if text is None:
+        return None
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter("write two numbers, as 812.5,344", param_hint="--at") from None
+    return ImagePoint(x, y)
+
+
+def _find(store: Any, dataset: str, group: str, camera: str) -> int:
+    """Id of a view."""
+    from app.features.datasets.service import dataset_id
+    from app.features.groups.view_queries import present_ids
+
+    number = dataset_id(store, dataset)
+    with store.read() as session:
+        views = present_ids(session, number, [group]).get(group, (0, {}))[1]
+    if camera not in views:
+        raise NotFoundError(f'"{dataset}" has no view {camera} in a group {group}')
+    return int(views[camera])

@@ -1,0 +1,448 @@
+"""The ball of a view followed through the frames of its camera, which stands still: into groups before and after.
+
+Nothing is stored. What comes of it is a proposal; a person accepts it as an edit of many views.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Literal
+
+from app.config import Settings
+from app.db.session import Session
+from app.db.store import Store
+from app.errors import ConflictError, InputError, NotFoundError, OverloadedError
+from app.features.groups.bulk_edits import ViewEdits, edit_views
+from app.features.groups.edit import set_ball
+from app.features.groups.state import GroupState, read_etags, read_states
+from app.features.groups.view_queries import StoredView, find_view, views_of_camera
+from app.features.people.visibility_queries import COPIES
+from app.features.tracks.queries import place_of_group
+from app.features.tracks.stretches import frame_of
+from app.geometry.camera import Camera
+from app.media.camera_frames import CameraFrames, Image, ViewFrame, frames_between
+from app.media.frames import Frames
+from app.soccer.annotation import BallAnnotation, followed_source
+from app.soccer.frames import Box, ImagePoint, ImageSize
+from app.soccer.group import Media
+from app.soccer.solution import ViewSolution
+from app.tracking.ball_expected import place_of, segment_of
+from app.tracking.ball_follow import follow_ball
+from app.tracking.ball_run import BallClick, BallRun, ExpectedPlace, FollowedBall, FollowHints
+from app.worker_pool import PoolTask
+
+EACH_WAY, MOST_EACH_WAY = 100, 250
+"""Frames that a ball is followed to either side, unless somebody asks for others; and at most."""
+MOST_GROUPS = 100
+"""Groups to either side: what is accepted is one request."""
+UNSEEN = 24
+"""Frames in a row that nobody has, beyond which there is no way on."""
+FollowEnd = Literal["lost", "left", "known", "end", "limit"]
+
+
+@dataclass(frozen=True)
+class CameraSequence:
+    """What a worker process needs to follow a ball.
+
+    Attributes:
+        views: Frames of views that show it, or may, in order.
+        click: Where it is; the number of its frame is one of these.
+        clicks: The nearest balls that people placed before and after.
+        expected: Where other views say that it is, by frame.
+        each_way: Frames to either side.
+    """
+
+    views: tuple[ViewFrame, ...]
+    click: BallClick
+    clicks: tuple[BallClick, ...]
+    camera: Camera | None
+    expected: Mapping[int, Sequence[ExpectedPlace]]
+    size: ImageSize
+    each_way: int
+
+
+@dataclass(frozen=True)
+class FollowQuestion:
+    """A ball that is to be followed, and the views into which it may be.
+
+    Attributes:
+        view: The view in which it is, and its group.
+        media: Its frame.
+        states: Groups of the other views of its camera as they are now, by frame.
+    """
+
+    view: StoredView
+    media: Media
+    sequence: CameraSequence
+    states: Mapping[int, tuple[StoredView, GroupState]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FollowedView:
+    """A view into which the ball was followed, and which has none yet.
+
+    Attributes:
+        group: Id of its group.
+        key: Of its group.
+        number: Of its group in the dataset.
+        view: Its id.
+        frame: Number of its frame.
+        etag: State of its group.
+        ball: Where the ball is.
+    """
+
+    group: int
+    key: str
+    number: int
+    view: int
+    frame: int
+    etag: str
+    ball: FollowedBall
+
+
+@dataclass(frozen=True)
+class FollowedViews:
+    """What came of following a ball.
+
+    Attributes:
+        view: Id of the view in which it was.
+        group: Key of its group.
+        camera: Key of its camera.
+        frame: Number of its frame.
+        first, last: Frames through which it was followed.
+        before, after: Why no further: it is ``lost``, it ``left`` the picture, a ball is ``known`` there, the
+            sequence is at its ``end``, or no more was asked for (``limit``).
+        sized: Whether the camera is known, and with it how large the ball is.
+        items: By frame.
+    """
+
+    view: int
+    group: str
+    camera: str
+    frame: int
+    first: int
+    last: int
+    before: FollowEnd
+    after: FollowEnd
+    sized: bool
+    items: tuple[FollowedView, ...]
+
+
+@dataclass(frozen=True)
+class FollowedSequence:
+    """A run through a sequence, and why it ends; None: nothing near the click looks like a ball."""
+
+    run: BallRun | None
+    before: FollowEnd = "lost"
+    after: FollowEnd = "lost"
+
+
+def plan_follow(
+    store: Store, view_id: int, at: ImagePoint | None = None, each_way: int = EACH_WAY
+) -> FollowQuestion:
+    """What has to be known to follow the ball of a view.
+
+    Args:
+        store: The database.
+        view_id: Which view.
+        at: Where its ball is, pixels; None: where it is annotated.
+        each_way: Frames to either side.
+
+    Raises:
+        NotFoundError: There is no such view, or it has no frame.
+        InputError: It has no ball, its camera moves, or no other group shows it.
+        ConflictError: It is of an independent annotation.
+    """
+    with store.read() as session:
+        view, dataset = _need_view(session, view_id)
+        if dataset > COPIES:
+            raise ConflictError(
+                "an independent annotation is made without help", hint="Place each ball by hand."
+            )
+        media, frame = view.media, _require_sequence(view)
+        if media is None:
+            raise NotFoundError(f"view {view.key} has no frame in which a ball could be followed")
+        others = views_of_camera(session, dataset, view.match, view.station_id)
+        numbered = {number: one for one in others if (number := frame_of(one.group)) is not None}
+        near = _near({**numbered, frame: view}, frame)
+        if len(near) < 2:
+            raise InputError(
+                f"no other group of this match has a frame of {view.station}",
+                hint="A ball is followed from group to group through the frames of one camera.",
+            )
+        states = _states(session, near)
+    own = states[frame][1]
+    click = at or _ball_of(own, view.key)
+    if click is None:
+        raise InputError(f"view {view.key} has no ball", hint="Place it first, or say where it is.")
+    sequence = _sequence(view, frame, click, states, each_way)
+    return FollowQuestion(view, media, sequence, states)
+
+
+def _require_sequence(view: StoredView) -> int:
+    """The number of a view's frame in its sequence."""
+    frame = frame_of(view.group)
+    if not view.shared:
+        raise InputError(
+            f"{view.station} is not a camera that stands still",
+            hint="In a recording a ball is followed by a click in its player.",
+        )
+    if frame is None:
+        raise InputError(
+            f"group {view.group} is part of no sequence: its key does not end in a frame number"
+        )
+    return frame
+
+
+def _near(views: Mapping[int, StoredView], frame: int) -> dict[int, StoredView]:
+    """The views with frames that are nearest to one, by frame."""
+    numbers = sorted(number for number, view in views.items() if view.media is not None)
+    here = numbers.index(frame)
+    wanted = numbers[max(here - MOST_GROUPS, 0) : here + MOST_GROUPS + 1]
+    return {number: views[number] for number in wanted}
+
+
+def _states(
+    session: Session, views: Mapping[int, StoredView]
+) -> dict[int, tuple[StoredView, GroupState]]:
+    found = read_states(session, [view.group_id for view in views.values()], markings=False)
+    by_id = {state.id: state for state in found}
+    return {number: (view, by_id[view.group_id]) for number, view in views.items()}
+
+
+def _ball_of(state: GroupState, key: str) -> ImagePoint | None:
+    view = state.group.view(key)
+    return None if view is None or view.ball is None else view.ball.center
+
+
+def _sequence(
+    view: StoredView,
+    frame: int,
+    click: ImagePoint,
+    states: Mapping[int, tuple[StoredView, GroupState]],
+    each_way: int,
+) -> CameraSequence:
+    first, last = _bounds(states, frame)
+    camera = _camera_of(states[frame][1], view.key)
+    views, clicks = [], []
+    expected: dict[int, list[ExpectedPlace]] = {}
+    size = ImageSize(view.width, view.height)
+    for number, (one, state) in sorted(states.items()):
+        if not first <= number <= last or one.media is None:
+            continue
+        views.append(ViewFrame(number, one.group, one.media))
+        if number == frame:
+            continue
+        known = _ball_of(state, one.key)
+        if known is not None:
+            clicks.append(BallClick(number, known.x, known.y))
+        elif camera is not None:
+            expected[number] = _expected(state, one.key, camera, size)
+    at = BallClick(frame, click.x, click.y)
+    return CameraSequence(tuple(views), at, tuple(clicks), camera, expected, size, each_way)
+
+
+def _bounds(states: Mapping[int, tuple[StoredView, GroupState]], frame: int) -> tuple[int, int]:
+    """The frames up to the next ball that somebody placed on either side, or said to be out of view."""
+    first, last = min(states), max(states)
+    for number, (view, state) in states.items():
+        shown = state.group.view(view.key)
+        if shown is None or not shown.balls or number == frame:
+            continue
+        hidden = _ball_of(state, view.key) is None
+        if number < frame:
+            first = max(first, number + hidden)
+        else:
+            last = min(last, number - hidden)
+    return first, last
+
+
+def _camera_of(state: GroupState, key: str) -> Camera | None:
+    solved = _solved(state, key)
+    return None if solved is None else solved.calibration.camera
+
+
+def _solved(state: GroupState, key: str) -> ViewSolution | None:
+    views = () if state.solution is None else state.solution.views
+    return next((one for one in views if one.view == key), None)
+
+
+def _expected(state: GroupState, key: str, camera: Camera, size: ImageSize) -> list[ExpectedPlace]:
+    """Where the other views of a group say that the ball is: one place, else the segments of their rays."""
+    solved = _solved(state, key)
+    if solved is not None and solved.expected is not None:
+        return [place_of(solved.expected)]
+    found = []
+    for other in state.group.views:
+        ball, source = _ball_of(state, other.key), _camera_of(state, other.key)
+        if other.key == key or ball is None or source is None or not other.included:
+            continue
+        segment = segment_of(source, ball, camera, size)
+        found += [] if segment is None else [segment]
+    return found
+
+
+def ask_follow(frames: Frames, question: FollowQuestion) -> PoolTask:
+    """Have a ball followed in a worker process; ``followed_views`` makes of its result what is told."""
+    view = question.view
+    return frames.ask_of(question.media, view.flipped, follow_through, question.sequence)
+
+
+def followed_views(question: FollowQuestion, found: FollowedSequence) -> FollowedViews:
+    """What came of a question.
+
+    Raises:
+        InputError: Nothing near the click looks like a ball.
+    """
+    view, click, run = question.view, question.sequence.click, found.run
+    if run is None:
+        raise InputError(
+            f"nothing near ({click.x:.0f}, {click.y:.0f}) in view {view.key} looks like a ball",
+            hint="Put it onto the middle of the ball, in a frame where nothing hides it.",
+        )
+    items = []
+    for ball in run.balls:
+        if ball.frame == click.frame or ball.frame not in question.states:
+            continue
+        one, state = question.states[ball.frame]
+        shown = state.group.view(one.key)
+        if shown is not None and not shown.balls:
+            items.append(
+                FollowedView(
+                    state.id, state.key, state.number, one.id, ball.frame, state.etag, ball
+                )
+            )
+    return FollowedViews(
+        view.id,
+        view.group,
+        view.station,
+        click.frame,
+        run.first,
+        run.last,
+        found.before,
+        found.after,
+        question.sequence.camera is not None,
+        tuple(items),
+    )
+
+
+def follow_view(
+    store: Store,
+    frames: Frames,
+    view_id: int,
+    at: ImagePoint | None = None,
+    each_way: int = EACH_WAY,
+) -> FollowedViews:
+    """Follow the ball of a view through the frames of its camera; waits for the process.
+
+    Raises:
+        NotFoundError, InputError, ConflictError: As ``plan_follow`` and ``followed_views``.
+        ImageError: The frame of the view cannot be read.
+        OverloadedError: Too many wait, or the server is shutting down.
+    """
+    question = plan_follow(store, view_id, at, each_way)
+    try:
+        found: FollowedSequence = ask_follow(frames, question).future.result()
+    except CancelledError as error:
+        raise OverloadedError(
+            "the server is shutting down", hint="Try again in a moment."
+        ) from error
+    return followed_views(question, found)
+
+
+def accept_followed(store: Store, found: FollowedViews, *, actor: str) -> int:
+    """Make the followed balls that are not uncertain those of their views; how many views changed."""
+    source = followed_source(found.group)
+
+    def item(one: FollowedView) -> ViewEdits:
+        ball, half = one.ball, one.ball.diameter / 2
+        box = Box(ball.x - half, ball.y - half, ball.diameter, ball.diameter)
+        annotation = BallAnnotation(box=box, predicted_by=source)
+        return ViewEdits(one.view, None, one.etag, lambda key: [set_ball(key, annotation)])
+
+    items = [item(one) for one in found.items if one.ball.state == "followed"]
+    return _edit(store, found.view, items, actor)
+
+
+def take_back_followed(store: Store, view_id: int, *, actor: str) -> int:
+    """Take away the balls that were followed from that of a view, as far as nobody changed them; how many.
+
+    Raises:
+        NotFoundError: There is no such view.
+    """
+    with store.read() as session:
+        view, dataset = _need_view(session, view_id)
+        source = followed_source(view.group)
+        others = views_of_camera(session, dataset, view.match, view.station_id)
+        mine = [one for one in others if [ball.predicted_by for ball in one.balls] == [source]]
+        etags = read_etags(session, [one.group_id for one in mine])
+    items = [
+        ViewEdits(one.id, None, etags[one.group_id], lambda key: [set_ball(key, None)])
+        for one in mine
+    ]
+    return _edit(store, view_id, items, actor)
+
+
+def _edit(store: Store, view_id: int, items: Sequence[ViewEdits], actor: str) -> int:
+    with store.read() as session:
+        _, dataset = _need_view(session, view_id)
+    report = edit_views(store, dataset, items, actor=actor)
+    return sum(one.outcome == "changed" for one in report.items)
+
+
+def _need_view(session: Session, view_id: int) -> tuple[StoredView, int]:
+    """A view, and the id of its dataset."""
+    view = find_view(session, view_id)
+    if view is None:
+        raise NotFoundError(f"there is no view {view_id}")
+    place = place_of_group(session, view.group_id)
+    assert place is not None
+    return view, int(place.dataset_id)
+
+
+def follow_through(
+    _: Media, flipped: bool, settings: Settings, asked: CameraSequence
+) -> FollowedSequence:
+    """The work of the process."""
+    media = frames_between(asked.views, settings)
+    frames = CameraFrames(media, flipped, asked.size, settings)
+    click, numbers = asked.click, _with_gaps(sorted(media))
+    before = [number for number in reversed(numbers) if number < click.frame]
+    after = [number for number in numbers if number > click.frame]
+    ways = before[: asked.each_way], after[: asked.each_way]
+    cameras = {} if asked.camera is None else dict.fromkeys(numbers, asked.camera)
+    hints = FollowHints(cameras, expected=asked.expected, still=True, clicks=asked.clicks)
+
+    def read(number: int) -> Image | None:
+        # Without the clicked frame there is nothing to follow, and it is said why.
+        return frames.read(number) if number == click.frame else frames.read_or_none(number)
+
+    try:
+        run = follow_ball(read, click, *ways, hints)
+    finally:
+        frames.close()
+    if run is None:
+        return FollowedSequence(None)
+    clicked = {one.frame for one in asked.clicks}
+
+    def end(why: FollowEnd, way: Sequence[int], every: Sequence[int]) -> FollowEnd:
+        if why != "limit":
+            return why
+        if clicked.intersection(way):
+            return "known"
+        return "limit" if len(way) < len(every) else "end"
+
+    return FollowedSequence(run, end(run.before, ways[0], before), end(run.after, ways[1], after))
+
+
+def _with_gaps(numbers: Sequence[int]) -> list[int]:
+    """Numbers of frames, and between them, in the usual step, those that nobody has: the ball goes on there, too."""
+    step = min((b - a for a, b in pairwise(numbers)), default=1)
+    found = set(numbers)
+    for here, there in pairwise(numbers):
+        missing = range(here + step, there, step)
+        found |= set(missing[: UNSEEN + 1])
+    return sorted(found)

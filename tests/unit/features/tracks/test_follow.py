@@ -1,0 +1,213 @@
+"""The ball of a view followed through the groups before and after: what comes of it, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.config import Settings
+from app.db.store import Store
+from app.errors import ConflictError, ImageError, InputError, NotFoundError
+from app.features.groups.state import read_state
+from app.features.tracks import follow
+from app.features.tracks.follow import FollowedViews, follow_view
+from app.features.tracks.queries import place_of_group
+from app.media.frames import Frames
+from app.soccer.annotation import BallAnnotation
+from app.soccer.frames import ImagePoint
+from app.soccer.group import Group
+from tests.filmed_rigs import centers, filmed_groups
+from tests.flights import FIRST
+
+COUNT, CAMERA, CLICKED = 24, "cam1", FIRST + 10
+Fill = Callable[..., list[int]]
+
+
+@pytest.fixture
+def frames(settings: Settings) -> Iterator[Frames]:
+    found = Frames(settings)
+    yield found
+    found.close()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "film").mkdir()
+    return tmp_path / "film"
+
+
+def view_of(store: Store, group: int, camera: str = CAMERA) -> int:
+    with store.read() as session:
+        return read_state(session, group).view_ids[camera]
+
+
+def off(found: FollowedViews) -> dict[int, float]:
+    """How far each ball is off, pixels."""
+    true = centers(COUNT, CAMERA)
+    return {
+        item.frame: float(np.hypot(*np.subtract(true[item.frame], (item.ball.x, item.ball.y))))
+        for item in found.items
+    }
+
+
+class TestFollowView:
+    def test_a_ball_goes_through_the_groups_before_and_after(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
+        found = follow_view(store, frames, view_of(store, ids[10]))
+        assert (found.group, found.camera, found.frame) == (str(CLICKED), CAMERA, CLICKED)
+        assert (found.before, found.after, found.sized) == ("end", "end", True)
+        numbers = [number for number in range(FIRST, FIRST + COUNT) if number != CLICKED]
+        assert [item.frame for item in found.items] == numbers
+        assert [item.group for item in found.items] == [ids[n - FIRST] for n in numbers]
+        assert max(off(found).values()) < 1.0
+        assert {item.ball.state for item in found.items} == {"followed"}
+        assert all(item.view == view_of(store, item.group) for item in found.items[:3])
+
+    def test_frames_of_a_video_between_groups_are_looked_at(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        every = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED], video=True)
+        ids = fill(*(group for group in every if int(group.key) % 5 == 0))
+        found = follow_view(store, frames, view_of(store, ids[2]))
+        assert [item.frame - FIRST for item in found.items] == [0, 5, 15, 20]
+        assert max(off(found).values()) < 1.0
+
+    def test_files_between_groups_are_looked_at_and_missing_ones_passed(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        every = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED])
+        ids = fill(*(group for group in every if int(group.key) % 5 == 0))
+        for number in (FIRST + 7, FIRST + 12, FIRST + 13):
+            (folder / CAMERA / f"{number:06d}.jpg").unlink()
+        found = follow_view(store, frames, view_of(store, ids[2]))
+        assert [item.frame - FIRST for item in found.items] == [0, 5, 15, 20]
+        assert max(off(found).values()) < 1.0
+
+    def test_it_ends_at_balls_that_are_there_and_leaves_them(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        said = [FIRST + 6, CLICKED, FIRST + 14]
+        ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=said))
+        found = follow_view(store, frames, view_of(store, ids[10]))
+        assert (found.before, found.after) == ("known", "known")
+        assert [item.frame - FIRST for item in found.items] == [7, 8, 9, 11, 12, 13]
+
+    def test_a_ball_that_somebody_said_is_out_of_view_ends_it(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        groups = filmed_groups(folder, COUNT, CAMERA, said=[CLICKED])
+        gone = groups[13].view(CAMERA)
+        assert gone is not None
+        groups[13] = groups[13].with_view(replace(gone, balls=(BallAnnotation(out_of_view=True),)))
+        ids = fill(*groups)
+        found = follow_view(store, frames, view_of(store, ids[10]))
+        assert found.items[-1].frame == FIRST + 12
+
+    def test_as_far_as_is_asked(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED]))
+        found = follow_view(store, frames, view_of(store, ids[10]), each_way=3)
+        assert [item.frame - CLICKED for item in found.items] == [-3, -2, -1, 1, 2, 3]
+        assert (found.before, found.after) == ("limit", "limit")
+
+    def test_where_the_ball_is_gone_it_is_lost(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        hidden = range(FIRST + 18, FIRST + 60)
+        groups = filmed_groups(folder, 60, CAMERA, said=[CLICKED], others=False, hidden=hidden)
+        ids = fill(*groups)
+        found = follow_view(store, frames, view_of(store, ids[10]))
+        assert found.after == "lost"
+        assert {item.frame for item in found.items if item.ball.state == "followed"} <= set(
+            range(FIRST, FIRST + 18)
+        )
+
+    def test_a_place_may_be_given_where_no_ball_is_annotated(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[]))
+        view = view_of(store, ids[10])
+        with pytest.raises(InputError, match="view cam1 has no ball"):
+            follow_view(store, frames, view)
+        x, y = centers(COUNT, CAMERA)[CLICKED]
+        found = follow_view(store, frames, view, ImagePoint(x + 1.5, y - 1), 4)
+        assert max(off(found).values()) < 1.0
+        with pytest.raises(InputError, match="looks like a ball"):
+            follow_view(store, frames, view, ImagePoint(x + 200, y - 100), 4)
+
+
+def broken(groups: Sequence[Group], **station: object) -> list[Group]:
+    """The groups with another camera."""
+    found = []
+    for group in groups:
+        view = group.view(CAMERA)
+        assert view is not None
+        other = replace(view.station, **station)  # type: ignore[arg-type]
+        found.append(group.with_view(replace(view, station=other)))
+    return found
+
+
+class TestRefusals:
+    def refused(self, store: Store, frames: Frames, group: int) -> str:
+        with pytest.raises((InputError, NotFoundError, ImageError, ConflictError)) as error:
+            follow_view(store, frames, view_of(store, group))
+        return error.value.message
+
+    def test_of_a_camera_that_moves(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        groups = filmed_groups(folder, 3, CAMERA, said=[FIRST])
+        moving = [broken([g], key=f"{CAMERA}/{g.key}", shared=False)[0] for g in groups]
+        assert "not a camera that stands still" in self.refused(store, frames, fill(*moving)[0])
+
+    def test_of_groups_without_numbers(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        groups = filmed_groups(folder, 3, CAMERA, said=[FIRST])
+        named = [
+            replace(group, key=f"goal {letter}x")
+            for group, letter in zip(groups, "abc", strict=True)
+        ]
+        assert "part of no sequence" in self.refused(store, frames, fill(*named)[0])
+
+    def test_of_one_group_alone(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        group = filmed_groups(folder, 1, CAMERA, said=[FIRST])[0]
+        assert "no other group" in self.refused(store, frames, fill(group)[0])
+
+    def test_without_a_frame(self, store: Store, fill: Fill, frames: Frames, folder: Path) -> None:
+        groups = filmed_groups(folder, 3, CAMERA, said=[FIRST])
+        view = groups[0].view(CAMERA)
+        assert view is not None
+        groups[0] = groups[0].with_view(replace(view, media=None))
+        assert "has no frame" in self.refused(store, frames, fill(*groups)[0])
+
+    def test_where_its_frame_is_gone(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        ids = fill(*filmed_groups(folder, 3, CAMERA, said=[FIRST]))
+        (folder / CAMERA / f"{FIRST:06d}.jpg").unlink()
+        assert "is not where it was imported from" in self.refused(store, frames, ids[0])
+
+    def test_of_an_independent_annotation(
+        self,
+        store: Store,
+        fill: Fill,
+        frames: Frames,
+        folder: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        ids = fill(*filmed_groups(folder, 3, CAMERA, said=[FIRST]))
+        with store.read() as session:
+            place = place_of_group(session, ids[0])
+        assert place is not None
+        monkeypatch.setattr(follow, "COPIES", place.dataset_id - 1)
+        assert "without help" in self.refused(store, frames, ids[0])
