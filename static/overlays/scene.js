@@ -42,6 +42,7 @@ import { pinsOf } from '../lib/pins.js';
  * @property {Pin[]} pins notes that stand at a place of this view
  * @property {ViewPredictions} [predictions] once they are known
  * @property {ViewPaint} [paint] once it is read, while it is shown
+ * @property {Draw} [followed] draws a ball that was followed through the frames of its camera
  * @property {ViewProposal} [proposal] lines that are proposed, where there is no camera
  */
 /**

@@ -117,6 +117,7 @@ export function drawOverlays(context, scene) {
 	if (scene.rays) drawEpipolars(context, scene);
 	drawPoints(context, scene);
 	scene.picture.proposal?.draw(context, scene);
+	scene.picture.followed?.(context, scene);
 	if (scene.boxes) scene.picture.predictions?.draw(context, scene);
 	drawExpected(context, scene);
 	drawBall(context, scene);

@@ -36,7 +36,7 @@ export const undoable = computed(() => {
 	const action = next.value;
 	if (action === null) return null;
 	if (action === 'here') return 'Undo the last edit of this group';
-	if (action.kind === 'batch') return `Undo: ${action.text}`;
+	if (action.kind === 'batch' || action.kind === 'follow') return `Undo: ${action.text}`;
 	if (action.kind === 'edit') return `Go back to group ${action.number} and undo its last edit`;
 	if (action.kind === 'dismissal') return `${action.dismissed ? 'Reopen the finding' : 'Dismiss the finding again'} in group ${action.number}`;
 	return `Undo the verdict on group ${action.number}`;
@@ -46,7 +46,7 @@ const canRedoHere = computed(() => Boolean(groupDocument.value?.can_redo) || own
 export const redoable = computed(() => {
 	const action = nextAgain(undone.value, here.value);
 	if (!action) return canRedoHere.value ? 'Redo the undone edit of this group' : null;
-	if (action.kind === 'batch') return `Redo: ${action.text}`;
+	if (action.kind === 'batch' || action.kind === 'follow') return `Redo: ${action.text}`;
 	if (action.kind === 'edit') return `Redo the undone edit of group ${action.number}`;
 	if (action.kind === 'dismissal') return `${action.dismissed ? 'Dismiss the finding again' : 'Reopen the finding'} in group ${action.number}`;
 	return `Redo the verdict on group ${action.number}`;
@@ -72,6 +72,10 @@ async function undoOne() {
 		// Findings are the review's: the queue opens without them.
 		const { undoDismissal } = await import('./dismissals.js');
 		await undoDismissal(action);
+	}
+	else if (action.kind === 'follow') {
+		const { undoFollow } = await import('./follow.js');
+		await undoFollow(action);
 	}
 	else {
 		// Bulk verdicts are the queue's: the review screen opens without them.
@@ -110,6 +114,10 @@ async function redoOne() {
 	else if (action?.kind === 'dismissal') {
 		const { dismissAgain } = await import('./dismissals.js');
 		await dismissAgain(action);
+	}
+	else if (action?.kind === 'follow') {
+		const { redoFollow } = await import('./follow.js');
+		await redoFollow(action);
 	}
 	else if (action?.kind === 'batch') {
 		const { redoBatch } = await import('./queue_batches.js');

@@ -12,6 +12,7 @@ import { group } from '../state/group.js';
 import { findFramesAround, framesAround, stepInstant } from '../state/instants.js';
 import { filled, toggleFilled } from '../state/viewports.js';
 import { drawing, equalViews, focusView, maximised, toggleMaximised } from '../state/workspace.js';
+import { followOrAccept } from './follow_parts.js';
 
 
 /** @import {ViewJson} from '../api/types.js' */
@@ -20,6 +21,7 @@ import { drawing, equalViews, focusView, maximised, toggleMaximised } from '../s
 const AdjustPopover = lazy(async () => (await import('./adjust_popover.js')).AdjustPopover);
 
 const PATHS = {
+	follow: 'M2 12.5c2-6 4.5-7.5 7-4.5M12 5.2a2.3 2.3 0 1 0 0 4.6 2.3 2.3 0 0 0 0-4.6M2 12.5v-2.6M2 12.5h2.6',
 	draw: 'M3 13l.8-3L11 2.8 13.2 5 6 12.2zM9.6 4.2l2.2 2.2',
 	camera: 'M2 4.5h3l1-1.5h4l1 1.5h3v8H2zM8 6.2a2.3 2.3 0 1 0 0 4.6 2.3 2.3 0 0 0 0-4.6',
 	light: 'M8 5.2a2.8 2.8 0 1 0 0 5.6 2.8 2.8 0 0 0 0-5.6M8 1.5v1.6M8 12.9v1.6M1.5 8h1.6M12.9 8h1.6M3.4 3.4l1.1 1.1M11.5 11.5l1.1 1.1M3.4 12.6l1.1-1.1M11.5 4.5l1.1-1.1',
@@ -75,6 +77,9 @@ export function PanelTools({ picture, sizes }) {
 				<${Tool} label=${`View ${letter} one frame after`} title="One frame after (.)" path=${PATHS.after} onClick=${() => step(letter, 1)} />` : null}
 			<${Tool} label=${`Draw in view ${letter}`} title="Draw a ball, a marking, a point (N)" path=${PATHS.draw} pressed=${draws}
 				onClick=${() => (draws ? endDrawing() : startDrawing(letter))} />
+			${picture.view.station.shared && picture.view.balls.length ? html`
+				<${Tool} label=${`Follow the ball of view ${letter}`} title="Follow the ball through the groups before and after (Shift+Q)" path=${PATHS.follow}
+					onClick=${() => { focusView(letter); followOrAccept(picture.view); }} />` : null}
 			<a class="icon-button" href=${group.value ? editorAddress(group.value.id, key) : undefined} aria-label=${`Calibration of view ${letter}`} title="Calibration editor (K)">
 				<svg viewBox="0 0 16 16" aria-hidden="true"><path d=${PATHS.camera} /></svg>
 			</a>

@@ -6,6 +6,7 @@ import { html } from 'htm/preact';
 import { lazy } from '../lib/lazy.js';
 import { isPractice } from '../state/datasets.js';
 import { Findings } from './findings.js';
+import { FollowCard, isFollowing } from './follow_parts.js';
 import { Gates } from './gates.js';
 import { PairTable } from './pair_table.js';
 import { PredictionCard } from './prediction_parts.js';
@@ -34,6 +35,7 @@ export function Rail({ group, solution, pictures, live }) {
 			<div class="rail__scroll" tabindex="0" role="group" aria-label="Numbers">
 				${isPractice(group.dataset.name) ? html`<${LessonCard} group=${group} />` : null}
 				<${VerdictCard} group=${group} solution=${solution} live=${live} />
+				${isFollowing() ? html`<${FollowCard} />` : null}
 				${solution ? html`<${Gates} group=${group} solution=${solution} />` : null}
 				<${ViewTable} group=${group} pictures=${pictures} />
 				${pictures.some(({ predictions }) => predictions) ? html`<${PredictionCard} group=${group} />` : null}

@@ -32,6 +32,7 @@ import { compose } from '../state/threads.js';
 import { deleteSelected, nudge, nudgeDiameter } from '../tools/nudge.js';
 import { EDITOR_DOOR } from './calibration/open.js';
 import { applySuggestion } from './suggestion_actions.js';
+import { acceptFollowedHere, followOrAccept, isFollowing, leaveFollow } from './follow_parts.js';
 import { acceptAll, acceptInHand, hasPredictions } from './prediction_parts.js';
 import { acceptProposed } from './proposal_parts.js';
 import { SCENE_KEYS } from './scene3d/scene3d.js';
@@ -71,6 +72,7 @@ function escape() {
 	else if (otherInstant.value) backToInstant();
 	else if (editing.value) editing.value = false;
 	else if (selected.value) selected.value = null;
+	else if (isFollowing()) leaveFollow();
 	else if (maximised.value) maximised.value = null;
 	else if (notice.value) dismiss();
 }
@@ -136,6 +138,7 @@ function swap() {
 /** Accept the prediction in hand, else put the ball where the other views see it. */
 function takeBall() {
 	const view = viewInHand();
+	if (acceptFollowedHere(view)) return;
 	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
 	if (predicted || !view || view.balls.length > 0) acceptInHand();
 	else if (!placeExpected(view)) announce(`The other views disagree about the place of the ball in view ${view.letter}. Press N to draw it.`);
@@ -328,6 +331,7 @@ const EDIT = [
 		run: () => changeBall(toggleOutOfView, ''),
 	},
 	{ keys: ['y'], label: 'Accept the predicted ball, or place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
+	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; again: accept what was followed', group: 'Edit', needs: 'annotate', run: () => { followOrAccept(viewInHand()); } },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
 	{ keys: ['u'], label: 'Reset object', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },

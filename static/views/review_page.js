@@ -17,6 +17,7 @@ import { guidelinesShown, isCopy } from '../state/independent_annotations.js';
 import { threads, withThreads } from '../state/threads.js';
 import { estimator, focused, loupe, maximised } from '../state/workspace.js';
 import { NoticeBar } from './bars.js';
+import { useFollowed } from './follow_parts.js';
 import { ImageGrid, ReviewMain } from './image_grid.js';
 import { usePredictions, withPredictions } from './prediction_parts.js';
 import { useProposals } from './proposal_parts.js';
@@ -63,7 +64,7 @@ function Workspace() {
 	const plain = useMemo(() => (shown ? picturesOf(shown, solved, saved) : []), [shown, solved, saved]);
 	const predicted = usePredictions(shown !== null);
 	const marked = useMemo(() => withPredictions(plain, predicted), [plain, predicted]);
-	const drawn = useProposals(usePaint(marked, saved), saved);
+	const drawn = useFollowed(useProposals(usePaint(marked, saved), saved));
 	const said = threads.value;
 	const pictures = useMemo(() => withThreads(drawn, said), [drawn, said]);
 	useEffect(() => keepWithin(pictures.map(({ view }) => view.letter)), [pictures]);

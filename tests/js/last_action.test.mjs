@@ -24,6 +24,11 @@ describe('nextBack', () => {
 		assert.equal(nextBack([verdict(1), edit(2)], 2, true, 'a'), 'here');
 	});
 
+	it('is a run of followed balls as a whole, though the group on screen has one of them', () => {
+		const run = { kind: 'follow', dataset: 'a', from: '106', text: '14 balls followed', items: [] };
+		assert.equal(nextBack([edit(2), run], 2, true, 'a'), run);
+	});
+
 	it('is the edit of the group on screen before one elsewhere', () => {
 		assert.equal(nextBack([edit(1)], 2, true, 'a'), 'here');
 		assert.deepEqual(nextBack([edit(1)], 2, false, 'a'), edit(1));

@@ -1,0 +1,169 @@
+// @ts-check
+/**
+ * The ball of a view followed through the frames of its camera into the groups before and after. What is found is shown
+ * and counts for nothing until it is accepted.
+ */
+
+import { computed, signal } from '@preact/signals';
+
+import { ApiError } from '../api/problem.js';
+import { editBalls, followBall } from '../api/follow.js';
+import { ballCenter, ballOf } from '../geometry/preview.js';
+import { plural } from '../lib/format.js';
+import { navigate } from '../lib/router.js';
+import { loadDatasets } from './datasets.js';
+import { group, groupDocument, open } from './group.js';
+import { did, didAgain, forget, forgetUndone, tookBack } from './last_action.js';
+import { reviewAddress } from './navigation.js';
+import { announce, complain, inform } from './notice.js';
+import { refuses } from './rights.js';
+
+/** @import {FollowedBall, FollowedItem} from '../api/follow.js' */
+/** @import {ViewJson} from '../api/types.js' */
+/** @import {FollowDone} from './last_action.js' */
+
+/** @typedef {{dataset: string, camera: string, letter: string, station: number, found: FollowedBall | null}} Follow   `found`: null while it is followed */
+
+/** What is being followed, or was and is not put away. */
+export const follow = signal(/** @type {Follow | null} */ (null));
+/** What can be accepted without a look. */
+export const sure = computed(() => itemsIn('followed'));
+/** What a person has to look at. */
+export const unsure = computed(() => itemsIn('uncertain'));
+
+let stop = new AbortController();
+
+/** @param {FollowedItem['state']} state @returns {FollowedItem[]} */
+function itemsIn(state) {
+	return (follow.value?.found?.items ?? []).filter((item) => item.state === state);
+}
+
+/** The followed balls of a view's camera, where it is the one. @param {ViewJson} view @returns {FollowedItem[]} */
+export function itemsOf(view) {
+	const at = follow.value;
+	return at?.found && at.station === view.station.id && at.dataset === groupDocument.value?.dataset.name ? at.found.items : [];
+}
+
+/** Follow the ball of a view. @param {ViewJson} view */
+export async function startFollow(view) {
+	const dataset = group.value?.dataset.name;
+	if (!dataset || refuses('annotate', dataset)) return;
+	const ball = ballOf(view);
+	const center = ball && ballCenter(ball);
+	if (!center) return complain(`View ${view.letter} has no ball to follow. Press N to draw it.`);
+	const { id: station, shared } = view.station;
+	if (!shared) return complain(`The camera of view ${view.letter} moves. A ball is followed through views of a camera that stands still, and in the player of a recording.`);
+	const mine = new AbortController();
+	stop = mine;
+	follow.value = { dataset, camera: view.label, letter: view.letter, station, found: null };
+	announce(`Following the ball of view ${view.letter}…`);
+	try {
+		const found = await followBall(view.id, [center.x, center.y], mine.signal);
+		if (mine.signal.aborted) return undefined;
+		tell(found);
+	} catch (error) {
+		if (mine.signal.aborted) return undefined;
+		follow.value = null;
+		if (!(error instanceof ApiError)) throw error;
+		complain(`The ball of view ${view.letter} cannot be followed: ${error.message}`);
+	}
+	return undefined;
+}
+
+/** @param {FollowedBall} found */
+function tell(found) {
+	if (follow.value && found.items.length) {
+		follow.value = { ...follow.value, found };
+		const rest = unsure.value.length ? `, ${unsure.value.length} of them uncertain` : '';
+		announce(`The ball was followed into ${plural(found.items.length, 'view')}${rest}.`);
+		return;
+	}
+	follow.value = null;
+	const known = found.before === 'known' || found.after === 'known';
+	inform(known ? 'The ball was followed no further: the groups before or after have a ball already, which stays.'
+		: 'The ball was followed into no other group: it is not seen in the frames before and after.');
+}
+
+/** Put away what was followed, or leave it. */
+export function endFollow() {
+	stop.abort();
+	follow.value = null;
+	announce('What was followed is put away; nothing was changed.');
+}
+
+/** Make followed balls those of their views. @param {FollowedItem[]} items */
+export async function acceptFollowed(items) {
+	const at = follow.value;
+	if (!at?.found) return announce('The ball is still being followed.');
+	if (items.length === 0) return complain('What is left is uncertain: look at each, and accept it with Y.');
+	const from = at.found.group;
+	/** @type {FollowDone} */
+	const action = {
+		kind: 'follow', dataset: at.dataset, from, text: `${plural(items.length, 'ball')} followed from group ${from}`,
+		items: items.map(({ view, etag, box }) => ({ view, etag, box })),
+	};
+	const left = at.found.items.filter((item) => !items.includes(item));
+	const done = await send(action, true);
+	if (!done) return undefined;
+	did(done.action);
+	follow.value = left.length ? { ...at, found: { ...at.found, items: left } } : null;
+	inform(`${plural(done.changed, 'ball')} placed in ${at.camera}.${stayed(done.refused)}`, { label: 'Undo', run: () => undoFollow(done.action) });
+	return undefined;
+}
+
+/** Accept the followed ball of the group on screen. @param {ViewJson} view @returns {boolean} whether there is one */
+export function acceptHere(view) {
+	const item = view.balls.length === 0 && itemsOf(view).find((one) => one.view === view.id);
+	if (item) acceptFollowed([item]);
+	return Boolean(item);
+}
+
+/** Go to the next group that a person has to look at, from the first again behind the last. */
+export function nextUnsure() {
+	const here = group.value?.number ?? 0;
+	const next = unsure.value.find(({ number }) => number > here) ?? unsure.value[0];
+	if (next) navigate(reviewAddress(next.group));
+}
+
+/** Take accepted balls away again; what was edited since stays. @param {FollowDone} action */
+export async function undoFollow(action) {
+	const done = await send(action, false);
+	if (!done) return;
+	forget(action);
+	if (done.changed) tookBack(done.action);
+	inform(`${plural(done.changed, 'ball')} taken away again.${stayed(done.refused)}`, done.changed ? { label: 'Redo', run: () => redoFollow(done.action) } : undefined);
+}
+
+/** Place balls again that were taken away. @param {FollowDone} action */
+export async function redoFollow(action) {
+	const done = await send(action, true);
+	if (!done) return;
+	if (done.changed) didAgain(action, done.action);
+	else forgetUndone(action);
+	inform(`${plural(done.changed, 'ball')} placed again.${stayed(done.refused)}`);
+}
+
+/**
+ * @param {FollowDone} action @param {boolean} placed whether the balls are there afterwards
+ * @returns {Promise<{action: FollowDone, changed: number, refused: number} | null>} with what was changed, as it is now
+ */
+async function send(action, placed) {
+	try {
+		const { changed, refused, items } = await editBalls(action.dataset, action.items.map(({ view, etag, box }) => (
+			{ view, etag, ball: placed ? { box, followed_from: action.from } : null }
+		)));
+		const kept = action.items.flatMap((item, i) => (items[i]?.outcome === 'changed' ? [{ ...item, etag: items[i].etag ?? item.etag }] : []));
+		if (groupDocument.value) open(groupDocument.value.id);
+		loadDatasets();
+		return { action: { ...action, items: kept }, changed, refused };
+	} catch (error) {
+		if (!(error instanceof ApiError)) throw error;
+		complain(`Not done: ${error.message}`);
+		return null;
+	}
+}
+
+/** Views that stay as they are, as a sentence; '' for none. @param {number} views */
+function stayed(views) {
+	return views ? ` ${plural(views, 'group')} ${views === 1 ? 'was' : 'were'} changed meanwhile and ${views === 1 ? 'stays' : 'stay'} as ${views === 1 ? 'it is' : 'they are'}.` : '';
+}
