@@ -1,12 +1,14 @@
 """One click follows the ball: through the sample's recording, whose true ball is known, and through real clips.
 
-``python -m tests.bench.ball_follow [SECONDS | FILM.mp4]``; without seconds the three minutes. A simulated person
+``python -m tests.bench.ball_follow [SECONDS | FILM.mp4 | rig]``; without seconds the three minutes; ``rig``: groups of
+a static rig (``rig_follow``), which need ``TOUCHLINE_REAL_DATA``. A simulated person
 clicks a visible ball, looks through what was followed, and clicks again where the run ends though the ball is seen,
 or where it is wrong; clicks miss the centre by a pixel and a half.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import time
@@ -24,6 +26,7 @@ from app.tracking.ball_run import BallClick, BallRun, FollowedBall, FollowHints
 from app.video.frames import Image, RecordingReader
 from app.video.index import RecordingIndex
 from tests.bench.recording import KnownRecording, camera_of
+from tests.bench.rig_follow import bench_rig_follow
 from tests.bench.table import print_table
 
 CLICK_PX = 1.5
@@ -243,6 +246,9 @@ def _add(whole: Told, told: Told) -> None:
 
 if __name__ == "__main__":
     arguments = sys.argv[1:]
+    if arguments == ["rig"]:
+        bench_rig_follow(Path(os.environ["TOUCHLINE_REAL_DATA"]) / "issia")
+        sys.exit()
     made = [Path(one) for one in arguments if one.endswith(".mp4")]
     numbers = [float(one) for one in arguments if not one.endswith(".mp4")]
     bench_ball_follow(numbers[0] if numbers else RECORDING_SECONDS, made[0] if made else None)
