@@ -65,7 +65,7 @@ function Slider({ field, value, id, change }) {
 }
 
 /** What a choice is called, where it is a word of the policy's. */
-const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'pair average', best: 'most likely point', lines: 'annotated lines', paint: 'paint in the picture', fixed: 'as set here', estimated: 'estimated from the dataset', exact: 'exactly as set here', professional: 'pitch of a professional club', any: 'any pitch, perhaps a stretched picture', inner: 'inner edges', middle: 'middle', laws: 'middle; pitch size to outer edges', points: 'each point', markings: 'each marking' });
+const CHOICES = /** @type {{[name: string]: string}} */ ({ mean: 'pair average', best: 'most likely point', lines: 'annotated lines', paint: 'paint in the picture', fixed: 'as set here', estimated: 'from the dataset', exact: 'as set here', professional: 'professional pitch', any: 'any, or stretched', inner: 'inner edges', middle: 'middle', laws: 'as in the Laws', points: 'each point', markings: 'each marking' });
 
 /** @param {{field: PolicyField, id: string, value: Value, change: (value: Value) => void}} props */
 function Choice({ field, id, value, change }) {
