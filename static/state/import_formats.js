@@ -16,7 +16,7 @@ const OFFSET = { name: 'frame_offset', label: 'Frame offset', hint: 'number in t
 const FLIPPED = { name: 'flipped', label: 'Mirrored cameras', hint: 'camera numbers, for example 2,6', kind: 'cameras' };
 
 /** @type {FormatOption} */
-const GROUPING = { name: 'grouping', label: 'Which pictures are one group', hint: 'a pattern of their names, with {instant} and {camera}', kind: 'grouping' };
+const GROUPING = { name: 'grouping', label: 'Which pictures form one group', hint: 'a pattern of their names, with {instant} and {camera}', kind: 'grouping' };
 
 /** @type {FormatOption} */
 const PROPOSE = { name: 'propose', label: 'Propose cameras afterwards', hint: 'from the painted lines of the pictures; a job, which can be cancelled', kind: 'switch' };

@@ -24,7 +24,7 @@ const FETCH_AHEAD_AFTER = 1500;
 
 /** @type {import('../lib/keys.js').Binding[]} */
 const GLOBAL_KEYS = [
-	{ keys: ['?', 'Shift+?'], label: 'Help: keys, legend, words, guide, practice', group: 'Everywhere', shown: '?', run: openHelp },
+	{ keys: ['?', 'Shift+?'], label: 'Help: keys, legend, glossary, guide, practice', group: 'Everywhere', shown: '?', run: openHelp },
 	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
 	{ keys: ['Shift+b'], label: 'Notifications', group: 'Everywhere', when: () => isTeam, run: openNotifications },
 	// Pages with a search field of their own bind it to that.

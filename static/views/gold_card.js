@@ -83,7 +83,7 @@ export function GoldCard({ dataset }) {
 		<section class="card card--flush" aria-labelledby="gold-title">
 			<h2 id="gold-title"><${Term} word="gold-group">Gold groups<//></h2>
 			${error || refused ? html`<${FormError} error=${error ?? refused} />` : null}
-			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} with known truth.` : 'None yet.'} Review a group, then choose <em>Mark as gold group</em> in its palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> use groups of a sample or a version. Batches mix them in without marking them.</p>
+			<p class="gold__about">${value?.groups.length ? `${plural(value.groups.length, 'group')} with known truth.` : 'None yet.'} Review a group, then choose <em>Mark as gold group</em> in the command palette (<kbd>Ctrl K</kbd>); or let <em>Assign…</em> use groups of a sample or a version. Batches mix them in without marking them.</p>
 			<p class="gold__about">While a batch is open, its annotators see neither the originals of its groups nor gold groups, every copy starts with the same kind of content, and their first submission is measured. People may still remember a frame or find it in another dataset: make gold groups of frames that the annotators have not seen.</p>
 			${value?.people.length ? html`
 				<div class="table__scroll" tabindex="0" role="region" aria-label="People and gold groups"><table class="table">

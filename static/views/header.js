@@ -50,7 +50,7 @@ export function Header({ current, of, children }) {
 			${children ?? html`<span class="header__middle"></span>`}
 			<${NotificationsButton} />
 			${myName.value ? html`<a class="header__person" href="/account" title="Your account, sessions and password" aria-current=${current === 'account' ? 'page' : undefined}>${myName.value}</a>` : null}
-			<button class="header__help" type="button" aria-label="Help" title="Help: keys, legend, words, guide, practice" onClick=${openHelp}><kbd>?</kbd></button>
+			<button class="header__help" type="button" aria-label="Help" title="Help: keys, legend, glossary, guide, practice" onClick=${openHelp}><kbd>?</kbd></button>
 		</header>
 	`;
 }

@@ -32,7 +32,7 @@ const DAYS = [7, 30, 90, 365];
 function ScopeCheck({ one }) {
 	// What one may in one dataset alone is enough: a token may it there.
 	const able = whyNot(one.action) === '';
-	const not = able ? '' : `your role, ${roleIn()}, may not`;
+	const not = able ? '' : `not allowed for your role, ${roleIn()}`;
 	return html`
 		<label class="form__check" title=${able ? undefined : not}>
 			<input type="checkbox" name="scopes" value=${one.name} disabled=${!able} defaultChecked=${one.name === 'read'} />

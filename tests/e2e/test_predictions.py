@@ -204,7 +204,7 @@ class TestEvaluationPage:
         dialog = page.get_by_role("dialog")
         expect(dialog).to_contain_text("1 view of 1 group gets a ball.")
         expect(dialog).to_contain_text("the view has a ball already")
-        page.get_by_label("Groups, as a query of the queue").fill(f"number:{number}")
+        page.get_by_label("Groups (a query as in the queue)").fill(f"number:{number}")
         page.locator("#accept-score").fill("0.9")
         expect(dialog).to_contain_text("the best prediction is below the score")
         page.locator("#accept-score").fill("0.8")

@@ -26,7 +26,7 @@ export function Cell({ cell }) {
 		<span class="cell">
 			<strong>${number(value)}</strong>
 			${low !== null && high !== null ? html`<small title="95 % interval">${number(low)} to ${number(high)}</small>` : null}
-			<small title="frames that the number is from, of all frames">${count(n)} of ${count(of)}</small>
+			<small title="frames used for this number, of all frames">${count(n)} of ${count(of)}</small>
 		</span>
 	`;
 }

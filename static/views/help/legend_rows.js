@@ -113,8 +113,8 @@ const BALLS = {
 const STRIPS = {
 	title: 'Line strips',
 	rows: [
-		{ name: 'Strip that fits', meaning: 'The picture along a marking, straightened. The paint and the points must lie on the middle line.', tokens: 'canvas-grass canvas-ok canvas-point', draw: strip('ok', 1) },
-		{ name: 'Strip that is wrong', meaning: 'Points lie beside the middle line, which is red.', tokens: 'canvas-bad', draw: strip('bad', 9) },
+		{ name: 'Strip of a line that fits', meaning: 'The picture along a marking, straightened. The paint and the points must lie on the middle line.', tokens: 'canvas-grass canvas-ok canvas-point', draw: strip('ok', 1) },
+		{ name: 'Strip of a wrong line', meaning: 'Points lie beside the middle line, which is red.', tokens: 'canvas-bad', draw: strip('bad', 9) },
 		{ name: 'Paint that was read', meaning: 'The middle of the painted line, place by place, after Shift W here or E in the calibration editor. There red means that it lies elsewhere than the lines say, and orange is everything that looks like paint.', tokens: 'canvas-reprojected canvas-bad canvas-warn', draw: strip('ok', 1, PAINT) },
 	],
 };

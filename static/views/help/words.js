@@ -31,7 +31,7 @@ export function Words() {
 			/>
 			<span class="note">In tables and gates, rest on an underlined word (or reach it with Tab) to read what it means.</span>
 		</p>
-		${error ? html`<p role="alert">The words could not be read. Is the server still running?</p>` : null}
+		${error ? html`<p role="alert">The glossary could not be read. Is the server still running?</p>` : null}
 		${value && sections.length === 0 ? html`<p class="empty-note" role="status">No word matches.</p>` : null}
 		<div class="help-words">
 			${sections.map(({ name, title, intro, words }) => html`
