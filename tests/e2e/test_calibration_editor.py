@@ -301,7 +301,9 @@ class TestPaint:
         editor.choose(marking)
         editor.press("Shift+K")
         editor.staged(1)
-        expect(editor.page.locator(".commit__state")).to_contain_text(f"{marking} moved onto the paint")
+        expect(editor.page.locator(".commit__state")).to_contain_text(
+            f"{marking} moved onto the paint"
+        )
         editor.press("Control+Delete")
         editor.staged(0)
 
