@@ -99,6 +99,11 @@ function includeBody(edit) {
 	return { included: edit.included, ...leftOutBy(edit) };
 }
 
+/** Whether a ball was followed there from another group, and not predicted. @param {string | null | undefined} source */
+export function isFollowed(source) {
+	return Boolean(source?.startsWith('followed from '));
+}
+
 /** @param {BallJson} ball */
 function ballBody(ball) {
 	const { box, point, occluded, out_of_view, inferred } = ball;

@@ -2,6 +2,7 @@
 /** What an entry of a group's history says, in words. */
 
 import { capital, words } from '../lib/format.js';
+import { isFollowed } from './edits.js';
 import { REASONS } from './reasons.js';
 
 /** @import {LogEntryJson} from '../api/history.js' */
@@ -27,13 +28,19 @@ function lineWords(lines, source = {}) {
 	return [drawn.length ? `drew ${listed(drawn)}` : '', gone.length ? `removed ${listed(gone)}` : '', hidden.length ? `marked ${listed(hidden)} as not visible` : ''].filter(Boolean).join(' and ') || 'changed lines';
 }
 
+/** @param {any[] | undefined} balls */
+function ballWords(balls) {
+	if (!balls?.length) return 'removed the ball';
+	return isFollowed(balls[0].predicted_by) ? `accepted the ball ${balls[0].predicted_by}` : 'placed the ball';
+}
+
 /** @param {any} edit @param {(view: string) => string} letterOf */
 function editWords(edit, letterOf) {
 	const where = edit.view ? ` in ${letterOf(edit.view)}` : '';
 	switch (edit.edit) {
 		case 'set_lines': return `${lineWords(edit.lines, edit.source)}${where}`;
 		case 'set_station_lines': return `${lineWords(edit.lines, edit.source)} of a static camera`;
-		case 'set_balls': return `${edit.balls?.length ? 'placed the ball' : 'removed the ball'}${where}`;
+		case 'set_balls': return `${ballWords(edit.balls)}${where}`;
 		case 'include_view': return edit.included ? `included view ${letterOf(edit.view)}` : `left view ${letterOf(edit.view)} out${edit.reason ? `: ${reasonWords(edit.reason)}` : ''}`;
 		case 'set_calibration': return `chose the ${edit.calibration} calibration${where}`;
 		case 'set_picture': return `set how the picture was changed${where}`;

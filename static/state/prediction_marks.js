@@ -3,6 +3,7 @@
 
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { boxCenter } from '../geometry/ball.js';
+import { isFollowed } from './edits.js';
 
 /** @import {AcceptedJson, GroupPredictionsJson, PredictionJson} from '../api/evaluations.js' */
 /** @import {BallJson, GroupDocument, ViewJson} from '../api/types.js' */
@@ -65,7 +66,7 @@ function originOf(view, items, said) {
 	if (!name) return null;
 	const known = said?.name === name ? said : null;
 	const score = known?.score ?? items.find((item) => isTaken(view, item))?.score ?? null;
-	const parts = [`predicted by ${name}`];
+	const parts = [isFollowed(name) ? name : `predicted by ${name}`];
 	if (score !== null) parts.push(`score ${score.toFixed(2)}`);
 	if (known?.by) parts.push(`accepted by ${known.by}`);
 	return parts.join(', ');

@@ -6,6 +6,7 @@ import { useLayoutEffect, useRef } from 'preact/hooks';
 
 import { ballOf } from '../geometry/preview.js';
 import { pixelText, scoreText } from '../lib/format.js';
+import { isFollowed } from '../state/edits.js';
 import { objectsOf, sameObject } from '../state/tab_order.js';
 import { boxes, editing, selected } from '../state/workspace.js';
 
@@ -20,7 +21,7 @@ function wordsFor(picture, object) {
 	if (object.kind === 'ball') {
 		const ball = ballOf(picture.view);
 		const size = ball?.box ? `Ø ${pixelText((ball.box[2] + ball.box[3]) / 2)}` : '';
-		return { name: 'Ball', point: ball?.predicted_by ? 'was predicted' : '', number: size, title: picture.predictions?.origin ?? undefined };
+		return { name: 'Ball', point: isFollowed(ball?.predicted_by) ? 'was followed' : ball?.predicted_by ? 'was predicted' : '', number: size, title: picture.predictions?.origin ?? undefined };
 	}
 	if (object.kind === 'prediction') {
 		const mark = picture.predictions?.marks.find(({ id }) => id === object.prediction);

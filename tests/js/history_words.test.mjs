@@ -17,6 +17,11 @@ describe('sentenceOfEntry', () => {
 		assert.equal(said('edit', { edit }), 'Removed the ball in B; removed “Circle left” in B');
 		assert.equal(said('undo', { edit }), 'Undid: removed the ball in B; removed “Circle left” in B');
 	});
+	it('says where a ball was followed from', () => {
+		const ball = (source) => ({ edit: { edit: 'set_balls', view: 'x', balls: [{ predicted_by: source }] } });
+		assert.equal(said('edit', ball('followed from 106')), 'Accepted the ball followed from 106 in B');
+		assert.equal(said('edit', ball('')), 'Placed the ball in B');
+	});
 	it('says what was decided, and why', () => {
 		assert.equal(said('verdict', { state: 'rejected', reason: 'bad_field_lines', note: 'no', override: null }), 'Rejected because of bad field lines: “no”');
 	});

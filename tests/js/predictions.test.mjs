@@ -55,6 +55,8 @@ describe('marksOf', () => {
 		assert.equal(own.origin, 'predicted by new, score 0.90');
 		const said = { ...found, accepted: [{ view: 11, name: 'new', score: 0.9, by: 'ana', at: null }] };
 		assert.equal(marksOf(said, after, all).get('7.png').origin, 'predicted by new, score 0.90, accepted by ana');
+		const followed = { ...group, views: group.views.map((view) => (view.key === '7.png' ? { ...view, balls: [{ ...after.views[0].balls[0], predicted_by: 'followed from 106' }] } : view)) };
+		assert.equal(marksOf(found, followed, all).get('7.png').origin, 'followed from 106');
 	});
 
 	it('says nothing of a ball that a person drew', () => {

@@ -8,11 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sqlalchemy import insert
 
 from app.config import Settings
 from app.db.store import Store
 from app.errors import ConflictError, ImageError, InputError, NotFoundError
 from app.features.groups.state import read_state
+from app.features.independent_annotations.tables import GoldModel
+from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.tracks import follow
 from app.features.tracks.follow import FollowedViews, follow_view
 from app.features.tracks.queries import place_of_group
@@ -108,6 +111,27 @@ class TestFollowView:
         ids = fill(*groups)
         found = follow_view(store, frames, view_of(store, ids[10]))
         assert found.items[-1].frame == FIRST + 12
+
+    def test_groups_that_are_hidden_from_whoever_asks_take_no_part(
+        self, store: Store, fill: Fill, frames: Frames, folder: Path
+    ) -> None:
+        ids = fill(*filmed_groups(folder, COUNT, CAMERA, said=[CLICKED, FIRST + 13]))
+        view = view_of(store, ids[10])
+        with store.write() as session:
+            dataset = place_of_group(session, ids[13]).dataset_id
+            gold = {"group_id": ids[13], "dataset_id": dataset, "start": "bare"}
+            session.execute(
+                insert(GoldModel), {**gold, "truth": b"", "marked": "x", "marked_by": "lea"}
+            )
+        blind = RestrictedReader("ann", {dataset: frozenset({1})}, lambda _: False)
+        token = READER.set(blind)
+        try:
+            found = follow_view(store, frames, view, each_way=5)
+        finally:
+            READER.reset(token)
+        assert [item.frame - CLICKED for item in found.items] == [-5, -4, -3, -2, -1, 1, 2, 4, 5]
+        assert found.after == "limit"
+        assert follow_view(store, frames, view, each_way=5).after == "known"
 
     def test_as_far_as_is_asked(
         self, store: Store, fill: Fill, frames: Frames, folder: Path
