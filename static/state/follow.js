@@ -52,7 +52,7 @@ export async function startFollow(view) {
 	const center = ball && ballCenter(ball);
 	if (!center) return complain(`View ${view.letter} has no ball to follow. Press N to draw it.`);
 	const { id: station, shared } = view.station;
-	if (!shared) return complain(`The camera of view ${view.letter} moves. A ball is followed through views of a camera that stands still, and in the player of a recording.`);
+	if (!shared) return complain(`The camera of view ${view.letter} is not static. A ball can be followed through groups of static cameras, and in the player of a recording.`);
 	const mine = new AbortController();
 	stop = mine;
 	follow.value = { dataset, camera: view.label, letter: view.letter, station, found: null };
@@ -80,22 +80,22 @@ function tell(found) {
 	}
 	follow.value = null;
 	const known = found.before === 'known' || found.after === 'known';
-	inform(known ? 'The ball was followed no further: the groups before or after have a ball already, which stays.'
-		: 'The ball was followed into no other group: it is not seen in the frames before and after.');
+	inform(known ? 'The ball was not followed further: the groups before or after already have a ball, which is kept.'
+		: 'The ball was not found in the frames before and after.');
 }
 
 /** Put away what was followed, or leave it. */
 export function endFollow() {
 	stop.abort();
 	follow.value = null;
-	announce('What was followed is put away; nothing was changed.');
+	announce('The followed ball was dismissed; nothing was changed.');
 }
 
 /** Make followed balls those of their views. @param {FollowedItem[]} items */
 export async function acceptFollowed(items) {
 	const at = follow.value;
 	if (!at?.found) return announce('The ball is still being followed.');
-	if (items.length === 0) return complain('What is left is uncertain: look at each, and accept it with Y.');
+	if (items.length === 0) return complain('The remaining views are uncertain: check each, and accept it with Y.');
 	const from = at.found.group;
 	/** @type {FollowDone} */
 	const action = {
@@ -131,7 +131,7 @@ export async function undoFollow(action) {
 	if (!done) return;
 	forget(action);
 	if (done.changed) tookBack(done.action);
-	inform(`${plural(done.changed, 'ball')} taken away again.${stayed(done.refused)}`, done.changed ? { label: 'Redo', run: () => redoFollow(done.action) } : undefined);
+	inform(`${plural(done.changed, 'ball')} removed again.${stayed(done.refused)}`, done.changed ? { label: 'Redo', run: () => redoFollow(done.action) } : undefined);
 }
 
 /** Place balls again that were taken away. @param {FollowDone} action */

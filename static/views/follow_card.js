@@ -13,7 +13,7 @@ import { Term } from './term.js';
 
 const ENDS = {
 	lost: 'the ball is lost', left: 'the ball left the picture', known: 'a group has a ball already', end: 'no more groups',
-	limit: 'followed no further',
+	limit: 'the limit is reached',
 };
 
 /** @param {{found: FollowedBall, here: number | undefined}} props */
@@ -29,7 +29,7 @@ function Strip({ found, here }) {
 function Found({ found }) {
 	const [certain, open] = [sure.value.length, unsure.value.length];
 	const here = unsure.value.some((item) => item.group === group.value?.id);
-	const why = certain ? '' : 'What is left is uncertain: look at each, and accept it with Y';
+	const why = certain ? '' : 'The remaining views are uncertain: check each, and accept it with Y';
 	return html`
 		<dl class="facts">
 			<dt>Frames</dt><dd>${found.first} to ${found.last}</dd>
@@ -41,8 +41,8 @@ function Found({ found }) {
 		${open ? html`
 			<p class="follow__open">${plural(open, 'uncertain view')}${open === 1 ? ' is' : ' are'} left out. <button class="link-button" type="button" onClick=${nextUnsure}>Look at the next</button>${here ? html`<br />Press <kbd>Y</kbd> to accept the one that is shown here.` : null}</p>` : null}
 		<div class="follow__tools">
-			<button data-needs="annotate" class="button button--primary" type="button" aria-disabled=${why !== ''} title=${why || 'One undo takes all of them back (Shift+Q)'} onClick=${() => { if (!why) acceptFollowed(sure.value); }}>
-				${certain ? `Accept ${plural(certain, 'ball')}` : 'Nothing sure left'} <kbd>⇧Q</kbd>
+			<button data-needs="annotate" class="button button--primary" type="button" aria-disabled=${why !== ''} title=${why || 'One undo removes all of them (Shift+Q)'} onClick=${() => { if (!why) acceptFollowed(sure.value); }}>
+				${certain ? `Accept ${plural(certain, 'ball')}` : 'Only uncertain views left'} <kbd>⇧Q</kbd>
 			</button>
 			<button class="button" type="button" title="Change nothing (Esc)" onClick=${endFollow}>Dismiss</button>
 		</div>

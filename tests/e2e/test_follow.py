@@ -100,9 +100,9 @@ def test_a_ball_is_followed_looked_at_accepted_and_taken_back(
     expect(card).to_be_hidden()
     assert sources(page)[HIDDEN] == said
     page.keyboard.press("Control+z")
-    expect(notice).to_contain_text("1 ball taken away")
+    expect(notice).to_contain_text("1 ball removed again")
     page.keyboard.press("Control+z")
-    expect(notice).to_contain_text(f"{COUNT - 2} balls taken away")
+    expect(notice).to_contain_text(f"{COUNT - 2} balls removed again")
     assert sources(page) == [before[place == CLICKED] for place in range(COUNT)]
     page.keyboard.press("Control+y")
     expect(notice).to_contain_text(f"{COUNT - 2} balls placed again")
