@@ -272,7 +272,7 @@ def _views_contradict_finding(item: Contradiction, group: Group, ball: Ball3D | 
     one = "The two views do" if len(found.views) == 2 else "The views do"
     sentences = [
         f"{one} not agree on one ball: consistent views have residuals as large as these "
-        f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in only "
+        f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in "
         f"{odds_text(found.p_value)}."
     ]
     if ball is not None and item.widening > 1:

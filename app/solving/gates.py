@@ -392,12 +392,12 @@ def odds_text(p_value: float) -> str:
 
     Example:
         >>> chance(0.31), chance(0.0004), chance(1e-12)
-        ('31 % of groups', '1 of 2,500 groups', 'less than 1 of a million groups')
+        ('31 % of groups', '1 of 2,500 groups', 'fewer than 1 of a million groups')
     """
     if p_value >= 0.01:
         return f"{p_value:.0%} of groups".replace("%", " %")
     if p_value < 1e-6:
-        return "less than 1 of a million groups"
+        return "fewer than 1 of a million groups"
     return f"1 of {float(f'{1 / p_value:.2g}'):,.0f} groups"
 
 

@@ -166,7 +166,7 @@ class TestAround:
         answer = flights.request.patch(view, data=edit, headers=etag)
         assert answer.ok, answer.text()
         now = flights.locator(f'[data-around="{at}"]')
-        expect(now).to_contain_text("As its groups are now")
+        expect(now).to_contain_text("With the present groups")
         expect(flights.get_by_role("button", name="Accept")).to_have_attribute(
             "aria-disabled", "true"
         )

@@ -103,7 +103,7 @@ class AcceptedTruth:
         """The tables, those that are flattered with a warning in their note."""
         if not self.frames:
             return list(tables)
-        own = f", {self.own} of them from the very set that is evaluated" if self.own else ""
+        own = f", {self.own} of them from the evaluated set itself" if self.own else ""
         warning = (
             f"Warning: the ball of {self.frames} of {self.of} frames is an accepted "
             f"prediction{own}; this makes the detector that predicted it look too good."

@@ -113,14 +113,14 @@ function chartsOf(frames, around) {
 		const { values, low, high, raw } = curvesOf(frames, /** @type {0 | 1 | 2} */ (axis));
 		const track = { label, values, low, high, gaps: true, colour: /** @type {const} */ ('chart-a') };
 		const alone = { label: `${label.split(',')[0]} of each frame alone`, values: raw, colour: /** @type {const} */ ('chart-b'), points: 4 };
-		const now = around && { label: 'as its groups are now', values: amid(frames.frame, around, curvesOf(around, /** @type {0 | 1 | 2} */ (axis)).values), gaps: true, colour: /** @type {const} */ ('chart-c'), dash: [6, 4] };
+		const now = around && { label: 'with the present groups', values: amid(frames.frame, around, curvesOf(around, /** @type {0 | 1 | 2} */ (axis)).values), gaps: true, colour: /** @type {const} */ ('chart-c'), dash: [6, 4] };
 		return { name: `${label} of the ball in each frame, with a band of two sigma`, yLabel: label, curves: /** @type {Curve[]} */ ([alone, track, ...(now ? [now] : [])]), format: centimetres };
 	});
 	const most = mostShown(frames.left_out_px);
 	/** @type {Curve} */
 	const left = { label: `left-out error, px (up to ${most})`, values: frames.left_out_px.map((value) => (value === null ? null : Math.min(value, most))), colour: 'chart-d', points: 4 };
 	/** @type {Curve[]} */
-	const now = around ? [{ label: 'as its groups are now', values: amid(frames.frame, around, around.left_out_px).map((value) => (value === null ? null : Math.min(value, most))), colour: 'chart-c', points: 4 }] : [];
+	const now = around ? [{ label: 'with the present groups', values: amid(frames.frame, around, around.left_out_px).map((value) => (value === null ? null : Math.min(value, most))), colour: 'chart-c', points: 4 }] : [];
 	return [...charts, { name: 'Error of left-out balls, by frame', yLabel: 'px', curves: [left, ...now], format: tenths, yRange: /** @type {[number | null, number | null]} */ ([0, null]) }];
 }
 
@@ -131,7 +131,7 @@ function Now({ around, at }) {
 	const where = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' ? `${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(-z, 2)} m up` : null;
 	return html`
 		<div class="track__now" data-around=${at}>
-			<p><strong>As its groups are now:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left-out error ${fixed(left, 1)} px` : ''}.</p>
+			<p><strong>With the present groups:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left-out error ${fixed(left, 1)} px` : ''}.</p>
 			<p class="note">Dashed in the curves, frames ${around.frame[0]} to ${around.frame.at(-1)}. The saved track stays as it is until it is made again.</p>
 		</div>
 	`;

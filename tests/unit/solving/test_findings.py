@@ -210,7 +210,7 @@ class TestViewsContradict:
         wide = replace(GOOD, sigma_m=0.94)
         test = ChiSquare(350.0, 1, 4e-78, ("a", "b"))
         (item, _) = found(made("ab"), torn=Contradiction(test, None, None), ball=wide)
-        assert "(χ² 350.0, 1 degree of freedom) in only less than 1 of a million" in item.sentence
+        assert "(χ² 350.0, 1 degree of freedom) in fewer than 1 of a million" in item.sentence
         assert "Because of this, sigma is 18.7 times larger: 0.94 m" in item.sentence
 
     def test_where_nobody_knows_the_cameras_the_way_to_their_noise_is_told(self) -> None:

@@ -411,7 +411,7 @@ class TestChiSquare:
             (0.31, "31 % of groups"),
             (0.01, "1 % of groups"),
             (0.0004, "1 of 2,500 groups"),
-            (0.0, "less than 1 of a million groups"),
+            (0.0, "fewer than 1 of a million groups"),
         ],
     )
     def test_chance_is_said_for_people(self, p_value, words):

@@ -183,7 +183,7 @@ class TestRunEvaluation:
             for run in (own, other)
         ]
         assert all("Warning: the ball of 1 of 6 frames is an accepted" in note for note in notes)
-        assert ["the very set" in note for note in notes] == [True, False]
+        assert ["the evaluated set itself" in note for note in notes] == [True, False]
 
     @pytest.mark.parametrize(
         ("change", "error"),

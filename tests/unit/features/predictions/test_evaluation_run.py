@@ -36,7 +36,7 @@ class TestAcceptedTruth:
         assert AcceptedTruth(0, 0, 3).warn(tables) == tables
         first, second = AcceptedTruth(2, 1, 3).warn(tables)
         assert first.note.startswith("Note. Warning: the ball of 2 of 3 frames")
-        assert "1 of them from the very set" in first.note
+        assert "1 of them from the evaluated set itself" in first.note
         assert second == tables[1]
 
 
