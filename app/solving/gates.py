@@ -391,7 +391,7 @@ def odds_text(p_value: float) -> str:
     """How often something happens, for people.
 
     Example:
-        >>> chance(0.31), chance(0.0004), chance(1e-12)
+        >>> odds_text(0.31), odds_text(0.0004), odds_text(1e-12)
         ('31 % of groups', '1 of 2,500 groups', 'fewer than 1 of a million groups')
     """
     if p_value >= 0.01:
