@@ -46,7 +46,7 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
     until(page, lambda: page.url.endswith("/datasets/sample/agreement"))
     expect(page.get_by_text("Nothing to decide")).to_be_visible()
     groups = page.get_by_role("region", name="Groups, most disagreement first", exact=True)
-    expect(groups).to_contain_text("ada’s, chosen by local")
+    expect(groups).to_contain_text("ada’s annotation, chosen by local")
     withdraw_verdict(page, group)
 
     agreement = "/api/v1/datasets/sample/agreement"
