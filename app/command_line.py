@@ -163,7 +163,7 @@ def run() -> None:
         name = quoted(str(error.filename), SHOWN)
         if isinstance(error, PermissionError):
             print_error(
-                f"this user may not look at {name}",
+                f"this user has no permission to read {name}",
                 "Give this user access (chmod, chown), or run the command as another user.",
             )
         else:
@@ -180,8 +180,8 @@ def run() -> None:
         if "cannot cache function" not in str(error):
             raise
         print_error(
-            "this user can write neither to the installation nor to a cache of its own, where the"
-            " compiled solver is kept",
-            "Point NUMBA_CACHE_DIR at a folder that this user alone can write.",
+            "this user cannot write to any folder in which the compiled solver can be cached"
+            " (neither to the installation nor to the user's own cache)",
+            "Set NUMBA_CACHE_DIR to a folder that only this user can write to.",
         )
         sys.exit(1)

@@ -95,9 +95,7 @@ class StoreSettings(BaseModel):
     def _require_one_login_method(self) -> StoreSettings:
         given = (self.key is not None and self.secret is not None, self.key_file is not None)
         if sum((*given, self.anonymous)) != 1:
-            raise ValueError(
-                "needs key and secret, or key_file, or anonymous, and only one of them"
-            )
+            raise ValueError("needs exactly one of these: key and secret, key_file, or anonymous")
         if self.endpoint is not None and not _URL.fullmatch(self.endpoint.lower()):
             raise ValueError("endpoint must be an address such as https://minio.example.org:9000")
         return self
@@ -263,7 +261,7 @@ class Settings(BaseSettings):
         if value is None or _URL.fullmatch(value.lower()):
             return None if value is None else value.lower().rstrip("/")
         raise ValueError(
-            "must be the beginning of an address, such as https://touchline.example.org"
+            "must be the base URL of the server, such as https://touchline.example.org"
         )
 
     @model_validator(mode="after")
@@ -276,7 +274,10 @@ class Settings(BaseSettings):
             )
         self.database_url = read_private(self.database_url_file, "TOUCHLINE_DATABASE_URL_FILE")
         if not self.database_url:
-            raise InputError(f"{self.database_url_file} is empty, and should hold an address")
+            raise InputError(
+                f"{self.database_url_file}, which TOUCHLINE_DATABASE_URL_FILE names, is empty;"
+                " write the database URL into it"
+            )
         return self
 
     @property

@@ -24,8 +24,8 @@ def read_private(path: Path, variable: str) -> str:
     try:
         if is_open_to_others(path.stat()):
             raise InputError(
-                f"other users can read {path}, which {variable} names",
-                hint=f"chmod 600 {path}",
+                f"other users can read the file {path}, which {variable} names",
+                hint=f"Run chmod 600 {path}.",
             )
         return path.read_text("utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:

@@ -190,12 +190,15 @@ class SharedStationError(ConflictError):
     """
 
     def __init__(self, view: str, station: int, station_key: str, what: str = "lines"):
-        hint = f"Edit the lines of station {station} instead."
+        message = f"view {view} has no lines of its own: it uses those of camera {station_key}"
+        hint = f"Edit the lines of static camera {station} instead."
         if what != "lines":
-            hint = "A static camera's picture is as it was taken: correct its given camera instead."
-        super().__init__(
-            f"view {view} takes its {what} from the static camera {station_key}", hint=hint
-        )
+            message = (
+                f"the picture geometry of view {view} cannot be set: the view belongs to the"
+                f" static camera {station_key}"
+            )
+            hint = "Correct the given camera of the static camera instead."
+        super().__init__(message, hint=hint)
         self.station = station
 
 
@@ -208,7 +211,7 @@ class HeldGroupError(ConflictError):
     """
 
     def __init__(self, message: str, here: Sequence[Any]):
-        super().__init__(message, hint="Take it over, or go on with the next one.")
+        super().__init__(message, hint="Take the group over, or continue with the next one.")
         self.here = here
 
 

@@ -193,9 +193,7 @@ def read_mail_server(settings: Settings) -> MailServer | None:
         raise InputError(f"TOUCHLINE_SMTP_FROM: {error.message}", hint=error.hint) from None
     password = _password(settings)
     if bool(settings.smtp_user) != bool(password):
-        raise InputError(
-            "TOUCHLINE_SMTP_USER and its password are given one without the other", hint=_HINT
-        )
+        raise InputError("TOUCHLINE_SMTP_USER and its password must be set together", hint=_HINT)
     if not f"{settings.smtp_user or ''}{password}".isascii():
         raise InputError("TOUCHLINE_SMTP_USER and its password must be ASCII")
     return MailServer(

@@ -170,7 +170,7 @@ class WorkerPool:
                 return task
             if bounded and len(self._tasks) >= self._most:
                 raise OverloadedError(
-                    f"{len(self._tasks)} {self._what} are being made or wait already",
+                    f"{len(self._tasks)} requests for {self._what} already run or wait",
                     hint="Try again in a moment.",
                 )
             self._tasks.add(task)

@@ -85,9 +85,10 @@ class WorkerEnded(Exception):  # noqa: N818
         super().__init__(
             {
                 "memory": f"needs more than {limits.memory / 2**20:,.0f} MiB of memory",
-                "processor": f"takes more than {limits.processor:,.0f} seconds to work out",
-                "silence": f"was at work for {limits.silence:,.0f} seconds without a result",
-                "killed": "was not finished: its process was killed, most likely for want of memory",
+                "processor": f"takes more than {limits.processor:,.0f} seconds of processor time",
+                "silence": f"gave no result or progress for {limits.silence:,.0f} seconds",
+                "killed": "was not finished: its process was killed, most likely because the machine ran"
+                " out of memory",
                 "terminated": "was not finished: its process was stopped",
                 "crash": "made its process crash",
             }[reason]

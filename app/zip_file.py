@@ -54,7 +54,7 @@ def open_zip(path: Path | StoredPath) -> zipfile.ZipFile:
         StorageError, NotFoundError: Its store cannot be asked, or has it no more.
     """
     if isinstance(path, Path) and not stat.S_ISREG(path.stat().st_mode):
-        raise zipfile.BadZipFile("is not a plain file")
+        raise zipfile.BadZipFile("is not a regular file")
     return _open_zip_part(_whole_file(path))
 
 
@@ -234,7 +234,7 @@ class FilePart(io.RawIOBase):
         """Set where the next read begins."""
         place = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
         if place < 0:
-            raise OSError(errno.EINVAL, "a position before the beginning")
+            raise OSError(errno.EINVAL, "the position lies before the beginning of the file")
         self._at = place
         return place
 

@@ -83,7 +83,10 @@ def back_up(settings: Settings, out: Path, folders: Sequence[str] = ()) -> Backu
     """
     require_file(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
     if not settings.database_file.exists() and not signs_of_use(settings):
-        raise InputError(f"there is no database in {settings.home}", hint="Set TOUCHLINE_HOME.")
+        raise InputError(
+            f"there is no database in {settings.home}",
+            hint="Set TOUCHLINE_HOME to the home folder of an installation.",
+        )
     lock = DatabaseInUse(settings)
     try:
         if lock.alone:
@@ -98,8 +101,10 @@ def require_file(settings: Settings, done: str, command: str) -> None:
     """Raise InputError where the database is a server's, whose own programs copy it."""
     if not dialect_of(settings).is_file:
         raise InputError(
-            f"{settings.database_name} is {done} by the programs of its server",
-            hint=f"Run {command}; the files of the home (uploads, exports) are copied as files.",
+            f"{settings.database_name} is a PostgreSQL database, which is {done} with the"
+            " programs of PostgreSQL",
+            hint=f"Run {command}, and copy the files of the home folder (uploads, exports)"
+            " yourself.",
         )
 
 
@@ -152,7 +157,8 @@ def read_manifest(backup: zipfile.ZipFile) -> BackupManifest:
         return BackupManifest(**values)
     except (KeyError, ValueError, TypeError) as error:
         raise InputError(
-            f"{backup.filename} is not a backup of Touchline: its manifest.json is missing or unknown"
+            f"{backup.filename} is not a backup of Touchline: its manifest.json is missing or"
+            " has an unknown format"
         ) from error
 
 
@@ -174,10 +180,14 @@ def verify_backup(path: Path) -> BackupManifest:
                         _digest_chunks(iter(lambda: member.read(_CHUNK), b""))
                         != manifest.files[name]
                     ):
-                        raise InputError(f"{path}, {name}: not what was written")
+                        raise InputError(
+                            f"the file {name} in the backup {path} is damaged: its checksum differs from the"
+                            " one in the manifest"
+                        )
     except (zipfile.BadZipFile, EOFError, OSError, zlib.error) as error:
         raise InputError(
-            f"{path} is damaged or no backup of Touchline ({error})", hint="Use another backup."
+            f"{path} is damaged or is not a backup of Touchline ({error})",
+            hint="Use another backup.",
         ) from error
     return manifest
 
@@ -271,7 +281,8 @@ def _copy_database(settings: Settings, copy: Path) -> None:
             driver.backup(target)
     except pysqlite3.dbapi2.Error as error:
         raise StorageError(
-            f"the database cannot be copied: {error}", hint="Is there room on the disk? " + EXAMINE
+            f"the database cannot be copied: {error}",
+            hint="Check that the disk has free space. " + EXAMINE,
         ) from error
     finally:
         engine.dispose()
@@ -354,8 +365,8 @@ def _report_read_errors(path: Path) -> Iterator[None]:
     except OSError as error:
         raise StorageError(
             f"{path} cannot be read: {error.strerror or error}",
-            hint="Make the file readable for this user, or look after the disk; no backup was"
-            " written.",
+            hint="Make the file readable for this user, or check the disk for faults; no backup"
+            " was written.",
         ) from error
 
 

@@ -55,7 +55,7 @@ def make_home(settings: Settings) -> Path:
         settings.home.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(
-            f"the home folder {settings.home} cannot be made: {error.strerror}",
+            f"the home folder {settings.home} cannot be created: {error.strerror}",
             hint="Set TOUCHLINE_HOME to a folder that this user may write to.",
         ) from error
     kind = file_system(settings.home)
@@ -197,8 +197,9 @@ def installation_key(settings: Settings, name: str) -> bytes:
         raise refused_file_error(path, error) from error
     if len(key) != _BYTES:
         raise DamagedError(
-            f"{path} is not a key: it has {len(key)} bytes, not {_BYTES}",
-            hint="Restore the file from a copy. If you delete it, a new key is made, and what the old key signed or locked is no longer valid.",
+            f"{path} is not a valid secret key: it has {len(key)} bytes, not {_BYTES}",
+            hint="Restore the file from a copy. If you delete it, the server makes a new key, and"
+            " everything that was signed or encrypted with the old key becomes invalid.",
         )
     return key
 

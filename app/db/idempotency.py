@@ -201,14 +201,17 @@ class PendingResponse(Generic[R]):
             RuntimeError: The request was answered in an earlier transaction.
         """
         if self._committed is not None:
-            raise RuntimeError("a request is answered once: use without_response for inner work")
+            raise RuntimeError(
+                "the response of this request is stored already: wrap the inner work in"
+                " without_response"
+            )
         response: R | None = None
         if self._request is not None:
             key, response = self._request.key, self._make(outcome)
             stored = self._encode(response, key.request_digest)
             if not insert_response(session, key.key, key.actor, stored):
                 raise ConflictError(
-                    "the same request was answered in the meantime",
+                    "another copy of this request was carried out first",
                     hint="Wait, then send it again with the same Idempotency-Key.",
                 )
         session.once_kept(lambda: self._commit(outcome, response))
@@ -228,7 +231,9 @@ class PendingResponse(Generic[R]):
             return self._make(outcome)
         answered, response = self._committed
         if answered is not outcome:
-            raise RuntimeError("a route must return the outcome that its request is answered with")
+            raise RuntimeError(
+                "a route must return the same outcome that it stored the response for"
+            )
         return self._make(outcome) if response is None else response
 
 

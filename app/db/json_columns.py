@@ -95,4 +95,4 @@ def decompress(data: bytes) -> bytes:
 
 
 def _damaged_record_error() -> DamagedError:
-    return DamagedError("the database holds a record that is not what was written", hint=EXAMINE)
+    return DamagedError("a record in the database is damaged: it cannot be decoded", hint=EXAMINE)

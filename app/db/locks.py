@@ -50,7 +50,8 @@ def require_lock(handle: int, held: str, seconds: float) -> None:
     if not lock_within(handle, seconds):
         raise BusyError(
             f"another Touchline process {held} for {seconds:.0f} seconds",
-            hint="Wait until it is done. One that was stopped (Ctrl-Z) goes on with fg.",
+            hint="Wait until that process is done. If it was suspended with Ctrl-Z, continue it"
+            " with fg.",
         )
 
 

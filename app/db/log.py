@@ -262,7 +262,8 @@ def verify_chain(session: Session) -> int:
         previous = chain_hash(previous, count, entry, canonical(entry.body).encode())
         if entry.id != count or entry.hash != previous:
             raise DamagedError(
-                f"row {entry.id} of the log is not what was written",
+                f"row {entry.id} of the log was changed or is damaged: its hash does not continue"
+                " the hash chain",
                 hint=dialect_in(session).restoring,
             )
     return count

@@ -86,9 +86,9 @@ def bring_up_to_date(settings: Settings, *, alone: bool) -> MigrationResult:
             if revision not in (None, SCHEMA_REVISION):
                 if not alone:
                     raise StorageError(
-                        "another Touchline process has the database open: its schema cannot be"
-                        " changed meanwhile",
-                        hint="Stop it, then run touchline migrate.",
+                        "another Touchline process has the database open, so its schema cannot be changed"
+                        " now",
+                        hint="Stop that process, then run touchline migrate.",
                     )
                 if dialect.is_file:
                     copy = _backup_folder(settings) / COPY.format(SCHEMA_REVISION)

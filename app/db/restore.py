@@ -83,7 +83,9 @@ def _restore_in_folder(settings: Settings, source: Path, folder: Path) -> Restor
     if anchor.schema not in KNOWN_REVISIONS:
         raise newer_schema(anchor.schema, settings)
     if expected not in (None, (anchor.entries, anchor.hash)):
-        raise DamagedError(f"the log in {source} is not the one that its manifest names")
+        raise DamagedError(
+            f"the log in the backup {source} differs from the log that its manifest describes"
+        )
     files = sum(1 for path in folder.rglob("*") if path.is_file()) - 1
     # The files of the backup, and those of its database's log, which SQLite may have left.
     os.sync()
@@ -124,7 +126,9 @@ def _safe_member_path(name: str, source: Path) -> PurePosixPath:
     path = PurePosixPath(name)
     ours = path.parts[0] in (*FRAMES, *EXPORTS) and len(path.parts) > 1
     if name != DATABASE and (not ours or ".." in path.parts):
-        raise InputError(f"{source}, {name}: no file of a home")
+        raise InputError(
+            f"the backup {source} contains {name}, which is not a file of a Touchline home"
+        )
     return path
 
 
@@ -134,7 +138,7 @@ def _copy_files(source: Path, folder: Path) -> bool:
     if header is None:
         raise InputError(
             f"{source} is neither a backup of Touchline nor a database ({MAGIC[:13].decode()})",
-            hint="touchline backup makes one.",
+            hint="Make a backup with touchline backup.",
         )
     log = read_log(log_file(source))
     shutil.copyfile(source, folder / DATABASE)

@@ -152,12 +152,14 @@ class Store:
             BusyError: There would be something to wait for; ``read_one`` waits for it.
         """
         if self._peeker is None:
-            raise BusyError("the database cannot answer without waiting")
+            raise BusyError("the database cannot be read now without waiting for another process")
         try:
             with self._noting_damage(), Session(self._peeker) as session:
                 yield session
         except NoConnectionError as error:
-            raise BusyError("another thread is using the connection that never waits") from error
+            raise BusyError(
+                "another thread is using the connection for reads that must not wait"
+            ) from error
 
     @contextmanager
     def write(self, *, lasting: bool = True) -> Iterator[Session]:
@@ -186,7 +188,9 @@ class Store:
             yield session
             session.store_response()
             if not lasting and session.log_end is not None:
-                raise RuntimeError("entries of the log must be on the disk")
+                raise RuntimeError(
+                    "a write with log entries must be durable: call write() without lasting=False"
+                )
             self._require_anchored(session)
             if self._file is not None:
                 self._file.require_there()
@@ -286,7 +290,8 @@ class Store:
         expected = max(there.entries, self._anchor.entries)
         if session.log_before < expected:
             raise DamagedError(
-                f"the log ends after {session.log_before:,} entries, but this home has noted {expected:,}",
+                f"the log ends after {session.log_before:,} entries, but this home recorded"
+                f" {expected:,}",
                 hint=EXAMINE,
             )
 

@@ -115,14 +115,16 @@ def read_predictions(
             raise run.found.report.problems[0]
         run.found.format = kind
         if images is not None and kind != "coco":
-            raise _unused_option_error("images", "a COCO document", kind)
+            raise _unused_option_error("images", "a COCO document with the image list", kind)
         if size is not None and kind == "yolo":
-            raise _unused_option_error("size", "a size: its numbers are shares of the image", kind)
+            raise _unused_option_error(
+                "size", "an image size: its coordinates are fractions of the image size", kind
+            )
         if kind == "tracks":
             if size is not None or category is not None:
                 option = "size" if size is not None else "category"
                 raise _unused_option_error(
-                    option, f"a {option}: its balls are places on the pitch", kind
+                    option, f"a {option}: its rows are positions on the pitch", kind
                 )
             run.found.tracks = read_tracks(tree, path, run.found.report, limits)
             return run.found
@@ -139,7 +141,9 @@ def read_predictions(
 
 def _unused_option_error(option: str, what: str, kind: str) -> InputError:
     return InputError(
-        f"{kind} does not use {what}", hint=f"Leave {option} out.", pointer=f"/{option}"
+        f"predictions in the format {kind} do not use {what}",
+        hint=f"Leave {option} out.",
+        pointer=f"/{option}",
     )
 
 
@@ -184,7 +188,7 @@ def read_predicted_cameras(
     sizes: dict[str, ImageSize] = {}
     cameras = read_cameras(path, found.report, limits, sizes)
     if not cameras:
-        problem = InputError(f"{path.name} holds no camera files")
+        problem = InputError(f"{path.name} contains no camera files (camera_<frame>.json)")
         raise found.report.problems[0] if found.report.problems else problem
     for name, camera in cameras.items():
         frame = names.find(name)
@@ -330,7 +334,7 @@ def _add_id(index: IdIndex[str], item: Mapping[str, Any], name: str) -> None:
             None if known is None else f"is {id_text(value)}, which is {quoted(known)} already"
         )
         raise FieldError(
-            "id", f"{known_as or 'must be a number or a text'}; this entry is left out"
+            "id", f"{known_as or 'must be a number or a string'}; this entry is left out"
         )
 
 
@@ -422,7 +426,7 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionRun) -> None:
             raise DatasetFormatError(shown, None, None, "is not UTF-8 text") from error
         if is_mot("\n".join(lines[:20]).encode()):
             raise DatasetFormatError(
-                shown, None, None, "is a table with commas (MOT): read it as csv"
+                shown, None, None, "is a comma-separated table (MOT): choose the format csv"
             )
         boxes = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
         frame = run.names.find(name)

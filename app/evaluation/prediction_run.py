@@ -191,15 +191,15 @@ class PredictionRun:
         unlabelled = [name for name in self.categories if name not in self.labels]
         if self.category is None and len(self.categories) > 1 and unlabelled:
             raise InputError(
-                f"{path.name} holds several classes ({self._classes()})",
-                hint="Say which one is the ball (category).",
+                f"{path.name} contains several classes ({self._classes()})",
+                hint="Name the class of the ball as category.",
                 pointer="/category",
             )
         if self.categories and self.left_out == self.categories.total():
             wanted = "called ball" if self.category is None else f"{self.category}"
             raise InputError(
-                f"{path.name} holds no class {wanted}; its classes are {self._classes()}",
-                hint="Say which one is the ball (category).",
+                f"{path.name} contains no class {wanted}; its classes are {self._classes()}",
+                hint="Name the class of the ball as category.",
                 pointer="/category",
             )
         if 2 * self._near_corner > self.found.boxes:
@@ -209,7 +209,8 @@ class PredictionRun:
             )
         if not self.matched and not self.found.unknown and not report.problems:
             raise InputError(
-                f"{path.name} holds no prediction that belongs to a frame: is it complete?",
+                f"{path.name} contains no prediction for any frame; check that the file is"
+                " complete",
                 pointer="/upload",
             )
         if not self.found.detections and not self.found.unknown and report.problems:

@@ -102,7 +102,9 @@ def read_table(tree: FileTree, path: Path, run: PredictionRun, limits: Limits) -
         with noted(run.found.report, shown, f"line {line}"):
             _add_row(run, cells)
     if columns is None:
-        raise DatasetFormatError(shown, None, None, "holds no row: is it complete?")
+        raise DatasetFormatError(
+            shown, None, None, "contains no rows; check that the file is complete"
+        )
 
 
 def _read_rows(
@@ -342,7 +344,9 @@ def _read_instant(row: Mapping[str, str]) -> tuple[int | None, float | None]:
 def _read_metres(text: str) -> float:
     value = fields.number(text)
     if abs(value) > FARTHEST_M:
-        raise ValueError(f"is {value:g} m; places are in metres from the centre mark")
+        raise ValueError(
+            f"is {value:g} m, which is too far away; positions are in metres from the centre mark"
+        )
     return value
 
 

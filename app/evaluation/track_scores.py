@@ -135,10 +135,10 @@ def evaluate_tracks(
     error = np.array(found.error)
     if not np.isfinite(error).any():
         raise InputError(
-            "no prediction is for an instant at which the true ball is known: "
-            f"{_describe_names('the stretches', [track.key for track in truth])}"
-            f"{_describe_names('; predicted', unknown) if unknown else ''}",
-            hint="Name each folder after its stretch, and number frames as an export of tracks does.",
+            "no predicted frame is one in which the true ball position is known:"
+            f" {_describe_names('the stretches', [track.key for track in truth])}{_describe_names('; predicted', unknown) if unknown else ''}",
+            hint="Give each folder of predictions the name of its stretch, and use the frame"
+            " numbers that an export of tracks uses.",
             pointer="/predictions",
         )
     missed = [track.key for track in truth if track.key not in own]

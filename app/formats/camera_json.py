@@ -198,7 +198,9 @@ def _read_lens(reader: _CameraFields) -> tuple[str, tuple[float, ...]]:
     name = reader.value.get(LENS)
     if name is None or name == BROWN_CONRADY:
         if reader.value.get(LENS_COEFFICIENTS) is not None:
-            raise reader.error(LENS_COEFFICIENTS, f"need a {LENS} of {_list_lens_names()}")
+            raise reader.error(
+                LENS_COEFFICIENTS, f"need a {LENS} that is one of {_list_lens_names()}"
+            )
         radial, tangential, prism = (reader.read_distortion(*each) for each in _DISTORTION)
         k1, k2, k3, k4, k5, k6 = radial
         return BROWN_CONRADY, (k1, k2, *tangential, k3, k4, k5, k6, *prism)
@@ -206,7 +208,9 @@ def _read_lens(reader: _CameraFields) -> tuple[str, tuple[float, ...]]:
         raise reader.error(LENS, f"is {quoted(str(name), 40)}; lenses are {_list_lens_names()}")
     for other, count in _DISTORTION:
         if any(reader.read_distortion(other, count)):
-            raise reader.error(other, f"contradicts the lens {name}, which has none")
+            raise reader.error(
+                other, f"must be left out or zero, because the lens {name} has no such coefficients"
+            )
     count = LENSES[name].count
     return name, reader.read_field(
         LENS_COEFFICIENTS, lambda value: fields.number_list(value, count)

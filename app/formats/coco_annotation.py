@@ -59,7 +59,9 @@ class JoinedAnnotations:
             other = item if identity is None else seen.setdefault(identity, item)
             if other is not item and other == item:
                 self._report_problem(
-                    record, "id", f"is {identity}: the same annotation twice; left out"
+                    record,
+                    "id",
+                    f"is {identity}, the id of an equal annotation before it; this one is left out",
                 )
                 continue
             shared += other is not item
@@ -87,9 +89,13 @@ class JoinedAnnotations:
         value = item.get("id")
         if not self._ids.add(value, index):
             known = id_text(value) is not None
-            problem = f"is {quote_value(value)}, as another image's is" if known else "is missing"
+            problem = (
+                f"is {quote_value(value)}, which is also the id of another image"
+                if known
+                else "is missing"
+            )
             self._report_problem(
-                f"images[{index}]", "id", f"{problem}; no annotation joins this image"
+                f"images[{index}]", "id", f"{problem}; no annotations are assigned to this image"
             )
 
     def _find_image(self, item: Any, record: str) -> int | None:

@@ -345,7 +345,7 @@ class _CocoFile:
         """Whether an annotation is a crowd, which is reported: it is not one ball."""
         crowd = item.get("iscrowd") in (1, "1")
         if crowd:
-            self._report_problem(record, "iscrowd", "is 1: a crowd is not one ball; left out")
+            self._report_problem(record, "iscrowd", "is 1: a crowd cannot be one ball; left out")
         return crowd
 
     def _read_foreign_camera(self, image: StateReader) -> Camera | None:

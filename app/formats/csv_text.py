@@ -113,7 +113,7 @@ def read_rows(
                 yield reader.line_num, dict(zip(header, map(_unescape_formula, row), strict=False))
     except csv.Error as error:
         line = f"line {reader.line_num}"
-        raise DatasetFormatError(path, line, None, f"is not sound CSV ({error})") from error
+        raise DatasetFormatError(path, line, None, f"is not valid CSV ({error})") from error
 
 
 def _unescape_formula(text: str) -> str:

@@ -204,9 +204,9 @@ def _require_supported_lenses(
             camera = view.station.given if format == "issia" else record.camera(view)
             if camera is not None and camera.is_wide:
                 raise InputError(
-                    f"{format} has no place for the {camera.lens} lens of view {view.key} of group"
-                    f" {record.group.key}",
-                    hint="Export cameras, coco, parquet or touchline, which hold every lens.",
+                    f"the format {format} cannot store the {camera.lens} lens of view {view.key} of"
+                    f" group {record.group.key}",
+                    hint="Export cameras, coco, parquet or touchline, which can store every lens.",
                 )
         yield record
 

@@ -115,9 +115,7 @@ def _read_chunk(file: IO[bytes], shown: str) -> bytes:
     try:
         return file.read(_CHUNK)
     except BROKEN as error:
-        raise DatasetFormatError(
-            shown, None, None, "is damaged, here or in its zip file"
-        ) from error
+        raise DatasetFormatError(shown, None, None, "is damaged, or its zip file is") from error
 
 
 def files_inside(names: list[str], folder: str) -> set[str]:

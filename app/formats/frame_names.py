@@ -186,7 +186,8 @@ class ExportNames:
                 self._owners.update(names)
                 return key
         raise InputError(
-            f"view {view.key} of group {group.key} and another view would have one name in the export",
+            f"view {view.key} of group {group.key} and another view would have the same name"
+            " in the export",
             hint="Rename the view or its group in the source, and import it again.",
         )
 

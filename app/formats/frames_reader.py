@@ -54,7 +54,8 @@ def check_grouping(grouping: str) -> re.Pattern[str] | None:
     parts = re.split(r"(\{instant\}|\{camera\})", grouping)
     if sorted(parts[1::2]) != ["{camera}", "{instant}"] or re.search(r"[{}/]", "".join(parts[::2])):
         raise InputError(
-            "pictures are grouped by folder, or by a pattern of their names with {instant} and {camera}",
+            'grouping must be "folder" or a pattern of file names that contains {instant}'
+            " and {camera} once each",
             hint="For example {instant}_{camera}.jpg: 12_main.jpg and 12_goal.jpg are one group.",
             pointer="/options/grouping",
         )
@@ -164,9 +165,7 @@ def _read_image_size(tree: FileTree, name: str, size_of: SizeOf) -> ImageSize:
         except (ImageError, TooLargeError) as error:
             problem = error.message.removeprefix(f"{PurePosixPath(name).name} ")
         except BROKEN as error:
-            raise DatasetFormatError(
-                shown, None, None, "is damaged, here or in its zip file"
-            ) from error
+            raise DatasetFormatError(shown, None, None, "is damaged, or its zip file is") from error
     raise DatasetFormatError(shown, None, None, problem)
 
 

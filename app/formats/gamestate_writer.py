@@ -138,7 +138,8 @@ def write_gamestate(root: Path, records: Iterable[ExportRecord]) -> dict[str, in
                     other = matches.setdefault(fold_file_name(path.parent.name), match)
                     if other != match:
                         raise InputError(
-                            f"the matches {other} and {match} would have one folder, {path.parent.name}",
+                            f"the matches {other} and {match} would be written to the same folder,"
+                            f" {path.parent.name}",
                             hint="Rename one of them in the source, and import it again.",
                         )
                     if path in files:

@@ -253,7 +253,9 @@ def require_absent_in_store(out: StoredPath) -> None:
         StorageError: The store cannot be asked.
     """
     if not _is_zip_in_store(out):
-        raise InputError("an export over REST goes into a store as a zip: let its name end in .zip")
+        raise InputError(
+            "an export to an object store must be a zip: choose a name that ends in .zip"
+        )
     require_free_in_store(out)
     with suppress(NotFoundError):
         out.store.head(out.key)

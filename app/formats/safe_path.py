@@ -105,7 +105,7 @@ def open_regular_file(path: Path, shown: str = "") -> IO[bytes]:
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         return file
     file.close()
-    raise DatasetFormatError(shown or str(path), None, None, "is not a plain file")
+    raise DatasetFormatError(shown or str(path), None, None, "is not a regular file")
 
 
 def _open_without_blocking(path: str, flags: int) -> int:
@@ -116,7 +116,7 @@ def read_regular_file(path: Path, limit: int = MAX_BYTES) -> bytes:
     """The whole content of a file that somebody named.
 
     Raises:
-        DatasetFormatError: It cannot be read, is no plain file, or is longer than the limit.
+        DatasetFormatError: It cannot be read, is not a regular file, or is longer than the limit.
     """
     try:
         with open_regular_file(path) as file:

@@ -185,7 +185,9 @@ def lines_from_json(
         DatasetFormatError: The file is no object at all.
     """
     if not isinstance(value, dict):
-        raise DatasetFormatError(path, None, None, "is not an object that maps lines to points")
+        raise DatasetFormatError(
+            path, None, None, "is not an object that maps line names to lists of points"
+        )
     known: dict[str, list[ImagePoint]] = {}
     others = []
     points = {name: _read_points(item, path, name, report) for name, item in value.items()}

@@ -249,7 +249,7 @@ class _MatchLabels:
         if self.missing and self.frames.has_frames:
             shown = ", ".join(self.missing[:5]) + (", ..." if len(self.missing) > 5 else "")
             images = plural(len(self.missing), "image has", "images have")
-            self.report_problem(None, None, f"{images} no frame: {shown}")
+            self.report_problem(None, None, f"{images} no frame file: {shown}")
 
 
 def _read_split(value: Any) -> str:

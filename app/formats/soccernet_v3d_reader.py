@@ -200,7 +200,7 @@ class _RowCells:
         try:
             x, y, width, height = map(fields.pixel_coordinate, parse_number_list(text, 4))
             if width <= 0 or height <= 0:
-                raise ValueError("is a box without area")
+                raise ValueError("is a box whose width or height is not positive")
         except ValueError as error:
             self._report.skip(self._cell_error("ball_bbox", f"{error}; left out"))
             return None

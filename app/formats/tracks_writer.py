@@ -226,8 +226,9 @@ def track_folders(root: Path, records: Iterable[TrackRecord]) -> Iterator[tuple[
         other = taken.setdefault(name.casefold(), record.key)
         if other != record.key:
             raise InputError(
-                f'the tracks "{other}" and "{record.key}" would have one folder, {name}',
-                hint="Export them one after the other.",
+                f'the tracks "{other}" and "{record.key}" would be written to the same folder,'
+                f" {name}",
+                hint="Export each of them separately.",
             )
         (root / name).mkdir()
         yield root / name, record

@@ -167,7 +167,7 @@ class ZipTree:
     ) -> str | None:
         kind = stat.S_IFMT(member.external_attr >> 16)
         if kind not in (0, stat.S_IFREG):
-            return "is a link or device, not a plain file"
+            return "is a link or device, not a regular file"
         if member.flag_bits & UNREADABLE:
             return "has a name that is not text, so it cannot be read"
         if folded[name.casefold()] > 1:

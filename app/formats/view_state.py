@@ -196,7 +196,8 @@ class StateReader:
         try:
             if self.value.get("given") is None:
                 raise ValueError(
-                    "is of a given camera, and the view has none: add `given`, or leave this out"
+                    "is the covariance of a given camera, but the view has none: add `given`, or"
+                    " leave the covariance out"
                 )
             return camera_covariance(fields.number_list(found, 64))
         except ValueError as error:

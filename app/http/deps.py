@@ -262,7 +262,7 @@ async def get_actor(
     if login is not None:
         if name is not None:
             raise InputError(
-                f"{ACTOR_HEADER} is not accepted where people log in",
+                f"{ACTOR_HEADER} is not accepted on a server with logins",
                 hint="Leave it out: the log names the logged-in person.",
                 pointer=f"/{ACTOR_HEADER}",
             )
@@ -299,8 +299,8 @@ async def require_if_match(
     """
     if if_match is None:
         raise PreconditionRequiredError(
-            "a change must name the state that it builds on",
-            hint="Send the ETag of the last answer as If-Match.",
+            "the request needs If-Match with the ETag of the state that it changes",
+            hint="Load the current state, and send its ETag as If-Match.",
         )
     if not STRONG_ETAG.fullmatch(if_match.strip()):
         raise InputError(

@@ -180,8 +180,8 @@ class KnownHosts:
             if len(hosts) != 1 or host_name(hosts[0]) not in self.allowed:
                 problem = make_problem(
                     400,
-                    "this server does not answer to that Host",
-                    hint="TOUCHLINE_ALLOWED_HOSTS lists the names it answers to.",
+                    "the Host of this request is not a name of this server",
+                    hint="The operator lists the names of the server in TOUCHLINE_ALLOWED_HOSTS.",
                 )
                 await problem_response(problem)(scope, receive, send)
                 return

@@ -212,20 +212,22 @@ def _is_storable(response: Response) -> bool:
 
 
 def _in_progress_error() -> OverloadedError:
-    return OverloadedError("the first request of this key is still being answered")
+    return OverloadedError("the first request with this Idempotency-Key is still running")
 
 
 def _response_of_stored(known: StoredResponse, *, is_same: bool) -> Response:
     if not is_same:
         problem = make_problem(
-            422, f"this {HEADER} was used for another request", hint="Send a new key with it."
+            422,
+            f"this {HEADER} was used for another request",
+            hint="Send this request with a new key.",
         )
         return problem_response(problem)
     if known.body is None:
         problem = make_problem(
             409,
-            "this request was answered before, and its answer is no longer kept",
-            hint="It was carried out, once. Load the present state.",
+            "this request was carried out before, and its response is no longer stored",
+            hint="Do not send it again: load the current state.",
         )
         return problem_response(problem, {REPLAYED: "true"})
     return Response(known.body, known.status, {**known.headers, REPLAYED: "true"})

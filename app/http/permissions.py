@@ -97,7 +97,9 @@ def may(
     found = Permission(action, things, body or {}, where, whole, to_enrol)
     of_none = action in (Action.ACCOUNT, Action.ADMINISTER)
     if not (of_none or things or body or where is not Where.NAMED):
-        raise TypeError("say what the route names, or where else a role counts")
+        raise TypeError(
+            "a permission needs a resource that the route names, or another value of `where`"
+        )
     return _mark_permission(found)
 
 

@@ -115,7 +115,7 @@ class OneRange:
             if message["type"] == "http.response.start" and message["status"] == 416:
                 refused = True
                 size = Headers(raw=message["headers"]).get("content-range", "bytes */*")
-                problem = make_problem(416, "the file ends before that range begins")
+                problem = make_problem(416, "the requested range begins after the end of the file")
                 await problem_response(problem, {"Content-Range": size})(scope, receive, send)
             elif not refused:
                 await send(message)
@@ -323,7 +323,7 @@ class TimedBody:
             async with asyncio.timeout(self._seconds):
                 message = await self._receive()
         except TimeoutError:
-            raise BodyError(408, "the rest of the request did not come") from None
+            raise BodyError(408, "the rest of the request body was not received in time") from None
         self._seconds -= clock() - began
         self._bytes += len(message.get("body", b""))
         if self._bytes >= BODY_BYTES:
@@ -411,7 +411,9 @@ def _object_without_repeated_names(pairs: list[tuple[str, Any]]) -> dict[str, An
     if len(found) < len(pairs):
         names = Counter(name for name, _ in pairs)
         raise BodyError(
-            400, f"the body names {quoted(names.most_common(1)[0][0], 80)} more than once"
+            400,
+            f"a JSON object of the body has the key {quoted(names.most_common(1)[0][0], 80)}"
+            " more than once",
         )
     return found
 

@@ -73,7 +73,9 @@ class Route(APIRoute):
     def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any):
         permission = find_permission(endpoint)
         if permission is None:
-            raise TypeError(f"{path}: say who may ask it, with @may below the route")
+            raise TypeError(
+                f"the route {path} has no permission: add @may or @open_to_all to its function"
+            )
         self.permission = permission
         self.request_class = request_class_of(endpoint, options.get("methods") or ("GET",))
         content = (options.get("openapi_extra") or {}).get("requestBody", {}).get("content", {})
@@ -239,7 +241,9 @@ def require_permissions(app: FastAPI) -> None:
         route = context.original_route
         is_file = isinstance(route, Mount) and route.name in ("assets", "static")
         if not (is_file or isinstance(route, Route)):
-            raise TypeError(f"{context.path}: make it by a router with route_class=Route")
+            raise TypeError(
+                f"the route {context.path} must be made by a router with route_class=Route"
+            )
 
 
 def list_routes(app: FastAPI) -> Iterator[tuple[str, Route]]:

@@ -234,7 +234,8 @@ class Team:
         """The provider by which people come in; raises ConflictError where there is none."""
         if self.sign_on is None:
             raise ConflictError(
-                "there is no single sign-on here", hint="The operator sets it up: docs/teams.md."
+                "single sign-on is not set up on this server",
+                hint="The operator can set it up as docs/teams.md describes.",
             )
         return self.sign_on
 
@@ -258,8 +259,9 @@ class Team:
             port = f":{url.port}" if url.port not in (None, 80, 443) else ""
             return PasskeySite(name, f"{url.scheme}://{name}{port}")
         raise ConflictError(
-            "browsers make no passkeys for this address",
-            hint="They need https and a name (touchline serve --team --url), or localhost.",
+            "browsers do not support passkeys at this address",
+            hint="Passkeys need https and a host name (touchline serve --team --url), or"
+            " localhost.",
         )
 
     def _cookie_name(self, name: str) -> str:

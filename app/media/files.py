@@ -427,9 +427,13 @@ def _require_regular_file(path: Path) -> os.stat_result:
     try:
         status = path.lstat()
     except OSError as error:
-        raise NotFoundError(f"the file {path.name} is not where it was imported from") from error
+        raise NotFoundError(
+            f"the file {path.name} is no longer in the place that it was imported from"
+        ) from error
     if stat.S_ISLNK(status.st_mode):
-        raise NotFoundError(f"{path.name} is a link now, which is not followed", hint=LINK_HINT)
+        raise NotFoundError(
+            f"{path.name} is now a symbolic link, which the server does not follow", hint=LINK_HINT
+        )
     if not stat.S_ISREG(status.st_mode):
         raise NotFoundError(f"{path.name} is not a file")
     return status
@@ -445,7 +449,8 @@ def _require_contained(media: Media, settings: Settings) -> None:
             continue
         if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(root)):
             raise NotFoundError(
-                f"{path.name} lies behind a link that leads out of its folder", hint=LINK_HINT
+                f"{path.name} is reached through a symbolic link that leads out of its folder",
+                hint=LINK_HINT,
             )
 
 

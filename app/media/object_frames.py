@@ -140,7 +140,9 @@ def _archive_key(path: _Place) -> _Key:
     try:
         status = path.stat()
     except OSError as error:
-        raise NotFoundError(f"the file {path.name} is not where it was imported from") from error
+        raise NotFoundError(
+            f"the file {path.name} is no longer in the place that it was imported from"
+        ) from error
     return str(path), status.st_mtime_ns, status.st_size, ""
 
 
@@ -207,7 +209,8 @@ def _fetch_object(media: Media, settings: Settings) -> bytes:
         data = _read_object_or_member(store, key, media.member, etag, settings)
     if kind == "sha256" and hashlib.sha256(data).hexdigest() != value:
         raise ChangedObjectError(
-            f"{_address_text(address, media)} is not the frame that was meant: its SHA-256 is another",
+            f"{_address_text(address, media)} has changed: its SHA-256 differs from that of"
+            " the imported frame",
             hint=CHANGED_HINT,
         )
     return data

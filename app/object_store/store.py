@@ -348,7 +348,7 @@ def translated_errors(store: str, address: str, wrong: Any) -> Iterator[None]:
     except wrong.PreconditionError as error:
         raise ChangedObjectError(
             f"{address} was changed in its store since it was imported",
-            hint="Import it again to take the new one, or put the old one back.",
+            hint="Import it again to use the new object, or restore the old one.",
         ) from error
     except (wrong.BaseError, OSError) as error:
         raise _store_error(store, error, wrong) from error
@@ -366,7 +366,9 @@ def _store_error(name: str, error: Exception, wrong: Any) -> StorageError:
             f'the store "{name}" refuses the keys of this server{code}', hint=OPERATOR
         )
     if code:
-        return StorageError(f'the store "{name}" cannot do what it was asked{code}', hint=OPERATOR)
+        return StorageError(
+            f'the store "{name}" failed to carry out a request{code}', hint=OPERATOR
+        )
     return StorageError(
         f'the store "{name}" cannot be reached, or does not answer in time',
         hint="Try again in a moment. " + OPERATOR,

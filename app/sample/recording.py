@@ -92,7 +92,9 @@ def plan_shots(seconds: float) -> list[ShotPlan]:
         InputError: It would be too short to show them.
     """
     if seconds < SHORTEST_RECORDING:
-        raise InputError(f"a recording of the sample takes {SHORTEST_RECORDING} seconds or more")
+        raise InputError(
+            f"a recording of the sample must be at least {SHORTEST_RECORDING} seconds long"
+        )
     times = max(1, round(seconds / RECORDING_SECONDS))
     scale = seconds / (times * RECORDING_SECONDS)
     parts = [
@@ -178,7 +180,9 @@ def write_recording(
         InputError: The recording would be too short, or its name has no ending of a video.
     """
     if out.suffix.lower() not in (".mp4", ".avi", ".mkv"):
-        raise InputError(f"{out.name} has no ending of a video", hint="Name it like film.mp4.")
+        raise InputError(
+            f"{out.name} does not end in .mp4, .avi or .mkv", hint="Choose a name such as film.mp4."
+        )
     play, shots = _plan_recording(list(parts) if parts else plan_shots(seconds), seed, since)
     total = shots[-1].last + 1
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -213,12 +217,14 @@ def _plan_recording(
     for number, (part, (begin, end)) in enumerate(zip(parts, pairwise(bounds), strict=True)):
         first, last = begin + soft[number] // 2, end - soft[number + 1] // 2 - 1
         if last < first:
-            raise InputError(f"shot {number + 1} is no longer than the transitions beside it")
+            raise InputError(
+                f"shot {number + 1} must be longer than the transitions before and after it"
+            )
         is_replay = part.kind == "replay"
         rate, start, source = REPLAY_FPS if is_replay else FPS, since + begin / FPS, None
         if is_replay:
             if live is None:
-                raise InputError(f"shot {number + 1} replays, and no live shot is before it")
+                raise InputError(f"shot {number + 1} is a replay, but no live shot comes before it")
             source = live[0]
             start = _start_of_liveliest_stretch(play, *live[1:], part.seconds * part.speed)
         elif part.kind == "main":
@@ -238,7 +244,7 @@ def _plan_recording(
 def _start_of_liveliest_stretch(play: Play, first: float, last: float, length: float) -> float:
     """When a replay begins: the stretch of a live shot in which the ball goes farthest, heights above all."""
     if length > last - first:
-        raise InputError("a replay is longer than the live shot before it")
+        raise InputError("a replay must not be longer than the live shot before it")
     starts = np.arange(first, last - length + 1e-9, 0.1)
     steps = np.arange(first, last + 0.02, 0.02)
     moves = np.abs(np.diff(play.ball_at(steps), axis=0)) @ (1.0, 1.0, 4.0)

@@ -185,7 +185,7 @@ def _truth_from_json(key: str, value: Any, path: str) -> SceneTruth:
         return SceneTruth(key, _to_triple(value["ball"]), views, faults)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise DatasetFormatError(
-            path, key, None, f"is not the truth of a group: {error}"
+            path, key, None, f"is not a valid record of a group's true values: {error}"
         ) from error
 
 

@@ -198,7 +198,7 @@ def station_from_json(value: Mapping[str, Any]) -> Station:
     """
     given, covariance = value["given"], value.get("given_covariance")
     if given is None and covariance is not None:
-        raise ValueError("a station has the covariance of a camera, and no given camera")
+        raise ValueError("a static camera has a covariance but no given camera")
     return Station(
         key=value["key"],
         size=ImageSize(*value["size"]),

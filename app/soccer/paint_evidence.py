@@ -162,7 +162,7 @@ def reading_from_json(value: Any) -> PaintReading:
             _tripod_from_json(value.get("tripod")),
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"this is not a reading of paint: {error}") from error
+        raise InputError(f"this is not a valid paint measurement: {error}") from error
 
 
 def _tripod_from_json(value: Any) -> TripodCamera | None:
@@ -171,7 +171,7 @@ def _tripod_from_json(value: Any) -> TripodCamera | None:
     parameters, covariance = (tuple(map(float, numbers)) for numbers in value)
     finite = all(map(math.isfinite, parameters + covariance))
     if not finite or (len(parameters), len(covariance)) != (8, 64):
-        raise ValueError("a camera of a tripod has 8 numbers and 64 of their covariance")
+        raise ValueError("the camera of a tripod must have 8 numbers, and its covariance 64")
     return TripodCamera(parameters, covariance)
 
 
@@ -184,7 +184,7 @@ def reading_from_text(text: str) -> PaintReading:
     try:
         reading = reading_from_json(json.loads(text))
     except json.JSONDecodeError as error:
-        raise InputError(f"this is not a reading of paint: {error}") from error
+        raise InputError(f"this is not a valid paint measurement: {error}") from error
     # It need not be written again to be digested.
     vars(reading)["text"] = text
     return reading
@@ -210,7 +210,7 @@ def evidence_from_json(value: Any) -> PaintEvidence:
         }
         return PaintEvidence(points, str(value["version"]))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this is not evidence of paint: {error}") from error
+        raise InputError(f"these are not valid paint points: {error}") from error
 
 
 def _paint_points_from_rows(rows: Any) -> tuple[PaintPoint, ...]:

@@ -158,7 +158,9 @@ class Pitch:
             ("width", self.width, WIDTH_RANGE),
         ):
             if not low <= value <= high:
-                raise InputError(f"pitch {name} is {value} m; the Laws allow {low:g} to {high:g}")
+                raise InputError(
+                    f"pitch {name} is {value} m; the Laws of the Game allow {low} to {high}"
+                )
 
     @cached_property
     def shapes(self) -> dict[str, Segment | Arc]:

@@ -93,7 +93,8 @@ def estimate_match_picture(
     seen = [_FittedFrame.of(frames[index], policy) for index in choose_frames(frames)]
     if len(seen) < MIN_FRAMES:
         raise DegenerateGeometryError(
-            f"{len(seen)} frames show enough markings, a picture needs {MIN_FRAMES}"
+            f"only {len(seen)} frames show enough markings; estimating the picture geometry"
+            f" needs {MIN_FRAMES}"
         )
     warp, pull, informations = _adjust_picture(seen)
     information = informations.sum(axis=0) + np.diag(PRIOR_SIGMA**-2)

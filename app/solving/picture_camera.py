@@ -425,7 +425,7 @@ def _normal_scale(normal: FloatArray) -> FloatArray:
     """Root of the diagonal of a normal matrix; LinAlgError where an unknown is in no equation."""
     scale: FloatArray = np.sqrt(np.diag(normal))
     if not scale.all():
-        raise np.linalg.LinAlgError("the lines say nothing of one of the unknowns")
+        raise np.linalg.LinAlgError("the lines do not determine one of the parameters")
     return scale
 
 

@@ -196,7 +196,7 @@ def estimate_pitch(
     seen = [_FittedFrame.of(frames[index], pitch, policy) for index in choose_frames(frames)]
     if len(seen) < least:
         raise DegenerateGeometryError(
-            f"{len(seen)} frames show enough markings, the size of a pitch needs {least}"
+            f"only {len(seen)} frames show enough markings; estimating the pitch size needs {least}"
         )
     pitch, seen, _ = _adjust_size(pitch, seen)
     # Labels are judged on the pitch as it is now: on one of the wrong size the touchlines look

@@ -110,7 +110,7 @@ def read_text(path: Path, most: int) -> str:
 
     try:
         if not path.is_file():
-            raise InputError(f"{path} is not a plain file")
+            raise InputError(f"{path} is not a regular file")
         with path.open(encoding="utf-8") as file:
             return file.read(most + 1)
     except (OSError, UnicodeDecodeError) as error:

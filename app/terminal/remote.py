@@ -241,8 +241,8 @@ def follow_job(client: Client, job: Mapping[str, Any], progress: ReportProgress)
         )
     except KeyboardInterrupt:
         print_error(
-            f"not waited for: job {job['id']} goes on on the server",
-            "The page Jobs shows how far it is, and cancels it.",
+            f"stopped waiting: job {job['id']} continues on the server",
+            "The page Jobs shows its progress and can cancel it.",
         )
         raise typer.Exit(INTERRUPTED) from None
 

@@ -72,7 +72,9 @@ def work_against_server(url: str | None, token_file: Path | None, command: str |
 
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.username:
-        raise InputError(f"{url} is not the address of a server", hint="Write https://NAME.")
+        raise InputError(
+            f"{url} is not the address of a server", hint="Write the address as https://NAME."
+        )
     if parts.scheme == "http" and not is_local(parts.hostname):
         raise InputError(
             f"{url} is not encrypted: a token must not be sent unencrypted",
@@ -99,7 +101,7 @@ def read_token(path: Path) -> str:
     """The token in a file that its owner alone can read.
 
     Raises:
-        InputError: It is no plain file, others can read it, or it holds none.
+        InputError: It is not a regular file, others can read it, or it holds none.
     """
     from app.features.people.access_tokens import has_valid_checksum
 
@@ -152,7 +154,7 @@ def _require_version(server: ServerPlace, client: Client) -> None:
     theirs = found.get("version") if isinstance(found, dict) else None
     if not isinstance(theirs, str):
         raise InputError(
-            f"what answers at {server.url} is not Touchline", hint="Is the address right?"
+            f"the server at {server.url} is not a Touchline server", hint="Check the address."
         )
     if theirs.split(".")[:2] != mine.split(".")[:2]:
         raise InputError(
@@ -182,7 +184,8 @@ def _command_error(server: ServerPlace, error: Exception) -> ReviewError:
     if said_nothing and ("certificate" in message.lower() or "ssl" in message.lower()):
         return InputError(
             f"{server.url} has a TLS certificate that cannot be verified: {message}",
-            hint="Is the address right? A certificate of your own goes into SSL_CERT_FILE.",
+            hint="Check the address. If the server uses your own certificate authority, name its"
+            " certificate in SSL_CERT_FILE.",
         )
     if said_nothing:
         hint = "Is it running, and the address right?"

@@ -72,7 +72,7 @@ def _frames(content: bytes) -> list[FrameCamera]:
         head = json.loads(arrays["head"].tobytes())
         kept = {name: arrays[name] for name in arrays.files if name != "head"}
     if head["version"] != _VERSION:
-        raise ValueError("another version")
+        raise ValueError("the camera file was written in another version of its format")
     size, reasons = ImageSize(*head["size"]), head["reasons"]
     known = [
         tuple(None if np.isnan(value) else value for value in row)

@@ -98,13 +98,13 @@ def track_clip(
     for number, drawn in lines.items():
         if not 0 <= number - clip.start < clip.count:
             raise InputError(
-                f"{clip.path.name} has {clip.count} frames, and none of the number {number}",
+                f"{clip.path.name} has {clip.count} frames, and frame {number} is not one of them",
                 hint="Frames count from 0.",
             )
         found = calibrate(drawn, pitch, clip.size, clicked)
         if found.camera is None:
             raise InputError(
-                f"the lines of frame {number} make no camera: {found.reason}",
+                f"no camera can be computed from the lines of frame {number}: {found.reason}",
                 hint="Draw more of the markings that this frame shows, or annotate another frame.",
             )
         spread = None if found.covariance is None else np.reshape(found.covariance, (8, 8))

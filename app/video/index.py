@@ -196,7 +196,7 @@ def index_from_bytes(data: bytes, name: str = "the index") -> RecordingIndex:
     with _opened(BytesIO(data), name) as arrays:
         rows: npt.NDArray[Any] = arrays["measured"]
         if rows.shape != (len(arrays["pts"]), MEASURES.itemsize):
-            raise ValueError("another shape")
+            raise ValueError("the measurements have a wrong shape")
         return _index(arrays, name, np.ascontiguousarray(rows).reshape(-1).view(MEASURES))
 
 
@@ -233,7 +233,7 @@ def _index(arrays: Any, name: str, measured: Measured) -> RecordingIndex:
     if head.pop("version") != VERSION:
         raise InputError(f"{name} is an index of another version; index the recording again")
     if not pts.dtype == keys.dtype == np.int64:
-        raise ValueError("another shape")
+        raise ValueError("the frame times and key frames have a wrong data type")
     for pair in ("pixel_aspect", "time_base"):
         head[pair] = tuple(head[pair])
     return RecordingIndex(RecordingFacts(**head), pts, keys, measured)

@@ -142,9 +142,9 @@ def _require_size(picture: Any, coded: tuple[int, int], number: int, path: Path)
     height, width = picture.shape[:2]
     if (width, height) != coded:
         raise ImageError(
-            f"frame {number} of {path.name} has {width} x {height} pixels, frames before it "
-            f"{coded[0]} x {coded[1]}",
-            hint="Cut the recording there: frames of one recording have one size.",
+            f"frame {number} of {path.name} has {width} x {height} pixels, but the frames"
+            f" before it have {coded[0]} x {coded[1]}",
+            hint="Split the recording there: all frames of a recording must have one size.",
         )
 
 
@@ -206,8 +206,8 @@ def _require_same_behind_jump(path: Path, times: FloatArray) -> None:
         follow = sum(reader.skip() for _ in range(2 * _BEFORE_END))
     if follow != min(len(times), _BEFORE_END) - 1:
         raise ImageError(
-            f"{path.name} is damaged: its own table of frames is not that of the frames in it",
-            hint="Repair it with a tool of your recorder, or write it anew as MP4 or MKV.",
+            f"{path.name} is damaged: its frame table lists other frames than the file contains",
+            hint="Repair the file with a tool of your recorder, or convert it to MP4 or MKV.",
         )
 
 

@@ -82,7 +82,7 @@ async def _run_scheduler(place: SchedulerPlace, say: Say) -> None:
             dashboard_address=_NOWHERE,
         )
     except OSError as error:
-        raise ClusterError(f"{place.address} cannot be listened on ({error})") from error
+        raise ClusterError(f"the scheduler cannot listen on {place.address} ({error})") from error
     async with scheduler:
         say(f"The scheduler is at {scheduler.address}")
         await end.wait()

@@ -112,8 +112,8 @@ def process_pool(workers: int) -> Iterator[Executor]:
     """
     if not os.access(".", os.X_OK):
         raise InputError(
-            "this user may not enter the folder in which the command was given, and processes"
-            " that solve begin there",
+            "this user has no access to the current folder, in which the worker processes"
+            " would start",
             hint="Change to another folder first (cd /), or solve with --workers 1.",
         )
     with spawned_pool(workers) as pool:

@@ -20,7 +20,7 @@ def test_a_lead_sees_that_nobody_takes_the_messages(
     card.get_by_label("Address").fill("http://127.0.0.1:9/elsewhere")
     card.get_by_label("group.judged").check()
     card.get_by_role("button", name="Add the webhook").click()
-    expect(card.get_by_role("alert")).to_contain_text("does not allow that address")
+    expect(card.get_by_role("alert")).to_contain_text("does not allow webhooks to this address")
     card.get_by_label("Address").fill(NOBODY)
     card.get_by_role("button", name="Add the webhook").click()
     expect(card.get_by_label("Secret")).to_have_value(re.compile("^whsec_"))

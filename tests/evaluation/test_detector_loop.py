@@ -80,7 +80,7 @@ class TestOpen:
 
     def test_a_file_that_is_no_model_is_refused(self, tmp_path) -> None:
         (tmp_path / "x.onnx").write_bytes(b"not a model")
-        with pytest.raises(InputError, match="no ONNX model"):
+        with pytest.raises(InputError, match="is not an ONNX model"):
             OnnxModel.open(tmp_path / "x.onnx")
         with pytest.raises(InputError, match="there is no model"):
             OnnxModel.open(tmp_path / "y.onnx")

@@ -60,7 +60,7 @@ class TestComingIn:
         visitor.provider.who = {"sub": "s-lena", "email": "lena@club.example"}
         own = f"{API}/session/identity"
         wrong = visitor.team.ask("POST", f"{own}/begin", {"password": "x"}, Cookie=cookie)
-        assert_refused(wrong, 400, "not your password")
+        assert_refused(wrong, 400, "the password is wrong")
         begun = visitor.team.ask("POST", f"{own}/begin", {"password": SECRET}, Cookie=cookie)
         told = visitor.back(json.loads(begun.body)["address"])
         other = f"{cookie_in(begun)}; {visitor.team.cookies['viewer']}"

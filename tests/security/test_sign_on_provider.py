@@ -179,7 +179,7 @@ class TestProvider:
         described = {**visitor.provider.described(), "issuer": "https://evil.example"}
         path = "/.well-known/openid-configuration"
         visitor.provider.instead[path] = lambda handler: tell(handler, described)
-        assert_refused(self.ends(visitor), 409, "does not answer as the provider")
+        assert_refused(self.ends(visitor), 409, "is not the provider in TOUCHLINE_SSO_ISSUER")
 
     @pytest.mark.parametrize("said", [b"[1]", b"<html>", b'{"a":' * 9000, b"\xff"])
     def test_that_talks_nonsense_is_refused(self, visitor: SignOnVisitor, said: bytes) -> None:

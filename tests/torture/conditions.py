@@ -75,7 +75,7 @@ def _on_a_network(home: Path) -> str:
 
 CONDITIONS = (
     Condition("newer schema", damage.write_newer_schema, ("newer version of Touchline",)),
-    Condition("truncated file", damage.cut_short, ("is cut short",)),
+    Condition("truncated file", damage.cut_short, ("is truncated",)),
     Condition("no database", damage.take_away, ("is missing, but this home has been used",)),
     Condition("damaged page", damage.spoil_first, ("damaged",)),
     Condition("damaged page in the middle", damage.spoil_inside, ("touchline.db is damaged",)),

@@ -151,7 +151,7 @@ class TestClosed:
         monkeypatch.setattr("app.features.file_tools.calibrate.score_files", refuse)
         code, _, err = run("score", line_files, line_files)
         assert code == 1
-        assert re.search(r"may not look at \W?/srv/closed/x\.json", err)
+        assert re.search(r"has no permission to read \W?/srv/closed/x\.json", err)
         assert "Traceback" not in err
 
 

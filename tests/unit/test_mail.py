@@ -185,8 +185,8 @@ class TestReadMailServer:
                 {"smtp_from": "Touchline <box@example.org>"},
                 "TOUCHLINE_SMTP_FROM: .* not an email address",
             ),
-            ({"smtp_user": "box"}, "one without the other"),
-            ({"smtp_password": "x"}, "one without the other"),
+            ({"smtp_user": "box"}, "must be set together"),
+            ({"smtp_password": "x"}, "must be set together"),
             ({"smtp_user": "box", "smtp_password": "ü"}, "must be ASCII"),
         ],
     )

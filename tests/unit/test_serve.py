@@ -107,7 +107,7 @@ class TestServe:
         monkeypatch.setattr("app.http.server.serve_with", lambda *_arguments: None)
         code, out, err = run("serve", "--port", "0", "--workers", "2")
         assert (code, out) == (1, "")
-        assert "only on PostgreSQL" in err
+        assert "need a PostgreSQL database" in err
         assert "TOUCHLINE_DATABASE_URL" in err
 
 

@@ -71,7 +71,7 @@ class TestSubmit:
     ) -> None:
         gate = Gate(tmp_path)
         tasks = [pool.submit(pass_gate, gate, "a") for _ in range(3)]
-        with pytest.raises(OverloadedError, match="3 pictures are being made or wait already"):
+        with pytest.raises(OverloadedError, match="3 requests for pictures already run or wait"):
             pool.submit(pass_gate, gate, "b")
         patient = pool.submit(pass_gate, gate, "c", bounded=False)
         gate.open.touch()

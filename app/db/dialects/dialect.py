@@ -113,8 +113,8 @@ AUTOCOMMIT = {"touchline_glance": True}
 def unstorable_text_error() -> InputError:
     """What is said of a text that one of the databases cannot keep; both refuse it."""
     return InputError(
-        "a text holds a character that the database cannot keep, such as U+0000",
-        hint="Leave it out.",
+        "a text contains a character that the database cannot store, such as U+0000",
+        hint="Remove the character.",
     )
 
 
@@ -241,7 +241,8 @@ def require_processes(settings: Settings, count: int) -> None:
     """
     if count > 1 and dialect_of(settings).is_file:
         raise InputError(
-            "several processes can serve a database only on PostgreSQL, and this one is a file",
+            "several server processes need a PostgreSQL database, and this database is an"
+            " SQLite file",
             hint="Leave out --workers (TOUCHLINE_WEB_WORKERS), or set TOUCHLINE_DATABASE_URL:"
             " docs/operations.md.",
         )
@@ -310,7 +311,7 @@ def _storage_error(
             hint="Is the server of the database running, and are TOUCHLINE_DATABASE_URL's host,"
             " database, user and password right? Nothing was saved.",
         )
-    return StorageError(f"the database refuses the statement ({name or type(error).__name__})")
+    return StorageError(f"the database rejected a statement ({name or type(error).__name__})")
 
 
 def insert(model: Any) -> Insert:

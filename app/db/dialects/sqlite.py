@@ -103,7 +103,9 @@ class SQLite:
             for name, (value, expected) in PRAGMAS.items():
                 answer = connection.exec_driver_sql(f"PRAGMA {name}").scalar()
                 if answer != expected:
-                    raise StorageError(f"SQLite refuses {name}={value} (it answers {answer})")
+                    raise StorageError(
+                        f"SQLite did not accept {name}={value}: the setting is still {answer}"
+                    )
 
     def failure(self, error: DBAPIError) -> tuple[DatabaseFailure, str]:
         """See ``Dialect``."""
@@ -163,7 +165,7 @@ def _make_engine(settings: Settings, lasting: bool, **pool: int) -> Engine:
         raise StorageError(
             f"SQLite {pysqlite3.dbapi2.sqlite_version} has a fault that can damage a database;"
             f" Touchline needs {needed} or later",
-            hint="Install a newer pysqlite3, as requirements.txt names it.",
+            hint="Install the version of pysqlite3 that requirements.txt requires.",
         )
     engine = create_engine(settings.database, module=pysqlite3.dbapi2, **pool)
     engine.dialect.statement_compiler = _HintedStatement

@@ -86,7 +86,7 @@ def _read_anchor_file(database: Path) -> Anchor | None:
         return None
     except (ValueError, TypeError) as error:
         raise DamagedError(
-            f"{path} is not what was written",
+            f"{path} is damaged: it does not contain the recorded state of the database",
             hint=f"Run touchline restore BACKUP, or touchline restore {database}.",
         ) from error
 
@@ -175,7 +175,7 @@ def _require_anchored(connection: Connection, anchor: Anchor, database: str, hin
     tables = inspect(connection).get_table_names()
     if "log" not in tables:
         raise DamagedError(
-            f"{database} is empty, but this home has noted {anchor.entries:,} entries of a log",
+            f"{database} has no log table, but this home recorded {anchor.entries:,} log entries",
             hint=hint,
         )
     if "installation" in tables:
@@ -185,7 +185,7 @@ def _require_anchored(connection: Connection, anchor: Anchor, database: str, hin
     entries = connection.execute(text("SELECT coalesce(max(id), 0) FROM log")).scalar_one()
     if entries < anchor.entries:
         raise DamagedError(
-            f"the log in {database} ends after {entries:,} entries, but this home has noted"
+            f"the log in {database} ends after {entries:,} entries, but this home recorded"
             f" {anchor.entries:,}",
             hint=hint,
         )
@@ -194,7 +194,7 @@ def _require_anchored(connection: Connection, anchor: Anchor, database: str, hin
         found = connection.execute(query, {"id": anchor.entries}).scalar()
         if found != anchor.hash:
             raise DamagedError(
-                f"entry {anchor.entries:,} of the log in {database} is not the one that this home"
-                " has noted",
+                f"entry {anchor.entries:,} of the log in {database} differs from the entry that"
+                " this home recorded",
                 hint=hint,
             )

@@ -235,15 +235,16 @@ def require_sound(settings: Settings) -> None:
 def _require_whole(database: Path, header: DatabaseHeader, log: WriteAheadLog) -> None:
     if not log.belongs_to(header):
         raise DamagedError(
-            f"{log_file(database)} is the write-ahead log of another database than {database}:"
-            " together they would destroy each other",
-            hint="If a backup was copied here, run touchline restore with it; "
-            f"touchline restore {database} goes on without the log. Both keep all files.",
+            f"{log_file(database)} is the write-ahead log of another database, not of"
+            f" {database}: opening them together would damage the data",
+            hint="If you copied a backup into this folder, run touchline restore with that backup"
+            f" instead. touchline restore {database} opens the database without the log. Both"
+            " commands keep all files.",
         )
     size, expected = _file_size(database), header.pages * header.page_bytes
     if not log.commits and size < expected:
         raise DamagedError(
-            f"{database} is cut short: {size:,} of {expected:,} bytes are there",
+            f"{database} is truncated: it has {size:,} of {expected:,} bytes",
             hint="Run touchline restore BACKUP with your newest backup; the damaged file is kept"
             " under another name.",
         )

@@ -95,10 +95,13 @@ def get_case(store: Store, group_id: int, *, actor: str) -> AgreementCase:
         )
         limits = read_limits(session, original.dataset_id)
     if row is None:
-        raise NotFoundError(f"nothing of group {group_id} waits for a decision")
+        raise NotFoundError(f"group {group_id} does not wait for adjudication")
     annotations = submitted_annotations(store, group_id, row.batch_id or None)
     if len(annotations) < 2:
-        raise NotFoundError(f"nothing of group {group_id} waits for a decision")
+        raise NotFoundError(
+            f"group {group_id} does not wait for adjudication: fewer than two annotations are"
+            " submitted"
+        )
     states = [load_solved(store, annotation.copy_id) for annotation in annotations]
     own = person_of(actor) in {annotation.person for annotation in annotations}
     refused = None
@@ -141,7 +144,9 @@ def decide_case(
         None,
     )
     if place is None:
-        raise NotFoundError(f"annotation {annotation_id} is not one that waits for a decision here")
+        raise NotFoundError(
+            f"annotation {annotation_id} is not among the annotations that wait for adjudication"
+        )
     return adopt_and_settle(
         store,
         group_id,
@@ -201,7 +206,9 @@ def return_for_correction(
         raise ForbiddenError(case.refused)
     annotation = next((one for one in case.annotations if one.id == annotation_id), None)
     if annotation is None:
-        raise NotFoundError(f"annotation {annotation_id} is not one that waits for a decision here")
+        raise NotFoundError(
+            f"annotation {annotation_id} is not among the annotations that wait for adjudication"
+        )
     if annotation.person == person_of(actor) != LOCAL_USER:
         raise ForbiddenError("you submitted this annotation yourself", hint="A lead can return it.")
     return return_annotation(store, annotation_id, reason, actor=actor)

@@ -85,8 +85,8 @@ def assign_local_work(store: Store, person_id: int, *, actor: str) -> str:
         before = find_alias(session, LOCAL_USER)
         if before is not None:
             raise ConflictError(
-                f"what was done as {LOCAL_USER} is shown as {before}'s already",
-                hint="The work of this home can be assigned to one person, once.",
+                f"the work of the user {LOCAL_USER} is already assigned to {before}",
+                hint="It can be assigned only once, to one person.",
             )
         at = now()
         body = {"person": person.name, "did": "adopted", "role": person.role, "from": LOCAL_USER}

@@ -215,7 +215,9 @@ class Leases:
             others = row.submitted is not None and row.submitted_by != worker.name
             if row.settled is not None or others:
                 by = row.submitted_by or "somebody"
-                raise ConflictError(f"{by} has submitted this group", hint="Go on with the next.")
+                raise ConflictError(
+                    f"{by} has submitted this group", hint="Continue with the next group."
+                )
             mark_submitted(
                 session, batch_id, group, at=self._now() if done else None, by=worker.name
             )
@@ -239,7 +241,9 @@ class Leases:
             batch = _open_batch(session, batch_id)
             row = _require_batch_group(session, batch, group)
             if row.settled is not None:
-                raise ConflictError("this group was judged", hint="Take the verdict back first.")
+                raise ConflictError(
+                    "this group already has a verdict", hint="Undo the verdict first."
+                )
             if row.submitted is None:
                 raise ConflictError("this group is not submitted")
             person = row.submitted_by

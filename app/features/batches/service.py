@@ -228,7 +228,7 @@ def make_batch(store: Store, dataset: str | int, new: NewBatch, *, actor: str) -
     with store.write() as session:
         if len(find_dataset_batches(session, [number])) >= MOST_BATCHES:
             raise ConflictError(
-                f"a dataset has at most {MOST_BATCHES} batches", hint="Delete one that is closed."
+                f"a dataset has at most {MOST_BATCHES} batches", hint="Delete a closed batch first."
             )
         ids = _choose_ids(session, number, new, query)
         if new.gold_every is not None:
@@ -268,7 +268,9 @@ def _choose_ids(session: Session, dataset: int, new: NewBatch, query: Query) -> 
         found = list(dict.fromkeys(new.tracks))
         known = {row.id for row in list_rows(session, dataset)}
         if strange := [one for one in found if one not in known]:
-            raise InputError(f"track {strange[0]} is not of this dataset", pointer="/tracks")
+            raise InputError(
+                f"track {strange[0]} does not belong to this dataset", pointer="/tracks"
+            )
         given = tracks_given(session, dataset) if new.skip_given else set()
     ids = [one for one in found if one not in given][: new.size or MOST_GROUPS]
     if not ids:
@@ -404,8 +406,8 @@ def _person_ids(store: Store, dataset: int, part: Part, names: Iterable[str]) ->
     missing = sorted(wanted - set(able))
     if missing:
         raise InputError(
-            f"{missing[0]} cannot be {part} here",
-            hint=f"Give them the role {part} in this dataset first.",
+            f"{missing[0]} does not have the role {part} in this dataset",
+            hint=f"Give them the role {part} first, or choose another person.",
             pointer=f"/{part}s",
         )
     return [able[name] for name in sorted(wanted)]
@@ -423,11 +425,14 @@ def _check_request(new: NewBatch) -> None:
 def _check_tracks(new: NewBatch) -> None:
     """Tracks are judged, each by one reviewer."""
     if new.annotators:
-        raise InputError("a batch of tracks takes reviewers, not annotators", pointer="/annotators")
+        raise InputError(
+            "a batch of tracks has reviewers only, no annotators", pointer="/annotators"
+        )
     if new.query or new.verdicts != 1 or new.gold_every is not None:
         raise InputError(
-            "a batch of tracks has no query, no gold groups, and one verdict on each",
-            hint="Name the tracks, or leave `tracks` out and give out groups.",
+            "a batch of tracks cannot have a query or gold groups, and each of its tracks"
+            " gets one verdict",
+            hint="Send only the tracks, or leave out `tracks` to assign groups.",
             pointer="/tracks",
         )
 
@@ -442,8 +447,8 @@ def _require_gold(session: Session, dataset: int) -> None:
     if not gold_heads(session, dataset):
         raise ConflictError(
             "no group of this dataset is a gold group",
-            hint="Mark gold groups first, take those of a sample or a frozen version, or assign "
-            "the batch without them.",
+            hint="Mark gold groups first, mark those of a sample or a frozen version, or create"
+            " the batch without gold groups.",
         )
 
 

@@ -101,7 +101,9 @@ def begin_thread(
     """
     text = _checked_comment(text)
     if at is not None and view is None:
-        raise InputError("a place in a picture needs the view that it is in", pointer="/view")
+        raise InputError(
+            "a comment on a point in a picture must name the view of that point", pointer="/view"
+        )
     with store.write() as session:
         group = _require_group(session, group_id)
         if view is not None and view not in group.views:
@@ -130,7 +132,7 @@ def add_reply(
         )
         if len(thread.comments) >= MOST:
             raise ConflictError(
-                f"a thread has at most {MOST} comments", hint="Begin another one on this group."
+                f"a thread has at most {MOST} comments", hint="Start another thread on this group."
             )
         before = {person_of(one.actor) for one in thread.comments if one.text is not None}
         _insert_comment(session, group, thread_id, text, actor, sorted(before))

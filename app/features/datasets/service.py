@@ -378,8 +378,8 @@ def delete_dataset(
     found = read_contents(store, dataset)
     if confirm != found.name:
         raise ConflictError(
-            f'the dataset is called "{found.name}"',
-            hint="Send its name as confirm: deleting cannot be undone.",
+            f'`confirm` is not the name of the dataset, which is "{found.name}"',
+            hint="Send the dataset's name as confirm: a deleted dataset cannot be restored.",
             pointer="/confirm",
         )
     identity = dataset_id(store, found.id)

@@ -353,7 +353,9 @@ def get_content(
         )
     path = services.exports.content(document.id)
     if document.state == "gone" or (document.state == "done" and not path.is_file()):
-        raise NotFoundError("the file of this export is gone", hint="Make the export again.")
+        raise NotFoundError(
+            "the file of this export is no longer on the server", hint="Make the export again."
+        )
     if document.state != "done":
         raise _not_ready_error(document)
     return FileResponse(
@@ -393,7 +395,7 @@ def _not_ready_error(document: ExportDocument) -> ConflictError:
     if document.state in ("waiting", "running"):
         return ConflictError(
             "the export is still being written",
-            hint=f"GET /api/v1/jobs/{document.id} says how far it is.",
+            hint=f"GET /api/v1/jobs/{document.id} shows its progress.",
         )
     reason = f": {document.error}" if document.error else ""
     return ConflictError(f"the export was not written{reason}", hint="Make the export again.")

@@ -119,8 +119,8 @@ class _ExportOptions:
         for name, formats in USERS.items():
             if self.format not in formats and getattr(self, name) != getattr(usual, name):
                 raise InputError(
-                    f"{self.format} does not use --{name}",
-                    hint=f"Leave it out. It is for {', '.join(sorted(formats))}.",
+                    f"exports in the format {self.format} do not use --{name}",
+                    hint=f"Leave it out. Only these formats use it: {', '.join(sorted(formats))}.",
                     pointer=f"/{name}",
                 )
 
@@ -138,9 +138,14 @@ class _ExportOptions:
                 )
         self.require_used()
         if self.images == "link" and isinstance(out, StoredPath):
-            raise InputError("a store cannot hold links; copy the images")
+            raise InputError(
+                "an object store cannot contain links to images; choose to copy the images"
+            )
         if self.images == "link" and out.suffix.lower() == ".zip":
-            raise InputError("a zip cannot hold links; export a folder or copy the images")
+            raise InputError(
+                "a zip file cannot contain links to images; export a folder, or choose to copy"
+                " the images"
+            )
 
 
 def export_dataset(
@@ -330,12 +335,14 @@ def _require_no_version_conflict(format: str, everything: bool, version: str | N
         return
     if format == CARRY:
         raise InputError(
-            "the format touchline carries the whole dataset; choose another format to export a frozen version",
+            "the format touchline always exports the whole dataset; choose another format to"
+            " export a frozen version",
             pointer="/version",
         )
     if everything:
         raise InputError(
-            "a frozen version always exports exactly its own groups; leave out all, or export the dataset itself",
+            "the option all cannot be combined with a frozen version, which exports exactly"
+            " its own groups; leave all out, or export the dataset itself",
             pointer="/all",
         )
 

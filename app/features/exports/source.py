@@ -357,7 +357,7 @@ class ExportImages:
         is_file = media.member is None and media.frame is None and not is_address(media.path)
         if self._images == "link" and is_file and self._is_upright(view, media):
             if not Path(media.path).is_file():
-                raise NotFoundError(f"{PurePosixPath(media.path).name} is not there")
+                raise NotFoundError(f"the image file {PurePosixPath(media.path).name} is missing")
             target = self._picture_path(group, view, PurePosixPath(media.path).suffix.lower())
             if target is not None:
                 target.symlink_to(media.path)

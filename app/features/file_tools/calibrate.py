@@ -300,7 +300,7 @@ def _write_results(
             file.parent.mkdir(parents=True, exist_ok=True)
             replace_file(file, text.encode(), durable=False, private=False)
     except OSError as error:
-        raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
+        raise InputError(f"the cameras cannot be written to {out} ({error.strerror})") from error
 
 
 def _files_of_earlier_run(out: Path) -> set[str]:
@@ -357,8 +357,9 @@ def score_files(
     if all(score is None for score in scores):
         frame, other = sorted(frames)[0], sorted(found)[0]
         raise InputError(
-            f'no camera belongs to a line file: cameras are called "{other}", frames "{frame}"',
-            hint="A camera of the frame 00002 lies in camera_00002.json.",
+            f'no camera file has the frame name of a line file: there is a camera of "{other}"'
+            f' and a line file of "{frame}"',
+            hint="The camera of the frame 00002 must be in the file camera_00002.json.",
         )
     # A line file that cannot be read is a frame without a camera.
     scores.extend([None] * (report.read - len(scores)))

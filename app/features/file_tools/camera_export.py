@@ -91,8 +91,8 @@ def _write_samples(
         shape = sizes.get(frame, size)
         if shape is None:
             raise InputError(
-                f"the camera of frame {frame} does not say the size of its image, which OpenTrackIO "
-                "needs: give it as --size 1280x720"
+                f"the camera of frame {frame} does not contain the size of its image, which"
+                " OpenTrackIO needs: give it as --size 1280x720"
             )
         if problem := opentrackio_problem(camera):
             raise DatasetFormatError(str(source), f"frame {frame}", None, problem)
@@ -121,7 +121,10 @@ def _read_track_rows(source: Path) -> dict[int, dict[str, Any]]:
         return {int(row["frame"]): row for row in rows}
     except (ValueError, LookupError, TypeError) as error:
         raise DatasetFormatError(
-            str(path), None, "frames", "is not a list of tracked frames"
+            str(path),
+            None,
+            "frames",
+            "is not a list of tracked frames as touchline track writes it",
         ) from error
 
 

@@ -58,7 +58,12 @@ def read_matches(path: Path) -> dict[str, str]:
     if path.suffix.lower() == ".json":
         value = read_json(content, str(path))
         if not isinstance(value, dict) or not all(isinstance(it, str) for it in value.values()):
-            raise DatasetFormatError(str(path), None, None, "is not an object of frame: match")
+            raise DatasetFormatError(
+                str(path),
+                None,
+                None,
+                "is not a JSON object that maps each frame name to a match name",
+            )
         return dict(value)
     rows = read_rows(content, str(path), ("frame", "match"), Limits())
     return {row["frame"].strip(): row["match"].strip() for _, row in rows if "match" in row}

@@ -78,7 +78,7 @@ def propose_files(
             progress(len(rows))
     if not rows:
         why = f": {report.problems[0].message}" if report.problems else ""
-        raise InputError(f"there are no pictures (jpg, png or webp) to read{why}")
+        raise InputError(f"no picture (jpg, png or webp) can be read{why}")
     pitches = _pitches_shown_by_films(seen)
     if pitches:
         for at, picture in enumerate(read_pictures(sources, settings, Report())):
@@ -216,7 +216,7 @@ def _read_known_cameras(paths: Sequence[Path]) -> list[Camera]:
     cameras = [camera for path in paths for camera in read_cameras(path, report).values()]
     if paths and not cameras:
         why = f": {report.problems[0].message}" if report.problems else ""
-        raise InputError(f"there is no known camera to read{why}")
+        raise InputError(f"no camera can be read from the files of known cameras{why}")
     return cameras
 
 

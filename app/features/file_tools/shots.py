@@ -254,5 +254,7 @@ def _parse_number(row: Mapping[str, str], column: str, name: str, line: int) -> 
     except ValueError:
         value = float("nan")
     if not np.isfinite(value) or abs(value) > 1e9:
-        raise DatasetFormatError(name, f"line {line}", column, f'is "{text}", no number')
+        raise DatasetFormatError(
+            name, f"line {line}", column, f'is "{text}", which is not a number'
+        )
     return value

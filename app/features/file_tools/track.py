@@ -68,7 +68,7 @@ def track_files(
     if turn and lines:
         raise InputError(
             "the cameras cannot be turned: the given lines already say which half of the pitch is left",
-            hint="Name the lines for the other half, or leave one of the two out.",
+            hint="Name the lines for the other half, or leave out one of the two options.",
         )
     named = _parse_names(lines)
     contents = {number: _read_file(path) for number, path in named.items()}
@@ -120,7 +120,10 @@ def track_video(
 def _parse_lines(content: bytes, shown: str, size: ImageSize, report: Report) -> Lines:
     documents = read_line_documents(content, shown, report)
     if len(documents) != 1:
-        raise InputError(f"{shown} has the lines of {len(documents)} frames; give a file of one")
+        raise InputError(
+            f"{shown} has the lines of {len(documents)} frames; give a file with the lines of"
+            " one frame"
+        )
     lines, _ = lines_from_json(documents[0].lines, size, shown, report)
     if not lines:
         raise report.refusal(f"{shown} has no line of a known marking")
@@ -149,7 +152,9 @@ def _read_file(path: Path) -> bytes:
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror})") from error
     if len(content) > LARGEST_LINES:
-        raise InputError(f"{path} is larger than the lines of a frame are ({LARGEST_LINES} bytes)")
+        raise InputError(
+            f"{path} is larger than {LARGEST_LINES} bytes, which is the limit for a line file"
+        )
     return content
 
 
@@ -250,4 +255,4 @@ def write_cameras(out: Path, found: Sequence[FrameCamera], result: Mapping[str, 
         replace_file(out / RESULT, text.encode(), durable=False, private=False)
     except (OSError, UnsafePathError) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)
-        raise InputError(f"{out} cannot hold the cameras ({why})") from error
+        raise InputError(f"the cameras cannot be written to {out} ({why})") from error

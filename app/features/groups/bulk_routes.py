@@ -234,9 +234,9 @@ def _require_etags(edit: BulkEdit) -> None:
         pointer = f"/items/{index}/etag"
         if item.etag is None and edit.if_match is None:
             raise InputError(
-                "an item must name the state that it builds on",
-                hint='Send the ETag of its group as "etag"; or "if_match": "*" beside the items to '
-                "change whatever is there. Nothing was done.",
+                "an item does not contain the ETag of its group",
+                hint='Send the ETag of the group that you changed as "etag" of the item, or send'
+                ' "if_match": "*" beside the items to overwrite any state. Nothing was changed.',
                 pointer=pointer,
             )
         if item.etag is not None and not STRONG_ETAG.fullmatch(item.etag):

@@ -107,7 +107,7 @@ class SetStationCalibration:
     def apply(self, station: Station) -> Station:
         """The station with that choice."""
         if self.calibration not in CALIBRATIONS:
-            raise InputError('the calibration is "given" or "lines"', pointer="/calibration")
+            raise InputError('calibration must be "given" or "lines"', pointer="/calibration")
         return replace(station, calibration=self.calibration)
 
     def inverse(self, station: Station) -> SetStationCalibration:
@@ -130,7 +130,7 @@ class SetStationCamera:
         """The station with that camera."""
         if self.given is None and self.covariance is not None:
             raise InputError(
-                "a covariance needs its camera in `given`",
+                "`covariance` needs a camera in `given`",
                 pointer="/covariance",
             )
         return replace(
@@ -402,6 +402,6 @@ def _check_ball(ball: BallAnnotation) -> None:
             raise InputError("a ball's box needs a width and a height above zero", pointer="/box")
     if not all(math.isfinite(value) and abs(value) <= MAX_PIXEL for value in numbers):
         raise InputError(
-            "the place of the ball is not a valid pixel coordinate",
+            "the position of the ball is not a valid pixel coordinate",
             pointer="/box" if ball.box else "/point",
         )

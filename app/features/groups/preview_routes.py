@@ -140,7 +140,7 @@ def prepare_solver_process() -> None:
 
 
 def _large_edit_error(error: WorkerEnded) -> OverloadedError:
-    return OverloadedError(f"solving this {error}", hint="Nothing was saved. Try it again.")
+    return OverloadedError(f"solving this group {error}", hint="Nothing was saved. Try it again.")
 
 
 def preview_edits(group: Group, request: PreviewRequest) -> list[Edit]:
@@ -266,4 +266,6 @@ def _solve_preview(
 
 
 def _process_ended_error(error: WorkerEnded) -> OverloadedError:
-    return OverloadedError(f"this preview {error}", hint="Nothing was changed. Try it again.")
+    return OverloadedError(
+        f"computing this preview {error}", hint="Nothing was changed. Try it again."
+    )

@@ -199,8 +199,8 @@ class BallEdit(BaseModel):
             raise ValueError("a ball that is out of view was not followed there")
         if not placed and not self.out_of_view:
             raise ValueError(
-                "give a box, a point or out_of_view: true; null in place of the whole ball "
-                "says that there is none"
+                "give a box, a point or out_of_view: true; to remove the ball, send null in place"
+                " of the whole ball"
             )
         return self
 

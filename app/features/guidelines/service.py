@@ -102,7 +102,7 @@ def write_guidelines(
         ConflictError: Somebody wrote another version meanwhile.
     """
     if len(text) > MAX_LETTERS:
-        raise InputError(f"guidelines have at most {MAX_LETTERS:,} letters", pointer="/text")
+        raise InputError(f"guidelines have at most {MAX_LETTERS:,} characters", pointer="/text")
     with store.write() as session:
         dataset_id = guidelines_dataset(session, need_dataset(session, dataset))
         heads = guideline_heads(session, dataset_id)

@@ -242,8 +242,8 @@ def ingest_batch(
     """
     if is_copy(session, origin.dataset_id):
         raise ConflictError(
-            "this dataset holds independent annotations of one person; importing into it is not "
-            "possible",
+            "this dataset holds the independent annotations of one person, so nothing can be"
+            " imported into it",
             hint="Import into the dataset that the annotated groups come from.",
         )
     shared = SharedStations(

@@ -226,7 +226,8 @@ def _group_of_record(value: Json, shared: Mapping[str, Station]) -> Group:
             _check_left_out(view)
         if not isinstance(fields["station"], str) and _checked_station(view.station).shared:
             raise InputError(
-                f"spells the static camera {view.station.key} inside a view, where only its key belongs"
+                f"contains the whole static camera {view.station.key} inside a view, which must"
+                " contain only its key"
             )
     return group
 
@@ -246,7 +247,8 @@ def _checked_station(station: Station) -> Station:
     for side in (station.size.width, station.size.height):
         if not isinstance(side, int) or isinstance(side, bool) or not 2 <= side <= MAX_SIDE:
             raise InputError(
-                f"has an image side of {side}, and sides are whole numbers from 2 to {MAX_SIDE:,}"
+                f"has an image width or height of {side}; both must be whole numbers from 2 to"
+                f" {MAX_SIDE:,}"
             )
     if station.calibration not in CALIBRATIONS:
         raise InputError(f"has a `calibration` that is none of {', '.join(CALIBRATIONS)}")
@@ -356,6 +358,6 @@ def _require_text(value: Json, *, empty: bool = False, most: int = MAX_TEXT) -> 
         raise InputError("has an empty text where a text is required")
     if not isinstance(value, str) or len(value) > most:
         raise InputError(
-            f"has {_describe_value(value)} where a text of at most {most} letters is expected"
+            f"has {_describe_value(value)} where a text of at most {most} characters is expected"
         )
     return value

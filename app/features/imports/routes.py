@@ -175,8 +175,9 @@ async def upload_file(
     else:
         if not mark:
             raise InputError(
-                f"{name} is uploaded in parts and needs a mark that identifies it",
-                hint="Send its modification time or digest as mark.",
+                f"{name} is uploaded in parts and needs `mark`, a value that changes when the file"
+                " changes",
+                hint="Send the modification time or digest of the file as mark.",
                 pointer="/mark",
             )
         upload = await _run_in_disk_thread(

@@ -117,7 +117,7 @@ def resolve_folder(settings: Settings, path: str) -> Root:
         )
     found = resolve_inside(folders[root], inside) if inside else folders[root]
     if not os.path.exists(found):  # noqa: PTH110 - a path that is too long is not there either
-        raise NotFoundError(f'there is no "{path}" to import from')
+        raise NotFoundError(f'there is no file or folder "{path}" in the folders for imports')
     return found
 
 
@@ -358,8 +358,8 @@ class PartWriter:
             grown = replace(upload, bytes=upload.bytes + len(fresh))
             if grown.bytes > upload.whole_size:
                 raise InputError(
-                    f"{upload.name} is longer than the {upload.whole_size:,} bytes that it was said "
-                    "to have",
+                    f"{upload.name} is longer than the {upload.whole_size:,} bytes that were declared"
+                    " when its upload began",
                     hint="Start a new upload for the changed file.",
                 )
             if fresh:
@@ -408,7 +408,7 @@ def _storage_errors(upload: Upload) -> Iterator[None]:
     except OSError as error:
         why = "is full" if is_full_disk(error) else f"refuses ({error.strerror})"
         raise StorageError(
-            f"the disk of the server {why}: {upload.bytes:,} of {upload.whole_size:,} bytes of "
-            f"{upload.name} are there",
+            f"the disk of the server {why}: {upload.bytes:,} of {upload.whole_size:,} bytes of"
+            f" {upload.name} were received",
             hint="Free some space and send the file again: the upload continues where it stopped.",
         ) from error

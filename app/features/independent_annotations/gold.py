@@ -153,8 +153,9 @@ def mark_group(store: Store, group_id: int, start: str, *, actor: str) -> GoldGr
     state = load_solved(store, group_id)
     if state.verdict.state not in JUDGED or state.verdict.stale:
         raise ConflictError(
-            "only a group that is accepted or rejected as it is now can be a gold group",
-            hint="Give it a verdict first: annotators are measured against what it holds.",
+            "only a group whose current state was accepted or rejected can be a gold group",
+            hint="Give the group a verdict first: annotators are compared with its lines and"
+            " balls.",
         )
     with store.write() as session:
         if is_copy(session, state.dataset_id):
@@ -277,7 +278,7 @@ def median_interval(values: Sequence[float | None]) -> MedianInterval:
 def check_start(start: str) -> None:
     """Raises InputError where annotators cannot begin with that."""
     if start not in STARTS:
-        raise InputError(f"annotators begin with {', '.join(STARTS)}", pointer="/start")
+        raise InputError(f"start must be one of {', '.join(STARTS)}", pointer="/start")
 
 
 def _truth_values(state: GroupState) -> Json:

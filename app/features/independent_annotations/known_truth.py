@@ -177,7 +177,9 @@ def _version_of_choice(store: Store, dataset: str | int, choice: GoldChoice) -> 
         return None
     if choice.version is None:
         raise InputError(
-            "name the frozen version whose verdicts and balls are the truth", pointer="/version"
+            "`version` is missing: give the frozen version whose verdicts and balls are taken"
+            " as true",
+            pointer="/version",
         )
     return find_version(store, dataset, choice.version)
 
@@ -203,13 +205,14 @@ def _truths_of_version(
 def _no_truth_error(source: TruthSource) -> InputError:
     if source is TruthSource.SAMPLE:
         return InputError(
-            "the truth of none of these groups is known",
-            hint=f"Their frames have to lie where the sample was written, beside its {TRUTH}.",
+            "none of these groups has known true values",
+            hint="The frames must be in the folder that the sample was written to, together with"
+            f" its file {TRUTH}.",
             pointer="/source",
         )
     return InputError(
-        "none of these groups in this version was agreed on by several people or decided by a "
-        "reviewer",
+        "the version has no verdict on these groups that several people agreed on or a"
+        " reviewer decided",
         hint="Let several people annotate them in a batch first.",
         pointer="/version",
     )

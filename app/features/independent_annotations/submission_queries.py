@@ -48,7 +48,7 @@ def _require_person(annotation: IndependentAnnotation, actor: str) -> None:
     """Raise ForbiddenError where a copy is somebody else's."""
     # On a server without accounts everybody is the local user.
     if person_of(actor) not in (annotation.person, LOCAL_USER):
-        raise ForbiddenError(f"only {annotation.person} submits and judges this annotation")
+        raise ForbiddenError(f"only {annotation.person} can submit and judge this annotation")
 
 
 def submit_copy(

@@ -396,7 +396,7 @@ def _referenced_keys(key: str, body: bytes | None) -> set[str]:
         if not key.startswith((SAID, SOLUTION)):
             unpack(body)
         if fitting_key(key, body) != key:
-            raise ValueError(f"{key} is the key of other content")
+            raise ValueError(f"the key {key} does not match the content stored under it")
         if key.startswith(SAID):
             return named_texts(read_json(body))
         return calibration_names(read_json(body)) if key.startswith(SOLUTION) else set()

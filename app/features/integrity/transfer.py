@@ -228,8 +228,9 @@ def transfer_database(
 def _null_character_error(found: Sequence[NullCharacter]) -> InputError:
     count = plural(len(found), "text holds", "texts hold")
     return InputError(
-        f"{count} U+0000, which no database takes any more: {list_null_characters(found)}",
-        hint="Run touchline transfer with --replace-null: it writes U+FFFD in its place.",
+        f"{count} the character U+0000, which databases no longer store:"
+        f" {list_null_characters(found)}",
+        hint="Run touchline transfer with --replace-null: it replaces the character with U+FFFD.",
     )
 
 
@@ -243,8 +244,8 @@ def _copy_all_tables(
     anchor = anchor_of(session)
     if anchor is None:
         raise InputError(
-            "the database that is copied was never set up by Touchline",
-            hint="Run touchline migrate.",
+            "the source database has no complete Touchline schema",
+            hint="Run touchline migrate on the source, or name another source.",
         )
     _prepare_target(target, dialect, anchor.installation)
     copied = 0
@@ -272,7 +273,9 @@ def _prepare_target(target: Engine, dialect: Dialect, installation: str) -> None
     if revision is None:
         with target.connect() as connection:
             if inspect(connection).get_table_names():
-                raise InputError("the target holds tables of something else", hint=_EMPTY)
+                raise InputError(
+                    "the target database contains tables of another program", hint=_EMPTY
+                )
         make_schema(target, dialect, new=True)
         with target.begin() as connection:
             connection.execute(text("DELETE FROM installation"))
@@ -281,7 +284,7 @@ def _prepare_target(target: Engine, dialect: Dialect, installation: str) -> None
     with target.connect() as connection:
         keys = list(connection.execute(text("SELECT key FROM installation")).scalars())
     if revision != UNFINISHED or keys not in ([], [installation]):
-        raise InputError("the target is in use already", hint=_EMPTY)
+        raise InputError("Touchline already uses the target database", hint=_EMPTY)
 
 
 _EMPTY = "Name a database without tables, or a home that does not exist yet."
@@ -343,7 +346,8 @@ def _require_equal(session: Session, connection: Connection) -> dict[str, int]:
         ours, theirs = _digest_rows(connection, table), _digest_rows(session, table)
         if ours != theirs:
             raise DamagedError(
-                f"table {table.name} of the copy is not equal: {ours[0]:,} rows of {theirs[0]:,}",
+                f"table {table.name} of the copy differs from the source: it has {ours[0]:,} rows,"
+                f" the source {theirs[0]:,}",
                 hint="Empty the target and run touchline transfer again.",
             )
         counts[table.name] = ours[0]
@@ -363,7 +367,9 @@ def _require_same_chain(session: Session, entries: int, last: str) -> int:
     count = verify_chain(session)
     found = session.execute(text("SELECT hash FROM log WHERE id = :id"), {"id": entries})
     if count != entries or (found.scalar() or "") != last:
-        raise DamagedError("the log of the copy does not end as the source's does")
+        raise DamagedError(
+            "the last entry of the copied log differs from the last entry of the source's log"
+        )
     return count
 
 

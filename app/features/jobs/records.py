@@ -98,7 +98,7 @@ class JobRecords:
         """
         with self._store.write() as session:
             if need_job(session, job_id).state in OPEN:
-                raise ConflictError(f"job {job_id} is not over yet", hint="Cancel it first.")
+                raise ConflictError(f"job {job_id} has not ended yet", hint="Cancel it first.")
             delete_job(session, job_id)
 
     def _save_progress_until_ended(self, run: JobRun, ended: threading.Event) -> None:

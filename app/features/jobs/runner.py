@@ -37,11 +37,11 @@ STOP_SECONDS = 2.0
 _AGAIN = "Start it again."
 _MEMORY = f"{_AGAIN} Where it happens often, give more memory."
 _ENDS: dict[EndReason, tuple[str, str]] = {
-    "memory": ("needs more memory than there is", _MEMORY),
-    "killed": ("was killed, most likely for want of memory", _MEMORY),
+    "memory": ("needs more memory than the machine has free", _MEMORY),
+    "killed": ("was killed, most likely because the machine ran out of memory", _MEMORY),
     "terminated": ("was stopped", _AGAIN),
     "crash": ("crashed", f"{_AGAIN} Where it crashes again, report it."),
-    "processor": ("took too long to work out", _AGAIN),
+    "processor": ("took too much processor time", _AGAIN),
     "silence": ("made no progress for too long", f"{_AGAIN} The disk or a store may not answer."),
 }
 """How a process ended, and what to do about it."""

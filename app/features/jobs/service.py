@@ -186,7 +186,7 @@ class Jobs(JobRecords):
         """
         job = self.get(job_id)
         if job.state in (DONE, FAILED):
-            raise ConflictError(f"job {job_id} is over already")
+            raise ConflictError(f"job {job_id} has already ended")
         with self._changed:
             run = next((item for item in self._queue.waiting if item.job.id == job_id), None)
             running = self._queue.running_of(job_id)

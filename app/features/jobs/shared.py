@@ -122,7 +122,7 @@ class SharedJobs(Jobs):
         """See ``Jobs``."""
         with self._store.write() as session:
             if need_job(session, job_id).state in (DONE, FAILED):
-                raise ConflictError(f"job {job_id} is over already")
+                raise ConflictError(f"job {job_id} has already ended")
             self._request_end(session, [job_id])
             job = record_cancellation(session, need_job(session, job_id), by)
         self._announce(job)
@@ -299,7 +299,7 @@ class SharedJobs(Jobs):
 
     def _require_known_work(self, run: JobRun) -> None:
         if run.job.kind not in self._makers:
-            raise RuntimeError(f"no process could make the work of {run.job.kind}")
+            raise RuntimeError(f"no process can run jobs of the kind {run.job.kind}")
 
     def _find_waiting_job(self, session: Session, new: NewJob) -> int | None:
         """See ``Jobs``."""

@@ -63,7 +63,8 @@ def set_banner(
     at = datetime.now(UTC)
     if until is not None and until <= max(starts or at, at):
         raise InputError(
-            "the notice would never be shown: until is over before it begins", pointer="/until"
+            "the notice would never be shown: `until` must be later than now and than the start",
+            pointer="/until",
         )
     begin, end = (None if time is None else text_of(time) for time in (starts, until))
     banner = Banner(text, begin, end)

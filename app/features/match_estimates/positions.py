@@ -210,7 +210,10 @@ def take_back_positions(
     ):
         return
     if not entries:
-        raise ConflictError(f"nothing is shared in {match}")
+        raise ConflictError(
+            f"the frames of {match or 'groups without a match'} share no camera position, so"
+            " there is nothing to undo"
+        )
     edits = {entry.group_id or 0: edit_from_json(entry.body["inverse"]) for entry in entries}
     share = entries[0]
     body = {

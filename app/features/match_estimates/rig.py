@@ -122,18 +122,18 @@ def load_adjustable_cameras(
     states = [load_station(store, station) for station in stations]
     if len(states) < 2:
         raise InputError(
-            f"{found.name} has {len(states)} static cameras, a rig has two at least",
+            f"{found.name} has {len(states)} static cameras; adjusting a rig needs at least two",
             hint="Only cameras that stand still can be adjusted to each other.",
         )
     if any(state.station.given_covariance is not None for state in states):
         raise ConflictError(
             f"the cameras of {found.name} were adjusted already",
-            hint="Take that back first, or the same balls would count twice.",
+            hint="Undo that adjustment first, otherwise the same balls would be used twice.",
         )
     if len(pitches) != 1:
         raise InputError(
-            f"the static cameras of {found.name} are given {len(pitches)} sizes of pitch",
-            hint="Give their match one size of pitch first.",
+            f"the static cameras of {found.name} have {len(pitches)} different pitch sizes",
+            hint="Set one pitch size for their match first.",
         )
     return states, pitches.pop(), found.policy
 
@@ -165,7 +165,7 @@ def accept_rig(store: Store, proposed: ProposedRig, what: str, *, actor: str) ->
         InputError: ``what`` is neither.
     """
     if what not in (CAMERAS, SIGMA):
-        raise InputError('accept "cameras" or "sigma"')
+        raise InputError('`accept` must be "cameras" or "sigma"')
     edits = [
         (
             proposed.stations[change.key],

@@ -88,7 +88,7 @@ class RigRequest(BaseModel):
     @model_validator(mode="after")
     def _seen(self) -> RigRequest:
         if self.accept is not None and self.inputs is None:
-            raise ValueError("to accept a proposal, give the inputs of the one that was looked at")
+            raise ValueError("to accept a proposal, send the `inputs` of that proposal")
         return self
 
 

@@ -98,7 +98,7 @@ def reading_from_row(digest: str, body: bytes) -> PaintReading:
     with as_written():
         reading = reading_from_text(decompress(body).decode())
         if reading.digest != digest:
-            raise ValueError(f"{digest} is the digest of another reading")
+            raise ValueError(f"the paint measurement stored under {digest} has another digest")
     return reading
 
 

@@ -181,7 +181,7 @@ def require_readable(
         found = require_matches(session, dataset, matches)
     if found.policy.calibration.source != "paint":
         raise ConflictError(
-            f'the policy of "{found.name}" does not use the paint of pictures',
+            f'the policy of "{found.name}" does not use the paint in pictures',
             hint="Choose the policy touchline, or set calibration.source to paint, first.",
         )
     return found
@@ -216,7 +216,10 @@ def take_back_paint(
     if stopped and not (entries and entries[0].body["run"] in stopped_runs):
         return
     if not entries:
-        raise ConflictError(f'no paint was read in "{found.name}"')
+        raise ConflictError(
+            f'no picture of "{found.name}" has a measurement of its paint, so there is nothing'
+            " to undo"
+        )
     before: dict[int, Mapping[str, str]] = {}
     for entry in entries:
         # A run that was begun again may have given a group something twice.

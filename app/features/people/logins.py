@@ -338,7 +338,7 @@ class Logins:
         with self._store.read() as session:
             person = person_by_id(session, login.person_id)
         if person is None or not is_password(old, person.password):
-            raise InputError("this is not your present password", pointer="/old")
+            raise InputError("this is not your current password", pointer="/old")
         hashed = hash_password(new, login.name, pointer="/new")
         with self._store.write() as session:
             found = list_sessions(session, login.person_id, **self._expiry_limits(self._clock()))

@@ -82,7 +82,7 @@ class ProviderClient:
             pass
         log.warning("the provider names an address of another server", address=repr(address)[:200])
         raise ConflictError(
-            f"{self._rules.label} names an address to which this server sends no requests",
+            f"{self._rules.label} names an address that this server is not allowed to contact",
             hint="The operator of this server can allow it with TOUCHLINE_SSO_HOSTS.",
         )
 
@@ -287,7 +287,7 @@ class Provider:
                     "the provider is another one", status=status, it=repr(found.get("issuer"))
                 )
                 raise self._provider_error(
-                    "does not answer as the provider in this server's settings"
+                    "is not the provider in TOUCHLINE_SSO_ISSUER: it reports another issuer"
                 )
             for name in ("authorization_endpoint", "token_endpoint", "jwks_uri"):
                 self._answers.require_own(found.get(name))
@@ -317,7 +317,9 @@ class Provider:
         usable = [one for one in keys if one is not None]
         if status != 200 or not usable:
             log.warning("the provider has no keys", status=status)
-            raise self._provider_error("shows no keys by which its logins can be checked")
+            raise self._provider_error(
+                "publishes no keys with which this server can verify its logins"
+            )
         self._keys = _CachedResponse(jwk.KeySet(usable), self._clock())
         return jwk.KeySet(usable)
 

@@ -100,7 +100,8 @@ def require_permission(role: Role, action: Action, where: str = "") -> None:
     if not role_allows(role, action):
         raise ForbiddenError(
             f"this action needs the role {LEAST[action]}{where}; yours is {role}",
-            hint="An admin of this server can change your role, a lead that in their dataset.",
+            hint="An admin of this server can change your role; a lead can change it within a"
+            " dataset.",
         )
 
 
@@ -207,9 +208,9 @@ def checked_name(text: str) -> str:
     name = text.strip().lower()
     if not _NAME.fullmatch(name) or name in _TAKEN:
         raise InputError(
-            f"{quoted(name)} cannot be the name of a person",
-            hint="Use up to 40 small letters, digits and . _ -, with a letter or digit at both ends;"
-            f" {', '.join(sorted(_TAKEN))} are reserved.",
+            f"{quoted(name)} is not a valid user name",
+            hint="Use up to 40 lowercase letters, digits and . _ -, with a letter or digit at both"
+            f" ends; {', '.join(sorted(_TAKEN))} are reserved.",
             pointer="/name",
         )
     return name
@@ -220,7 +221,8 @@ def require_no_token(actor: str) -> None:
     if person_of(actor) != actor:
         raise ForbiddenError(
             "a token cannot add people or change their rights",
-            hint="An admin does it in the browser, or touchline users on the machine.",
+            hint="An admin can do this in the browser, or with touchline users on the server's"
+            " machine.",
         )
 
 

@@ -131,7 +131,7 @@ class SecondFactors:
             if not use_totp(session, self._store, login.person_id, code, self._clock()):
                 raise InputError(
                     "this code is wrong or has expired",
-                    hint="Check the clock of the device, and type the present code.",
+                    hint="Check the clock of the device, and type the current code.",
                     pointer="/code",
                 )
             confirm_second_factor(session, login.person_id, code_hashes(codes))
@@ -234,4 +234,4 @@ def require_password(store: Store, login: Login, password: str | None, at: datet
     with store.read() as session:
         person = person_by_id(session, login.person_id)
     if person is None or not is_password(password, person.password):
-        raise InputError("that is not your password", pointer="/password")
+        raise InputError("the password is wrong", pointer="/password")

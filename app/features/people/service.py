@@ -131,7 +131,8 @@ def invite(store: Store, name: str, role: Role, *, actor: str) -> tuple[Person, 
     with store.write() as session:
         if person_by_name(session, name) is not None:
             raise ConflictError(
-                f"there is already a user {name}", hint="A new link for them: reset their password."
+                f"there is already a user {name}",
+                hint="To make a new link for this user, reset their password.",
             )
         person, link = insert_invited(session, name, role, actor=actor)
         return _read_person(session, person), link
@@ -163,7 +164,9 @@ def renew_link(store: Store, person_id: int, *, actor: str) -> tuple[Person, Lin
                 "you cannot create a link for yourself", hint="Change the password under Account."
             )
         if person.disabled:
-            raise ConflictError(f"{person.name} is disabled", hint="Enable them first.")
+            raise ConflictError(
+                f"the account of {person.name} is disabled", hint="Enable the account first."
+            )
         log_account_event(session, actor, person.name, "link", person.role)
         link = insert_new(session, person_id, by=actor, at=datetime.now(UTC))
         return _read_person(session, person_id), link
@@ -198,7 +201,7 @@ def change_person(
         loses = person.role is Role.ADMIN and (off or wanted is not Role.ADMIN)
         if loses and not count_people_who_can_log_in(session, Role.ADMIN, but=person_id):
             raise ConflictError(
-                f"{person.name} is the last admin who can log in",
+                f"{person.name} is the only admin who can log in",
                 hint="Make another person admin first.",
             )
         if wanted is not person.role:

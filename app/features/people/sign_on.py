@@ -294,7 +294,7 @@ class SignOn:
             name = checked_name(self.rules.name_for(claims))
         except InputError:
             raise NotLoggedInError(
-                f"{self.rules.label} gives you a name that Touchline cannot use",
+                f"{self.rules.label} sent a user name for you that Touchline does not allow",
                 hint=self._unknown_account_hint(),
             ) from None
         if person_by_name(session, name) is not None:

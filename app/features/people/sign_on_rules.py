@@ -108,7 +108,7 @@ def url_origin(address: str) -> str:
     host = parts.hostname or ""
     secure = parts.scheme == "https" or (parts.scheme == "http" and host in LOOPBACK)
     if not secure or not host or parts.username is not None or not address.isprintable():
-        raise ValueError(f"{address[:200]!r} is not an address with TLS")
+        raise ValueError(f"{address[:200]!r} is not an https address")
     return f"{parts.scheme}://{host}:{parts.port or _PORTS[parts.scheme]}"
 
 
@@ -136,13 +136,14 @@ def read_rules(settings: Settings) -> SignOnRules | None:
             )
             if not value
         ]
-        raise _incomplete_error(f"single sign-on lacks {' and '.join(absent)}")
+        raise _incomplete_error(f"single sign-on needs the settings {' and '.join(absent)}")
     if not settings.team:
         raise InputError(
-            "single sign-on is for the server of a team", hint="Serve with --team, or unset it."
+            "single sign-on works only on a server with accounts",
+            hint="Serve with --team, or unset the TOUCHLINE_SSO settings.",
         )
     if not (client + secret).isascii():
-        raise _incomplete_error("the client's id and secret have letters that no provider gives")
+        raise _incomplete_error("the client's id and secret must contain only ASCII characters")
     _require_complete_settings(settings)
     return SignOnRules(
         issuer,
@@ -164,14 +165,15 @@ def read_rules(settings: Settings) -> SignOnRules | None:
 def _require_complete_settings(settings: Settings) -> None:
     if bool(settings.sso_group_claim) != bool(settings.sso_groups):
         raise _incomplete_error(
-            "TOUCHLINE_SSO_GROUP_CLAIM and TOUCHLINE_SSO_GROUPS belong together"
+            "TOUCHLINE_SSO_GROUP_CLAIM and TOUCHLINE_SSO_GROUPS must be set together"
         )
     if "openid" not in settings.sso_scope.split():
-        raise _incomplete_error("TOUCHLINE_SSO_SCOPE needs the word openid")
+        raise _incomplete_error("TOUCHLINE_SSO_SCOPE must contain openid")
     if settings.sso_new_role and not (settings.sso_domains or settings.sso_groups):
         raise _incomplete_error(
-            "TOUCHLINE_SSO_NEW_ROLE lets in whom nobody here knows: say of which TOUCHLINE_SSO_DOMAINS"
-            f' or TOUCHLINE_SSO_GROUPS (["{ALL}"] as domains: whoever the provider knows)'
+            "TOUCHLINE_SSO_NEW_ROLE creates accounts for new people: set"
+            f' TOUCHLINE_SSO_DOMAINS or TOUCHLINE_SSO_GROUPS to limit who gets one (["{ALL}"]'
+            " as domains allows everybody whom the provider knows)"
         )
 
 
@@ -189,10 +191,10 @@ def _allowed_hosts(addresses: Sequence[str]) -> frozenset[str]:
         found = [(urlsplit(one), url_origin(one)) for one in addresses]
     except ValueError as error:
         raise _incomplete_error(
-            f"{error}, as TOUCHLINE_SSO_ISSUER and TOUCHLINE_SSO_HOSTS need"
+            f"{error}, which TOUCHLINE_SSO_ISSUER and TOUCHLINE_SSO_HOSTS require"
         ) from None
     if any(parts.query or parts.fragment for parts, _ in found):
-        raise _incomplete_error("an address of the provider has neither ? nor #")
+        raise _incomplete_error("an address of the provider must not contain ? or #")
     return frozenset(origin for _, origin in found)
 
 
@@ -201,7 +203,10 @@ def _read_client_secret(settings: Settings) -> str:
     if path is None:
         return given.get_secret_value().strip() if given else ""
     if given:
-        raise _incomplete_error("the client's secret is given twice, by a file and without")
+        raise _incomplete_error(
+            "the client's secret is given twice: by TOUCHLINE_SSO_CLIENT_SECRET and by"
+            " TOUCHLINE_SSO_CLIENT_SECRET_FILE"
+        )
     return read_private(path, _variable_name("client_secret_file"))
 
 
@@ -308,7 +313,7 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
             raise NotFoundError("no account of a provider is linked with that person")
         if person.role == Role.ADMIN and not count_people_who_can_log_in(session, Role.ADMIN):
             raise ConflictError(
-                f"{person.name} is the last admin who can log in",
+                f"{person.name} is the only admin who can log in",
                 hint="Make another person admin first.",
             )
         delete_logins(session, person_id, way=LoginMethod.SIGN_ON)

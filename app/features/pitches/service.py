@@ -230,7 +230,7 @@ def _requested_size(state: PitchState, text: str) -> Pitch:
     if state.previous is None:
         raise InputError(
             f"{state.match or 'groups without a match'}: there is no earlier pitch size to restore",
-            hint="It was never changed. Give a size, such as 105x68.",
+            hint="The pitch size was never changed. Give a size, such as 105x68.",
         )
     return state.previous
 

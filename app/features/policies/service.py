@@ -160,7 +160,7 @@ def unknown_policy(name: str, otherwise: str, *, pointer: str | None = None) -> 
     meant = f"did you mean {nearest[0]}?" if nearest else f"there are {', '.join(POLICIES)}"
     return InputError(
         f'there is no policy "{name}", and {otherwise}; {meant}',
-        hint="A policy of one's own comes with its thresholds.",
+        hint="To make a policy of your own, send its thresholds.",
         pointer=pointer,
     )
 
@@ -230,7 +230,8 @@ def _flatten_values(values: Mapping[str, Any], pointer: str) -> Iterator[tuple[s
         if key == CALIBRATION:
             if not isinstance(value, dict):
                 raise InputError(
-                    f"{CALIBRATION} is a mapping of thresholds", pointer=f"{pointer}/{CALIBRATION}"
+                    f"{CALIBRATION} must be a mapping of thresholds",
+                    pointer=f"{pointer}/{CALIBRATION}",
                 )
             yield from _flatten_values(
                 {f"{CALIBRATION}.{inner}": item for inner, item in value.items()}, pointer
@@ -252,7 +253,7 @@ def _check_threshold(
     name, place = threshold.name, f"{pointer}/{threshold.name.replace('.', '/')}"
     if isinstance(threshold.default, bool):
         if not isinstance(value, bool):
-            raise InputError(f"{name} is true or false", pointer=place)
+            raise InputError(f"{name} must be true or false", pointer=place)
         return value
     if value is None and threshold.optional:
         return None
@@ -262,19 +263,19 @@ def _check_threshold(
         return value
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not number or not math.isfinite(float(value)):  # type: ignore[arg-type]
-        raise InputError(f"{name} is a number", pointer=place)
+        raise InputError(f"{name} must be a number", pointer=place)
     found = float(value)  # type: ignore[arg-type]
     low, high = threshold.minimum, threshold.maximum
     if (low is not None and found < low) or (high is not None and found > high):
         unit = f" {threshold.unit}" if threshold.unit else ""
-        raise InputError(f"{name} lies between {low:g} and {high:g}{unit}", pointer=place)
+        raise InputError(f"{name} must lie between {low:g} and {high:g}{unit}", pointer=place)
     return found
 
 
 def _checked_name(name: object) -> str:
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
-            "the name of a policy is up to 80 letters, digits, spaces and . _ + -",
+            "the name of a policy may have up to 80 letters, digits, spaces and . _ + -",
             pointer="/name",
         )
     return name
@@ -285,7 +286,7 @@ def _require_honest(policy: Policy) -> None:
     if policy.name in POLICIES and not is_shipped(policy):
         raise InputError(
             f'"{policy.name}" is the name of a policy with other thresholds',
-            hint="Give yours a name of its own.",
+            hint="Choose another name for your policy.",
             pointer="/name",
         )
 

@@ -247,7 +247,7 @@ def require_own_recording(store: Store, person: str | None) -> None:
     is_empty = not groups and not list_recordings(store, int(row.id))
     if _is_ordinary(row, person) or not (is_empty or _find_recording(store, person)):
         raise ConflictError(
-            f'there is a dataset "{name}" of your own',
+            f'you already have a dataset called "{name}"',
             hint="The practice needs that name. Rename or delete your dataset first.",
         )
 

@@ -299,7 +299,9 @@ def _detect_in_recording(
         f"of {recording}; they are candidates where a ball is followed"
     )
     if kept.unknown:
-        print_error(f"  {plural(kept.unknown, 'frame')} of the file are not of the recording")
+        print_error(
+            f"  the file has {plural(kept.unknown, 'frame')} that the recording does not have"
+        )
 
 
 def _frames_of(text: str) -> range:

@@ -209,8 +209,9 @@ class OnnxModel:
         chosen = ball_category(names) if category is None else category
         if chosen is None and names:
             raise InputError(
-                f"which of the {len(names)} classes of {path.name} is the ball is not clear from their names",
-                hint="Say which one is the ball (--category).",
+                f"it is not clear from their names which of the {len(names)} classes of"
+                f" {path.name} is the ball",
+                hint="Name the class of the ball with --category.",
                 pointer="/category",
             )
         return OnnxModel(
@@ -231,7 +232,7 @@ class OnnxModel:
             (output, *_) = self._session.run(None, {self._input_name: box.prepare(picture)})
         except Exception as error:
             raise InputError(
-                f"{self.path.name} does not run on a picture ({_first_line(error)})"
+                f"the model {self.path.name} failed on a picture ({_first_line(error)})"
             ) from error
         return decode_output(np.asarray(output), box, self.category, min_score, most)
 
@@ -255,7 +256,7 @@ def _open_model(path: Path, threads: int) -> Any:
         return onnxruntime.InferenceSession(str(path), options, ["CPUExecutionProvider"])
     except Exception as error:
         raise InputError(
-            f"{path.name} is no ONNX model that can be run ({_first_line(error)})",
+            f"{path.name} is not an ONNX model that can be run ({_first_line(error)})",
             hint="docs/detector.md has the command that exports one.",
         ) from error
 

@@ -311,7 +311,7 @@ def write_parts(
             for frame in frames:
                 file.write(json_text(frame, ascii_=True) + "\n")
     except OSError as error:
-        raise InputError(f"{out} cannot hold the evaluation ({error.strerror})") from error
+        raise InputError(f"the evaluation cannot be written to {out} ({error.strerror})") from error
 
 
 def _figure_content(figure: Figure, ending: str) -> bytes:

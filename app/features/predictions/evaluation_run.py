@@ -155,7 +155,7 @@ class EvaluationRequest:
             )
         if not 0 <= self.min_score <= 1:
             raise InputError(
-                f"a score lies between 0 and 1, and min_score is {self.min_score:g}",
+                f"min_score is {self.min_score:g}, but it must lie between 0 and 1",
                 pointer="/min_score",
             )
         if len(self.name) > MAX_NAME:
@@ -171,8 +171,8 @@ def check_groups(groups: str, version: int | str | None) -> None:
     """
     if version is not None and groups != EvaluationRequest.groups:
         raise InputError(
-            f"a version has its own groups, so that groups {quoted(groups)} is not used",
-            hint="Leave the groups or the version out.",
+            f"groups {quoted(groups)} cannot be combined with a version, which has its own groups",
+            hint="Leave out the groups or the version.",
             pointer="/groups",
         )
 
@@ -279,7 +279,8 @@ def _find_track_set(
     for name in ("careful", "split", "boxes", "min_score"):
         if getattr(request, name) != getattr(usual, name):
             raise InputError(
-                f'the predictions "{found.name}" are tracks of the ball, and {name} is not used with them',
+                f'the predictions "{found.name}" are ball tracks, for which the option {name} is'
+                " not used",
                 hint="Leave it out, or evaluate boxes by themselves.",
                 pointer=f"/{name}",
             )
@@ -343,10 +344,10 @@ def _pinned_options(
 
 def _no_frames(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
     of = f' in the split "{request.split}"' if request.split else ""
-    hint = "Groups take part when the policy passes them and they are not rejected."
+    hint = "A group is evaluated when the policy passes it and it is not rejected."
     if request.groups == "accepted":
         hint = "Nobody has accepted a group; evaluate the passing ones, or accept some."
-    return InputError(f'no group of "{dataset.name}" takes part{of}', hint=hint)
+    return InputError(f'no group of "{dataset.name}" can be evaluated{of}', hint=hint)
 
 
 def _require_common_frames(
@@ -360,8 +361,8 @@ def _require_common_frames(
     ):
         if predicted and not predicted & frames:
             raise InputError(
-                f'none of the {len(predicted)} frames of "{sets[name].name}" is among the {len(frames)} '
-                "frames that take part",
+                f'none of the {len(predicted)} frames of "{sets[name].name}" is among the'
+                f" {len(frames)} frames to evaluate",
                 hint="Name the split or the version that the predictions were made for.",
                 pointer=f"/{name}",
             )

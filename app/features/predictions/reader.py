@@ -65,7 +65,9 @@ class PredictionFiles:
         found = self.path or self.cameras
         if found is None:
             raise InputError(
-                "there is nothing to read: neither boxes nor cameras", pointer="/upload"
+                "there are no predictions to import: give a file of boxes, a file of cameras, or"
+                " both",
+                pointer="/upload",
             )
         return found
 
@@ -92,9 +94,9 @@ class PredictionFiles:
         unused = next((name for name, is_given in given.items() if is_given), None)
         if unused is not None and (self.path is None or not self.path.exists()):
             there = "there is none" if self.path is None else f'"{self.path}" is not a file'
-            raise InputError(f"--{unused} is for a file of boxes, and {there}")
+            raise InputError(f"--{unused} needs a file of boxes, but {there}")
         if self.cameras_size is not None and self.cameras is None:
-            raise InputError("--cameras-size is the size of predicted cameras, and there are none")
+            raise InputError("--cameras-size needs predicted cameras, but no --cameras is given")
 
 
 def uploaded_files(
@@ -141,8 +143,8 @@ def read_files(files: PredictionFiles, names: FrameNames, limits: Limits) -> Fou
         )
     if boxes.tracks and files.cameras is not None:
         raise InputError(
-            "tracks of the ball come without cameras",
-            hint="Bring the cameras as a set of their own.",
+            "ball tracks cannot be imported together with cameras",
+            hint="Import the cameras as a separate set of predictions.",
             pointer="/cameras_upload",
         )
     if files.cameras is not None:

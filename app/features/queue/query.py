@@ -140,7 +140,8 @@ def _parse_sort(term: _QueryTerm) -> tuple[str, bool]:
     if name not in SORTS:
         raise InputError(
             f'the queue cannot be sorted by "{term.value}"',
-            hint=f"Sorts: {', '.join(order.name for order in ORDERS)}, each also with -desc.",
+            hint=f"Sort orders are {', '.join(order.name for order in ORDERS)}, each also with"
+            " -desc.",
             pointer=term.pointer,
         )
     return name, term.value.endswith("-desc")
@@ -193,7 +194,8 @@ def _parse_id(term: _QueryTerm, text: str) -> int:
     if not digits or not 1 <= int(text) <= MAX_ID:
         raise InputError(
             f'"{text[:40]}" is not the id of a {what}',
-            hint=f"For example {term.field}:12,15,19; the id of a {what} stands in its address.",
+            hint=f"For example {term.field}:12,15,19; the id of a {what} is the number in the URL"
+            " of its page.",
             pointer=term.pointer,
         )
     return int(text)

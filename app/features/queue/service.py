@@ -37,7 +37,9 @@ def decode(query: Query, cursor: str) -> list[Key]:
         text = base64.b64decode(padded, altchars=b"-_", validate=True)
         name, *values = json.loads(text)
     except (binascii.Error, ValueError, TypeError) as error:
-        raise InputError("the cursor is invalid", pointer="/cursor") from error
+        raise InputError(
+            "the cursor is invalid; request the first page without a cursor", pointer="/cursor"
+        ) from error
     sound = all(map(_is_key, values))
     if name != _cursor_name(query) or len(values) != len(query.order.keys) or not sound:
         raise InputError(

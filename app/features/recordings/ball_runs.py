@@ -190,7 +190,8 @@ def change_run(
     if change.accepted is not None:
         if change.accepted and before.stale:
             raise ConflictError(
-                "the video file has changed since then", hint="Follow the ball again."
+                "the video file has changed since the ball was followed",
+                hint="Follow the ball again.",
             )
         with without_response():
             groups = _place(store, before, change.accepted, actor, paint)
@@ -298,7 +299,7 @@ def _annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
 def _require_open(run: StoredRun, if_match: str) -> None:
     require_etag(run.etag, if_match, "this ball run")
     if run.accepted_by is not None:
-        raise ConflictError("this ball run is accepted", hint="Take that back first.")
+        raise ConflictError("this ball run is accepted", hint="Undo the acceptance first.")
 
 
 def _checked(run: StoredRun, frames: Sequence[int]) -> list[int]:

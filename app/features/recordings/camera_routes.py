@@ -95,7 +95,9 @@ def get_stretch(
     found = get_cameras(store, recording, frame)
     digest = found.digest_before if before else found.digest
     if digest is None:
-        raise NotFoundError("these are the first cameras of this stretch")
+        raise NotFoundError(
+            "there are no earlier cameras of these frames: they were tracked only once"
+        )
     pitch = pitch_of(store, recording)
     tag = f'"{digest}-{pitch.length:g}-{pitch.width:g}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}

@@ -78,8 +78,8 @@ def require_stretch(recording: Recording, first: int, last: int) -> None:
     recording.require_readable()
     if not first <= last < (recording.frames or 0):
         raise InputError(
-            f'the frames {first} to {last} are none of "{recording.name}"; its last one is '
-            f"{(recording.frames or 0) - 1}",
+            f'"{recording.name}" does not have all of the frames {first} to {last}; its last'
+            f" one is {(recording.frames or 0) - 1}",
             pointer="/last",
         )
     if last - first >= MOST_FRAMES:
@@ -208,7 +208,9 @@ def require_turnable(store: Store, recording_id: int, frame: int, turned: bool) 
     """
     found = get_cameras(store, recording_id, frame)
     if found.stale:
-        raise ConflictError("the video file has changed since then", hint="Track the shot again.")
+        raise ConflictError(
+            "the video file has changed since the shot was tracked", hint="Track the shot again."
+        )
     fixed = sorted(set(found.summary.annotated) - set(found.summary.unusable))
     if fixed and turned != found.summary.turned:
         raise ConflictError(
@@ -280,12 +282,15 @@ def save_cameras(
         row = need_recording(session, recording.id)
         if row.sha256 != recording.sha256:
             raise ConflictError(
-                f'"{recording.name}" became another file while it was tracked',
+                f'the video file of "{recording.name}" was replaced while the shot was tracked',
                 hint="Track the shot again.",
             )
         replaced = delete_overlapping(session, recording.id, first, last)
         if turned_from is not None and [old.digest for old in replaced] != [turned_from.digest]:
-            raise ConflictError("somebody tracked this shot meanwhile", hint="Look at it again.")
+            raise ConflictError(
+                "the cameras of this shot were changed in the meantime",
+                hint="Reload the page and check the new cameras.",
+            )
         same = next((old for old in replaced if (old.first, old.last) == stretch), None)
         insert_cameras(
             session,
@@ -333,7 +338,7 @@ def _keep(
         replace_file(camera_place(settings, digest), content)
     except OSError as error:
         raise StorageError(
-            f"the cameras of {recording.name} cannot be kept ({error.strerror})",
+            f"the cameras of {recording.name} cannot be stored ({error.strerror})",
             hint="Free some space, and track the shot again.",
         ) from error
     numbers = [frame.number for frame in tracked.frames]

@@ -144,8 +144,8 @@ def read_boxes_of_file(
     read = read_predictions(path, AUTO, names)
     if not read.detections:
         raise InputError(
-            f'{path.name} has no box of a frame of "{recording.name}"',
-            hint=f"Call frames by their numbers, 0 to {count - 1}.",
+            f'{path.name} contains no box for any frame of "{recording.name}"',
+            hint=f"The file must identify frames by their numbers, 0 to {count - 1}.",
         )
     sure = {
         number: [one for one in boxes if one.score >= min_score]
@@ -232,6 +232,6 @@ def _read(settings: Settings, recording: Recording) -> tuple[list[str], dict[str
             return [str(name) for name in kept["sets"]], {name: kept[name] for name in _COLUMNS}
     except (OSError, ValueError, KeyError) as error:
         raise StorageError(
-            f"what detectors found in {recording.name} is damaged",
-            hint=f"Delete {place}, and let them look again.",
+            f"the stored detections of {recording.name} are damaged",
+            hint=f"Delete {place}, then run the detector again.",
         ) from error

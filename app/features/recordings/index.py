@@ -65,7 +65,7 @@ def index_now(
     path = Path(row.path)
     stamp = file_stamp(path)
     if stamp is None:
-        raise NotFoundError(f"{path.name} is not where it was imported from")
+        raise NotFoundError(f"{path.name} is no longer in the place that it was imported from")
     facts, shots = in_worker(path, index_file, store.settings, progress=progress, stop=stop)
     if file_stamp(path) != stamp:
         raise ImageError(f"{path.name} changed while it was read", hint="Import it again.")
@@ -121,7 +121,9 @@ def index_file(
         place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         replace_file(place, index_to_bytes(index))
     except OSError as error:
-        raise StorageError(f"the index of {path.name} cannot be kept ({error.strerror})") from error
+        raise StorageError(
+            f"the index of {path.name} cannot be stored ({error.strerror})"
+        ) from error
     facts = {
         **asdict(index.facts),
         "frames": len(index),

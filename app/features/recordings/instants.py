@@ -106,7 +106,8 @@ def require_instants(recording: Recording, frames: Sequence[int]) -> list[int]:
     numbers = sorted(set(frames))
     if len(numbers) > MOST_AT_ONCE:
         raise InputError(
-            f"{len(numbers):,} instants are too many at once; {MOST_AT_ONCE:,} can be taken",
+            f"{len(numbers):,} instants are too many at once; at most {MOST_AT_ONCE:,} can be"
+            " taken",
             hint="Take fewer, or take one part of the recording after another.",
             pointer="/frames",
         )
@@ -324,7 +325,7 @@ def _kept(place: Path, image: Any) -> Path:
         replace_file(place, data.tobytes())
     except OSError as error:
         raise StorageError(
-            f"frame {place.stem} cannot be kept ({error.strerror})",
+            f"frame {place.stem} cannot be stored ({error.strerror})",
             hint="Free some space, and take the instants again.",
         ) from error
     return place

@@ -75,7 +75,7 @@ def _path_of(settings: Settings, source: Mapping[str, str]) -> Path:
     found = resolve_folder(settings, source["folder"])
     if not isinstance(found, Path):
         raise TooLargeError(
-            "a recording is not read from an object store",
+            "recordings cannot be read from an object store",
             hint="Copy it into a folder that the operator allows, or upload it.",
             pointer="/source/folder",
         )

@@ -82,7 +82,7 @@ def suggest_live(store: Store, recording_id: int, frame: int) -> list[LiveSugges
     timed = list(zip(mine.items, mine.times, strict=True))
     found = next((one for one in timed if one[0].first <= frame <= one[0].last), None)
     if found is None:
-        raise InputError(f"frame {frame} is in no shot", pointer="/frame")
+        raise InputError(f"frame {frame} does not belong to any shot", pointer="/frame")
     replay, (start, end) = found
     half = _half(mine.recording.clocks, replay.first)
     candidates = [

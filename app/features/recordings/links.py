@@ -111,8 +111,8 @@ def add_link(
             )
         if live[0] == replay[0] and live[1] <= replay[2] and replay[1] <= live[2]:
             raise InputError(
-                f"frames {live[1]} to {live[2]} and {replay[1]} to {replay[2]} overlap: a shot is no "
-                "replay of itself",
+                f"frames {live[1]} to {live[2]} and {replay[1]} to {replay[2]} overlap: a shot"
+                " cannot be the replay of itself",
                 pointer="/replay",
             )
         rows = list_link_rows(session, live[0])
@@ -158,7 +158,8 @@ def _require_shot(
     frames = parse(row.facts)["frames"]
     if not first <= last < frames:
         raise InputError(
-            f'"{row.name}" has {plural(frames, "frame")}, and no shot from {first} to {last}',
+            f'"{row.name}" has {plural(frames, "frame")}, so it has no shot from frame {first}'
+            f" to frame {last}",
             pointer=pointer,
         )
     return row

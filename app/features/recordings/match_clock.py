@@ -46,8 +46,9 @@ def require_clocks(clocks: Sequence[MatchClock], frames: int) -> list[MatchClock
     for one, other in pairwise(found):
         if one.frame == other.frame or one.half > other.half:
             raise InputError(
-                f"the clock of frame {other.frame} (half {other.half}) does not follow that of frame "
-                f"{one.frame} (half {one.half})",
+                f"the match clocks of frame {one.frame} (half {one.half}) and frame {other.frame}"
+                f" (half {other.half}) contradict each other: a frame has one clock, and a later"
+                " frame cannot be in an earlier half",
                 hint="Correct one of the two.",
                 pointer="/clocks",
             )

@@ -81,7 +81,7 @@ def save_view(store: Store, dataset_id: int, *, name: str, q: str, actor: str) -
         if own >= MAX_OWN and person_of(actor) != LOCAL_USER:
             raise ConflictError(
                 f"one person has at most {MAX_OWN} saved views in a dataset",
-                hint="Delete one of yours first.",
+                hint="Delete one of your saved views first.",
             )
         identity = insert_saved_view(session, dataset_id, name=name, query=q.strip(), actor=actor)
         saved = _read_visible_view(session, identity)

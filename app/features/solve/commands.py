@@ -71,7 +71,8 @@ def solve(
             left = pending_work(store, dataset) if interrupted() else None
             if left is not None:
                 print_error(
-                    f"stopped; {plural(report.solved, 'group is', 'groups are')} kept, {left}"
+                    f"stopped; {plural(report.solved, 'solved group is', 'solved groups are')} stored,"
+                    f" {left}"
                 )
                 raise typer.Exit(INTERRUPTED)
         count_yield(store, dataset, report, progress)

@@ -225,5 +225,5 @@ def _shown_group(state: StationState, group: int | None) -> int:
     """
     chosen = group if group is not None else next(iter(state.groups), None)
     if chosen is None or chosen not in state.groups:
-        raise NotFoundError(f"camera {state.station.key} has no view in that group")
+        raise NotFoundError(f"static camera {state.station.key} has no view in that group")
     return chosen

@@ -212,7 +212,7 @@ def _plan_change(
     state = _read_state(session, station_id)
     if not state.station.shared:
         raise ConflictError(
-            f"station {state.station.key} belongs to a single view",
+            f"static camera {state.station.key} belongs to a single view",
             hint="Edit the lines of that view instead.",
         )
     require_etag(state.etag, if_match, f"camera {state.station.key}")
@@ -244,7 +244,7 @@ def _save_change(session: Session, state: StationState, change: _StationChange, 
 def _read_state(session: Session, station_id: int) -> StationState:
     stored = read_stations(session, [station_id]).get(station_id)
     if stored is None:
-        raise NotFoundError(f"there is no station {station_id}")
+        raise NotFoundError(f"there is no static camera with id {station_id}")
     stacks = read_station_stacks(session, station_id)
     return StationState(
         id=stored.id,

@@ -116,7 +116,8 @@ def track_around(store: Store, track_id: int, frame: int | None = None) -> Aroun
             frame = int(row.first) if summary.worst is None else summary.worst
         if not row.first <= frame <= row.last:
             raise InputError(
-                f'frame {frame} is not of the track "{row.key}", {row.first} to {row.last}'
+                f'frame {frame} is not in the track "{row.key}", which has the frames {row.first}'
+                f" to {row.last}"
             )
         first = max(int(row.first), frame - AROUND - _MARGIN)
         last = min(int(row.last), frame + AROUND + _MARGIN)

@@ -138,7 +138,7 @@ def ball_link_work(store: Store, progress: JobProgress) -> Json:
                 stop=progress.check,
             )
         except WorkerEnded as error:
-            raise TooLargeError(f"the search {error}") from error
+            raise TooLargeError(f"the search for the time map {error}") from error
     return asdict(found)
 
 

@@ -320,7 +320,8 @@ def _checked(track: Track, corrections: Sequence[Correction]) -> str:
     for number, item in enumerate(corrections):
         if not track.first <= item.frame <= track.last:
             raise InputError(
-                f'frame {item.frame} is not of the track "{track.key}", {track.first} to {track.last}',
+                f'frame {item.frame} is not in the track "{track.key}", which has the frames'
+                f" {track.first} to {track.last}",
                 pointer=f"/corrections/{number}/frame",
             )
     return corrections_text(corrections)

@@ -337,7 +337,8 @@ def _stretch(
     count = int(numbers[-1] - numbers[0]) + 1
     if count > MOST_FRAMES:
         raise InputError(
-            f"the stretch {key} has {count:,} frames from its first group to its last; {MOST_FRAMES:,} are possible"
+            f"the stretch {key} has {count:,} frames from its first group to its last; a track"
+            f" can have {MOST_FRAMES:,} at most"
         )
     frames = np.arange(numbers[0], numbers[-1] + 1)
     span = float(seconds[-1] - seconds[0])

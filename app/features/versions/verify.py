@@ -419,7 +419,9 @@ def _parse_frozen(body: bytes) -> Json:
     try:
         return json.loads(read_text(body))
     except ValueError as error:
-        raise StorageError("a frozen part is damaged") from error
+        raise StorageError(
+            "a stored part of the frozen version is damaged: it is not valid JSON"
+        ) from error
 
 
 def _unequal_leaves(group: str, place: str, then: Json, now: Json) -> Iterator[VersionDifference]:

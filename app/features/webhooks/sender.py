@@ -85,12 +85,13 @@ def require_allowed(text: str, allowed: Iterable[str], pointer: str | None = Non
     address, places = read_address(text, pointer), [read_address(item) for item in allowed]
     if not places:
         raise ConflictError(
-            "this server sends nothing to other addresses",
-            hint="Its operator allows some by the setting TOUCHLINE_WEBHOOKS.",
+            "this server is not allowed to send webhooks",
+            hint="The operator of the server can allow addresses with the setting"
+            " TOUCHLINE_WEBHOOKS.",
         )
     if not any(address.is_below(place) for place in places):
         raise InputError(
-            "the operator of this server does not allow that address",
+            "the operator of this server does not allow webhooks to this address",
             hint=f"It may begin with: {', '.join(sorted(allowed))}",
             pointer=pointer,
         )

@@ -218,7 +218,7 @@ def send_ping(store: Store, dataset: str, webhook_id: int, *, actor: str) -> Del
 def _require_on(webhook: Webhook) -> None:
     if webhook.off is not None:
         raise ConflictError(
-            f"the server does not send to this address: {webhook.off}", hint="Turn it on first."
+            f"the webhook is switched off: {webhook.off}", hint="Switch the webhook on first."
         )
 
 

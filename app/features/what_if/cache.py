@@ -75,7 +75,7 @@ def map_arrays(path: Path, *, whole: bool = False) -> ArraysFile:
     found, checksum = _map_with_checksum(path)
     # A file from before there was a checksum has none to compare.
     if whole and checksum is not None and _checksum(found.arrays) != checksum:
-        raise ValueError(f"{path.name} is not what was written")
+        raise ValueError(f"{path.name} is damaged: its checksum does not match")
     return found
 
 
@@ -92,11 +92,11 @@ def _map_with_checksum(path: Path) -> tuple[ArraysFile, int | None]:
     length, checksum = np.frombuffer(raw[:_HEAD].tobytes(), "<u8").tolist()
     described = raw[_HEAD : _HEAD + length].tobytes()
     if zlib.crc32(described) != checksum:
-        raise ValueError(f"{path.name} is not what was written")
+        raise ValueError(f"{path.name} is damaged: the checksum of its head does not match")
     head = json.loads(described)
     start = -(-(_HEAD + length) // _LINE) * _LINE
     if len(raw) != start + head["bytes"]:
-        raise ValueError(f"{path.name} is not whole")
+        raise ValueError(f"{path.name} is truncated or too long")
     arrays = {}
     for name, (kind, shape, at) in head["arrays"].items():
         dtype = np.dtype(kind)
@@ -260,7 +260,9 @@ def cached_results(folder: Path, block: CachedBlock, policy: Policy) -> BlockRes
         judgement = Judgement(**{name: found.arrays[name] for name in _JUDGEMENT})
         table = block.table
         if judgement.failed.shape[1:] != (table.groups,):
-            raise ValueError("a judgement is not that of its block")
+            raise ValueError(
+                "the stored gate results have another number of groups than their block"
+            )
         judged = BlockResults(table.facts, table.jac, policy, judgement)
         for name in _LATER:
             setattr(judged, name, found.arrays.get(name))
@@ -293,7 +295,7 @@ def _map_table(folder: Path, name: str) -> YieldTable:
     """The table of a block, mapped."""
     found = map_arrays(_block_path(folder, name))
     if found.about["format"] != FORMAT:
-        raise ValueError("a block is of another format")
+        raise ValueError("the cached block was written in another format")
     arrays = found.arrays
     facts = Facts(len(arrays["group_id"]), **{item: arrays[item] for item in COLUMNS})
     heads = {item: arrays[item] for item in HEADS}
@@ -308,7 +310,7 @@ def _map_table(folder: Path, name: str) -> YieldTable:
 def _map_unsolved_table(folder: Path, mark: int) -> YieldTable:
     found = map_arrays(folder / BARE)
     if found.about["mark"] != mark:
-        raise ValueError("the list of a table is not of one piece")
+        raise ValueError("the cached table was written at another revision than its blocks")
     splits, matches = tuple(found.about["splits"]), tuple(found.about["matches"])
     return YieldTable(**found.arrays, splits=splits, matches=matches, facts=NOTHING)
 
@@ -320,7 +322,7 @@ def _require_valid_table(table: YieldTable) -> None:
         array, per = getattr(facts, name), name.partition("_")[0]
         rows = lengths.setdefault(per, len(array))
         if array.shape != (rows, *shape) or array.dtype != kind:
-            raise ValueError(f"{name} is not what was written")
+            raise ValueError(f"the cached column {name} has a wrong shape or type")
     inside = (
         (facts.view_group, table.groups),
         (facts.mark_view, lengths["view"]),
@@ -330,9 +332,9 @@ def _require_valid_table(table: YieldTable) -> None:
         (table.match, len(table.matches)),
     )
     if any(len(rows) and not 0 <= rows.min() <= rows.max() < count for rows, count in inside):
-        raise ValueError("rows refer to rows that there are not")
+        raise ValueError("rows of the cached table refer to rows that do not exist")
     if any(len(getattr(table, name)) != table.groups for name in HEADS):
-        raise ValueError("a group lacks something")
+        raise ValueError("a column of the cached table has a wrong number of groups")
 
 
 def _block_without(block: CachedBlock, gone: Sequence[int]) -> CachedBlock:

@@ -189,7 +189,7 @@ class TestFrameLists:
         assert placed[0].media is not None and placed[1].media is not None and wrong is not None
         assert read_frame(placed[0].media, None, False, settings) == frame
         assert placed[1].media == media[0].media
-        with pytest.raises(NotFoundError, match="its SHA-256 is another"):
+        with pytest.raises(NotFoundError, match="its SHA-256 differs"):
             read_frame(wrong, None, False, settings)
         assert not is_kept(wrong, settings)
 
@@ -204,7 +204,7 @@ class TestBadDays:
         [
             ("denied", "refuses the keys of this server (AccessDenied)"),
             ("expired", "refuses the keys of this server (ExpiredToken)"),
-            ("broken", "cannot do what it was asked (SlowDown)"),
+            ("broken", "failed to carry out a request (SlowDown)"),
             ("hangs", "cannot be reached, or does not answer in time"),
             ("cuts", "cannot be reached, or does not answer in time"),
             ("closed", "cannot be reached, or does not answer in time"),

@@ -68,7 +68,7 @@ class TestMakeHome:
     def test_a_home_that_cannot_be_made_is_said(self, settings, tmp_path: Path) -> None:
         (tmp_path / "file").write_text("")
         other = settings.model_copy(update={"home": tmp_path / "file" / "home"})
-        with pytest.raises(StorageError, match="cannot be made"):
+        with pytest.raises(StorageError, match="cannot be created"):
             make_home(other)
 
 

@@ -189,7 +189,7 @@ class TestPendingResponse:
             work(store, "outcome")
         done = entries(store)
         with (
-            pytest.raises(ConflictError, match="answered in the meantime"),
+            pytest.raises(ConflictError, match="was carried out first"),
             keyed_request().open(),
         ):
             work(store, "outcome")
@@ -209,7 +209,7 @@ class TestPendingResponse:
         request = KeyedRequest(IdempotencyKey("key", "ann", "digest")) if has_a_key else None
         with self.pending(request, []).open():
             work(store, "first")
-            with pytest.raises(RuntimeError, match="answered once"):
+            with pytest.raises(RuntimeError, match="stored already"):
                 work(store, "second")
 
     @pytest.mark.parametrize("has_a_key", [True, False])
@@ -220,7 +220,7 @@ class TestPendingResponse:
         pending = self.pending(request, [])
         with pending.open():
             work(store, ["answered"])
-        with pytest.raises(RuntimeError, match="must return the outcome"):
+        with pytest.raises(RuntimeError, match="must return the same outcome"):
             pending.response_to(["answered"])
 
     def test_other_threads_and_what_comes_after_have_no_request(self, store: Store) -> None:

@@ -97,7 +97,7 @@ class TestRestore:
             for member in ("touchline.db", "uploads/1/upload.json"):
                 target.writestr(member, source.read(member))
             target.writestr(name, b"{}")
-        with pytest.raises(InputError, match="no file of a home"):
+        with pytest.raises(InputError, match="not a file of a Touchline home"):
             restore(own_store.settings, forged)
         assert not (tmp_path / "evil").exists()
 

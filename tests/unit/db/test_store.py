@@ -87,7 +87,7 @@ class TestOpen:
 
     def test_what_the_log_says_must_be_on_the_disk(self, own_store: Store) -> None:
         with (
-            pytest.raises(RuntimeError, match="must be on the disk"),
+            pytest.raises(RuntimeError, match="must be durable"),
             own_store.write(lasting=False) as session,
         ):
             append(session, [Entry("work", "ada", "2026-11-23T10:00:00+00:00", {})])

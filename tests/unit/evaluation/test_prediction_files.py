@@ -275,7 +275,7 @@ class TestCoco:
         self, tmp_path, names
     ) -> None:
         path = write(tmp_path / "r.json", [result(category_id=32), result(category_id=3)])
-        with pytest.raises(InputError, match="holds no class 0; its classes are 3, 32") as refused:
+        with pytest.raises(InputError, match="contains no class 0; its classes are 3, 32") as refused:
             read_predictions(path, "coco", names, category=0)
         assert refused.value.pointer == "/category"
 
@@ -350,7 +350,7 @@ class TestYolo:
 
     def test_a_class_that_the_files_do_not_have_is_refused(self, tmp_path, names) -> None:
         write(tmp_path / "7.txt", YOLO)
-        with pytest.raises(InputError, match="holds no class 32; its classes are 0"):
+        with pytest.raises(InputError, match="contains no class 32; its classes are 0"):
             read_predictions(tmp_path, "yolo", names, category=32)
 
     def test_a_size_and_a_document_are_refused(self, tmp_path, names) -> None:
@@ -406,7 +406,7 @@ class TestCsv:
     def test_a_table_without_a_row_is_no_evaluation_of_nothing(
         self, tmp_path, names, text: str
     ) -> None:
-        with pytest.raises(DatasetFormatError, match=r"r\.csv: holds no row"):
+        with pytest.raises(DatasetFormatError, match=r"r\.csv: contains no rows"):
             read_predictions(write(tmp_path / "r.csv", text), "csv", names)
 
     def test_reads_a_table_like_snv3d(self, tmp_path, names) -> None:

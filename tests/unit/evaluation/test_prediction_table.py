@@ -103,5 +103,5 @@ class TestReadTracks:
 
     def test_options_of_boxes_are_refused(self, folder: Path) -> None:
         for options in ({"size": ImageSize(10, 10)}, {"category": 3}):
-            with pytest.raises(InputError, match="tracks does not use"):
+            with pytest.raises(InputError, match="tracks do not use"):
                 read(folder, **options)

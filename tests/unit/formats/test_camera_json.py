@@ -241,7 +241,7 @@ class TestCameraFromJson:
                     "radial_distortion": [0.1, 0, 0, 0, 0, 0],
                 },
                 "radial_distortion",
-                "contradicts the lens fisheye",
+                "the lens fisheye has no such coefficients",
             ),
             ({"lens": "fisheye", "lens_coefficients": [-900, 0, 0, 0]}, None, "folds"),
         ],

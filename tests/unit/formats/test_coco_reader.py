@@ -357,9 +357,9 @@ class TestJoins:
             ({"image_id": 99}, "annotations[1]", "image_id", "is 99, which no image"),
             ({"image_id": None}, "annotations[1]", "image_id", "is null, which no image"),
             ({"category_id": 9}, "annotations[1]", "category_id", "is 9, which no category"),
-            ({"iscrowd": 1}, "annotations[1]", "iscrowd", "a crowd is not one ball"),
+            ({"iscrowd": 1}, "annotations[1]", "iscrowd", "a crowd cannot be one ball"),
             ({"bbox": None, "segmentation": {"counts": "x"}}, "annotations[1]", "bbox", "RLE"),
-            ({}, "annotations[1]", "id", "the same annotation twice"),
+            ({}, "annotations[1]", "id", "the id of an equal annotation before it"),
             ({"id": 3}, "annotations[1]", "bbox", "a second ball at the same place"),
         ],
     )
@@ -410,7 +410,7 @@ class TestJoins:
         assert [len(group.views[0].balls) for group in groups] == [1, 0]
         (problem,) = report.problems
         assert (problem.record, problem.field) == ("images[1]", "id")
-        assert "no annotation joins this image" in problem.problem
+        assert "no annotations are assigned to this image" in problem.problem
 
     def test_an_image_that_is_left_out_says_how_many_annotations_go_with_it(
         self, read: Callable[[Any], list[Group]], report: Report

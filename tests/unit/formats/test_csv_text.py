@@ -75,7 +75,7 @@ class TestReadRows:
         [
             (b"b\n1\n", "is missing from the columns"),
             (b"a\n\xff\n", "is not UTF-8"),
-            (b'a\n"x', "is not sound CSV"),
+            (b'a\n"x', "is not valid CSV"),
             (b"", "is missing from the columns"),
         ],
     )

@@ -39,7 +39,7 @@ class TestWideLenses:
         self, store, fill, group, lens, tmp_path, kind
     ) -> None:
         fill(group)
-        with pytest.raises(InputError, match=f"{kind} has no place for the {lens} lens of view"):
+        with pytest.raises(InputError, match=f"{kind} cannot store the {lens} lens of view"):
             export_dataset(store, "demo", kind, tmp_path / "out", everything=True)
         assert not (tmp_path / "out").exists()
 

@@ -118,7 +118,7 @@ class TestExportNames:
         first, second = groups_of(view, ("a", "north"), ("b", "north"))
         assert names.of(first, {}) == {}
         with pytest.raises(
-            InputError, match="view north of group b and another view would have one name"
+            InputError, match="view north of group b and another view would have the same name"
         ):
             names.of(second, {})
 

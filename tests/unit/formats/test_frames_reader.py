@@ -132,7 +132,7 @@ class TestGrouping:
         ["folders", "{instant}.jpg", "{instant}_{camera}_{camera}", "{a}{instant}{camera}"],
     )
     def test_what_is_no_pattern_is_refused(self, grouping: str) -> None:
-        with pytest.raises(InputError, match=r"with \{instant\} and \{camera\}"):
+        with pytest.raises(InputError, match=r"contains \{instant\} and \{camera\}"):
             check_grouping(grouping)
 
     def test_letters_of_patterns_mean_themselves(self) -> None:

@@ -108,7 +108,7 @@ class TestWriteTracks:
 
     def test_two_tracks_of_one_folder_are_refused(self, tmp_path: Path) -> None:
         with pytest.raises(
-            InputError, match='the tracks "a/b" and "a:b" would have one folder, a_b'
+            InputError, match='the tracks "a/b" and "a:b" would be written to the same folder, a_b'
         ):
             write_tracks(tmp_path, [record("a/b"), record("a:b")])
 

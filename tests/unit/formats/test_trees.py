@@ -103,7 +103,7 @@ class TestFolderTree:
         os.mkfifo(tmp_path / "a")
         tree = open_tree(tmp_path, report)
         assert tree is not None
-        with pytest.raises(DatasetFormatError, match="not a plain file"):
+        with pytest.raises(DatasetFormatError, match="not a regular file"):
             tree.read_bytes("a")
 
     def test_a_file_beyond_the_limit_is_refused(self, tmp_path: Path, report: Report) -> None:
@@ -331,17 +331,17 @@ class TestPipesAndDevices:
     ) -> None:
         os.mkfifo(tmp_path / name)
         assert open_tree(tmp_path / name, report) is None
-        assert report.problems[0].problem == "is not a plain file"
+        assert report.problems[0].problem == "is not a regular file"
         guess_format(tmp_path / name)
 
     def test_a_device_is_refused_at_once(self, report: Report) -> None:
         assert open_tree(Path("/dev/zero"), report) is None
-        assert report.problems[0].problem == "is not a plain file"
+        assert report.problems[0].problem == "is not a regular file"
 
     def test_a_pipe_in_a_folder_is_left_out(self, tmp_path: Path, report: Report) -> None:
         os.mkfifo(tmp_path / "Labels-v3.json")
         assert [*read_soccernet_v3(tmp_path, report)] == []
-        assert "is not a plain file" in report.problems[0].problem
+        assert "is not a regular file" in report.problems[0].problem
 
     def test_a_pipe_in_the_place_of_the_frames_costs_the_frames(
         self, tmp_path: Path, report: Report

@@ -196,7 +196,7 @@ class TestReadJson:
     )
     def test_a_name_that_stands_twice_in_one_object_is_refused(self, body: bytes) -> None:
         read_json(b'[{"a": {"a": 1}}, {"a": 2}]')
-        assert refusal(body) == 'the body names "a" more than once'
+        assert refusal(body) == 'a JSON object of the body has the key "a" more than once'
 
     def test_the_place_of_a_mistake_is_told(self) -> None:
         assert refusal(b'{"a": }').endswith("at character 6")

@@ -239,7 +239,7 @@ class TestReadFrame:
         secret, path = tmp_path / "secret.png", tmp_path / "7.png"
         secret.write_bytes(PNG)
         path.symlink_to(secret)
-        with pytest.raises(NotFoundError, match=r"7\.png is a link now"):
+        with pytest.raises(NotFoundError, match=r"7\.png is now a symbolic link"):
             read_frame(Media(str(path)), width, False, settings)
 
     def test_an_archive_swapped_for_a_link_is_not_followed(
@@ -253,7 +253,7 @@ class TestReadFrame:
             lambda: read_frame(media, 40, False, settings),
             lambda: has_member(media, "v3_frames/7.png"),
         ):
-            with pytest.raises(NotFoundError, match=r"swapped\.zip is a link now"):
+            with pytest.raises(NotFoundError, match=r"swapped\.zip is now a symbolic link"):
                 asked()
         assert media_facts(media) == {}
 

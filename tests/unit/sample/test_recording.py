@@ -58,7 +58,7 @@ class TestPartsOf:
         assert [part.entered_by for part in parts].count("start") == 1
 
     def test_too_short_a_one_is_refused(self) -> None:
-        with pytest.raises(InputError, match="36 seconds or more"):
+        with pytest.raises(InputError, match="at least 36 seconds"):
             plan_shots(20)
 
 
@@ -155,8 +155,8 @@ class TestWriteRecording:
     @pytest.mark.parametrize(
         ("name", "parts", "message"),
         [
-            ("film.txt", None, "no ending of a video"),
-            ("film.mp4", [ShotPlan("replay", 3, "start", 0.5)], "no live shot is before it"),
+            ("film.txt", None, "does not end in .mp4, .avi or .mkv"),
+            ("film.mp4", [ShotPlan("replay", 3, "start", 0.5)], "no live shot comes before it"),
             (
                 "film.mp4",
                 [ShotPlan("main", 1, "start"), ShotPlan("replay", 8, "cut", 0.5)],

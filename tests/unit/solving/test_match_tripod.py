@@ -133,5 +133,5 @@ def test_it_is_kept_as_json_to_the_last_bit_and_anything_else_is_refused():
     value = reading_to_json(reading)
     assert "tripod" not in reading_to_json(groups[1].paint["a"])
     for wrong in ([[1.0], [2.0]], [[float("nan")] * 8, [0.0] * 64], "no"):
-        with pytest.raises(InputError, match="this is not a reading of paint"):
+        with pytest.raises(InputError, match="this is not a valid paint measurement"):
             reading_from_json({**value, "tripod": wrong})

@@ -170,7 +170,7 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
     for run, every in ((remote, "5"), (local, "7")):
         run("batch", "change", rest, "--gold-every", every)
         assert get_batch(place.store, int(rest)).gold_every == int(every)
-        assert "the truth of none" in str(run("batch", "gold", "small").exception)
+        assert "none of these groups has known true values" in str(run("batch", "gold", "small").exception)
         assert "say sample or version" in run("batch", "gold", "small", "--from", "hearsay").output
     with place.store.write() as session:
         unmark_gold(session, 1)
@@ -342,7 +342,7 @@ class TestFollow:
         pressing.join()
         held.set()
         assert (stopped.exit_code, stopped.stdout) == (INTERRUPTED, "")
-        assert re.search(r"job \d+ goes on on the server", stopped.stderr)
+        assert re.search(r"job \d+ continues on the server", stopped.stderr)
         assert told(remote("policy", "show", "--dataset", "twin", "--json"))["name"] == "strict"
         _idle(place)
         (twin,) = (
@@ -408,7 +408,7 @@ class TestRefusals:
     ) -> None:
         path = tmp_path / "token"
         os.mkfifo(path, 0o600)
-        with pytest.raises(InputError, match="is not a plain file"):
+        with pytest.raises(InputError, match="is not a regular file"):
             read_token(path)
 
     def test_without_a_token_it_asks_for_one(self, place: Place) -> None:

@@ -113,7 +113,7 @@ def test_a_film_of_nothing_has_no_camera(tmp_path: Path):
 def test_lines_of_a_frame_that_is_not_there_are_refused(film: Film, tmp_path: Path):
     lines = drawn(film, 0)
     path = film.write(tmp_path, film.images[:2])
-    with pytest.raises(InputError, match="has 2 frames, and none of the number 7"):
+    with pytest.raises(InputError, match="has 2 frames, and frame 7 is not one of them"):
         track_clip(path, {7: lines})
     few = make_lines(dict(list(lines.items())[:1]))
     with pytest.raises(InputError, match="lines of frame 0 make no camera"):

@@ -113,7 +113,7 @@ class TestReadFrames:
         self, tmp_path: Path, settings: Settings
     ) -> None:
         path = damaged(recording(tmp_path / "cam1", "avi/MJPG"))
-        with pytest.raises(ImageError, match=r"cam1\.avi is damaged: its own table"):
+        with pytest.raises(ImageError, match=r"cam1\.avi is damaged: its frame table"):
             index_recording(path, settings)
 
     def test_pixels_are_square(self, tmp_path: Path, settings: Settings) -> None:

@@ -65,7 +65,7 @@ class TestReadAnchor:
 
     def test_one_that_stays_broken_is_damage(self, own_store: Store) -> None:
         anchor_file(own_store.settings.database_file).write_bytes(b"{")
-        with pytest.raises(DamagedError, match="not what was written"):
+        with pytest.raises(DamagedError, match="is damaged"):
             read_anchor(own_store.settings.database_file)
 
 
@@ -116,7 +116,7 @@ class TestBeforeTheCommit:
     ) -> None:
         say(own_store, 5)
         cut_log(own_store, after=3)
-        with pytest.raises(DamagedError, match="ends after 3 entries, but this home has noted 5"):
+        with pytest.raises(DamagedError, match="ends after 3 entries, but this home recorded 5"):
             say_at_once(own_store, times)
         with pytest.raises(DamagedError, match="nothing can be changed now"):
             say(own_store)
@@ -127,7 +127,7 @@ class TestBeforeTheCommit:
         with closing(Store.open(own_store.settings)) as other:
             say(other, 3)
         cut_log(own_store, after=4)
-        with pytest.raises(DamagedError, match="ends after 4 entries, but this home has noted 5"):
+        with pytest.raises(DamagedError, match="ends after 4 entries, but this home recorded 5"):
             say(own_store)
 
     def test_beside_the_writes_of_another_process_the_log_grows(self, own_store: Store) -> None:
@@ -147,7 +147,7 @@ class TestBeforeTheCommit:
             say(own_store)
             cut_log(own_store, after=1)
             # What this process has said itself it knows all the same.
-            with pytest.raises(DamagedError, match="but this home has noted 2"):
+            with pytest.raises(DamagedError, match="but this home recorded 2"):
                 say(own_store)
 
     def test_a_home_whose_anchor_was_taken_away_believes_its_database(

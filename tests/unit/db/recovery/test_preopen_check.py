@@ -139,7 +139,7 @@ class TestRequireSound:
         log = log_file(settings.database_file)
         whole = log.read_bytes()
         log.write_bytes(damage(whole))
-        refused(settings, r"the log .* ends after \d+ entries, but this home has noted 43")
+        refused(settings, r"the log .* ends after \d+ entries, but this home recorded 43")
         log.write_bytes(whole)
         assert entries(settings) == 43
 
@@ -169,7 +169,7 @@ class TestRequireSound:
         settings = killed(own_store, tmp_path / "50% of #1")
         log = log_file(settings.database_file)
         log.write_bytes(cut(log.read_bytes()))
-        refused(settings, "but this home has noted 40")
+        refused(settings, "but this home recorded 40")
 
     def test_a_database_that_is_cut_short_is_refused(
         self, own_store: Store, tmp_path: Path
@@ -179,7 +179,7 @@ class TestRequireSound:
         settings = killed(own_store, tmp_path / "left", "touchline.db", "home.json")
         whole = settings.database_file.read_bytes()
         settings.database_file.write_bytes(whole[: len(whole) // 2])
-        refused(settings, "is cut short")
+        refused(settings, "is truncated")
 
     def test_a_file_that_is_no_database_is_named(self, settings: Settings) -> None:
         settings.home.mkdir()
@@ -211,7 +211,7 @@ class TestAnchor:
         early = killed(own_store, tmp_path / "left", "touchline.db")
         say(own_store, 1)
         killed(own_store, tmp_path / "left", "home.json")
-        refused(early, "ends after 5 entries, but this home has noted 6")
+        refused(early, "ends after 5 entries, but this home recorded 6")
 
     def test_a_log_that_says_something_else_is_refused(
         self, own_store: Store, tmp_path: Path
@@ -222,7 +222,7 @@ class TestAnchor:
             say(twin, 5)
         say(own_store, 4)
         killed(own_store, tmp_path / "left", "home.json")
-        refused(other, "entry 4 of the log .* is not the one")
+        refused(other, "entry 4 of the log .* differs from the entry")
 
     def test_an_emptied_database_is_refused(self, own_store: Store, tmp_path: Path) -> None:
         say(own_store, 4)
@@ -230,7 +230,7 @@ class TestAnchor:
         with closing(sqlite.connect(str(settings.database_file))) as empty:
             empty.execute("PRAGMA journal_mode = WAL")
             empty.execute("CREATE TABLE something (id)")
-        refused(settings, "is empty, but this home has noted 4 entries")
+        refused(settings, "has no log table, but this home recorded 4 log entries")
 
     def test_the_database_of_another_installation_is_refused(
         self, own_store: Store, tmp_path: Path
@@ -261,7 +261,7 @@ class TestAnchor:
     def test_a_damaged_anchor_is_named(self, own_store: Store, tmp_path: Path) -> None:
         settings = killed(own_store, tmp_path / "left")
         (settings.home / "home.json").write_bytes(b'{"half')
-        with pytest.raises(StorageError, match=r"home\.json is not what was written"):
+        with pytest.raises(StorageError, match=r"home\.json is damaged"):
             Store.open(settings)
 
 

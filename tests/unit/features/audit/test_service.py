@@ -120,7 +120,7 @@ class TestAudit:
         self, store: Store, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         def refuse(*_asked: object) -> None:
-            raise InputError("a text holds a character that the database cannot keep")
+            raise InputError("a text contains a character that the database cannot store")
 
         monkeypatch.setattr("app.features.audit.service.audit_rows", refuse)
         with pytest.raises(InputError):

@@ -48,7 +48,7 @@ class TestExamineThreads:
         with store.write() as session, said_for_sqlite(session):
             session.execute(text("DROP TRIGGER log_refuses_update"))
             session.execute(text("UPDATE log SET kind = 'comment' WHERE id = 1"))
-        assert "not what was written" in examine_threads(store).sentence
+        assert "cannot be decoded" in examine_threads(store).sentence
 
     def test_a_name_that_is_shown_in_the_place_of_another_is_none(self, store: Store) -> None:
         with store.read() as session:

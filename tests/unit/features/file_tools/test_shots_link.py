@@ -56,7 +56,7 @@ class TestLinkFiles:
         with (live / "ball.csv").open("a") as file:
             file.write("9000,99.0,,\n9001,1.0,abc,2\n7,0.5,1,1\n9002,0.001,5,5\n")
         problems = link_files(*views)["problems"]
-        assert any('x: is "abc", no number' in one for one in problems)
+        assert any('x: is "abc", which is not a number' in one for one in problems)
         assert any("7 is listed twice" in one for one in problems)
         assert any("2 of" in one and "have no camera" in one for one in problems)
         assert out.is_dir()

@@ -170,10 +170,10 @@ class TestSubmit:
         self, store, fill, make_static
     ) -> None:
         state = load(store, fill(make_static())[0])
-        with pytest.raises(SharedStationError, match="takes its picture from") as caught:
+        with pytest.raises(SharedStationError, match="picture geometry of view cam1 cannot be set") as caught:
             change(store, state, SetPicture("cam1", OPEN))
         assert "given camera" in str(caught.value.hint)
-        with pytest.raises(SharedStationError, match="takes its picture from"):
+        with pytest.raises(SharedStationError, match="picture geometry of view cam1 cannot be set"):
             preview(store, state.id, lambda _group: [SetPicture("cam1", OPEN)])
 
     def test_a_moved_ball_calibrates_nothing(self, store, state, monkeypatch) -> None:

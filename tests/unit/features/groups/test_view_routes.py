@@ -315,7 +315,7 @@ class TestImage:
 
     def test_more_pictures_than_may_wait_are_503(self, app, api, frames, monkeypatch) -> None:
         def refuse(*_: object, **__: object) -> None:
-            raise OverloadedError("68 pictures are being made or wait already")
+            raise OverloadedError("68 requests for pictures already run or wait")
 
         monkeypatch.setattr(app.state.services.frames._pool, "submit", refuse)
         row = api.get(f"{API}/groups", params={"dataset": "framed"}).json()["items"][0]

@@ -181,7 +181,7 @@ class TestRoundTrip:
         assert entries(there) == before
 
     def test_a_frozen_version_is_not_carried(self, store, busy, tmp_path) -> None:
-        with pytest.raises(InputError, match="carries the whole dataset"):
+        with pytest.raises(InputError, match="exports the whole dataset"):
             export_dataset(store, "demo", "touchline", tmp_path / "x", version="v1")
 
 

@@ -132,10 +132,10 @@ class TestSample:
     def test_other_groups_of_the_same_names_have_no_truth(self, store, scenes, tmp_path) -> None:
         truth = tmp_path / TRUTH
         truth.rename(tmp_path / "elsewhere.json")
-        with pytest.raises(InputError, match="the truth of none"):
+        with pytest.raises(InputError, match="none of these groups has known true values"):
             mark_known(store, "demo", SAMPLE, actor="lea")
         truth.symlink_to(tmp_path / "elsewhere.json")
-        with pytest.raises(InputError, match="the truth of none"):
+        with pytest.raises(InputError, match="none of these groups has known true values"):
             mark_known(store, "demo", SAMPLE, actor="lea")
 
 
@@ -164,7 +164,7 @@ class TestVersion:
         judge(store, take.copy_id, "dee")
         ((result,),) = [person.results for person in read_report(store, "demo").people]
         assert (result.right, result.error.ball_px, result.error.line_px) == (True, 0, 0)
-        with pytest.raises(InputError, match="name the frozen version"):
+        with pytest.raises(InputError, match="give the frozen version"):
             mark_known(store, "demo", GoldChoice(TruthSource.VERSION), actor="lea")
 
 

@@ -72,7 +72,7 @@ class TestSignOn:
             other = {**provider.described(), "issuer": "https://other.example"}
             there = "/.well-known/openid-configuration"
             provider.instead[there] = lambda handler: tell(handler, other)
-            assert "does not answer as the provider" in faults(settings)["single sign-on"].sentence
+            assert "is not the provider in TOUCHLINE_SSO_ISSUER" in faults(settings)["single sign-on"].sentence
         assert "valid response" in faults(settings)["single sign-on"].sentence
         half = Settings(home=tmp_path / "home", sso_issuer=provider.address)
         assert "lacks TOUCHLINE_SSO_CLIENT_ID" in faults(half)["single sign-on"].sentence

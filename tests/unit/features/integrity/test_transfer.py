@@ -84,7 +84,7 @@ class TestTransfer:
     ) -> None:
         target = source.model_copy(update={"database_url": databases.new()})
         monkeypatch.setattr(module, "_digest_rows", lambda connection, _: (id(connection), ""))
-        with pytest.raises(DamagedError, match="is not equal"):
+        with pytest.raises(DamagedError, match="differs from the source"):
             transfer_database(source, target)
         monkeypatch.undo()
         with pytest.raises(StorageError, match="was interrupted"):

@@ -48,7 +48,7 @@ class TestPositions:
             (("paper", "--share"), 1, "calibration.share_position"),
             (("demo", "--share", "--match", "final"), 1, "has no match final"),
             (("demo", "--undo"), 2, "--undo needs --match"),
-            (("demo", "--undo", "--match", MATCH), 1, "nothing is shared"),
+            (("demo", "--undo", "--match", MATCH), 1, "share no camera position"),
             (("demo", "--undo", "--share"), 2, "one at a time"),
         ],
     )

@@ -283,7 +283,7 @@ class TestTakeBackPositions:
 
     def test_a_take_back_is_not_taken_back(self, shared):
         take_back(shared, MATCH)
-        with pytest.raises(ConflictError, match="nothing is shared"):
+        with pytest.raises(ConflictError, match="share no camera position"):
             take_back(shared, MATCH)
         assert (state(shared).shared, state(shared).current) == (0, None)
 
@@ -298,16 +298,16 @@ class TestTakeBackPositions:
         assert (state(shared).shared, state(shared).current) == (0, None)
         share_positions(shared, "demo", actor="ann")
         take_back(shared, MATCH)
-        with pytest.raises(ConflictError, match="nothing is shared"):
+        with pytest.raises(ConflictError, match="share no camera position"):
             take_back(shared, MATCH)
 
     def test_what_a_group_had_in_another_match_is_not_taken_back(self, shared):
         first, *_ = match()
         ingest(shared, "demo", (replace(first, match="b"),), source="files", actor="ann")
-        with pytest.raises(ConflictError, match="nothing is shared in b"):
+        with pytest.raises(ConflictError, match="the frames of b share no camera position"):
             take_back(shared, "b")
 
     def test_where_nothing_was_shared_it_is_refused(self, store):
         ingest(store, "demo", match(), source="files", actor="ann")
-        with pytest.raises(ConflictError, match="nothing is shared"):
+        with pytest.raises(ConflictError, match="share no camera position"):
             take_back(store, MATCH)

@@ -170,7 +170,7 @@ class TestLogin:
 class TestMaking:
     def test_it_takes_the_password_and_ends_other_sessions(self, desk: Desk) -> None:
         other, login = desk.logins.log_in("anna", SECRET), desk.login()
-        with pytest.raises(InputError, match="not your password"):
+        with pytest.raises(InputError, match="the password is wrong"):
             desk.passkeys.begin(login, "wrong wrong wrong", SITE)
         desk.made(login)
         assert desk.logins.find(other) is None

@@ -162,7 +162,7 @@ class TestEnrolling:
 
     def test_it_takes_the_password_and_ends_other_sessions(self, desk: Desk) -> None:
         other = desk.logins.log_in("anna", SECRET)
-        with pytest.raises(InputError, match="not your password"):
+        with pytest.raises(InputError, match="the password is wrong"):
             desk.factors.begin(desk.login(), "wrong wrong wrong")
         login = desk.enrol()
         assert desk.logins.find(other) is None

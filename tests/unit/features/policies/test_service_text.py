@@ -63,7 +63,7 @@ class TestPolicyFromYaml:
             ("tau_percent: .inf", "/tau_percent", "is a number"),
             ("tau_percent: null", "/tau_percent", "is a number"),
             ("tau_percent: [1]", "/tau_percent", "is a number"),
-            ("tau_percent: -1", "/tau_percent", "lies between 0.05 and 5"),
+            ("tau_percent: -1", "/tau_percent", "must lie between 0.05 and 5"),
             ("max_sigma_m: 0", "/max_sigma_m", "lies between"),
             ("point: middle", "/point", "mean or best"),
             ("point: null", "/point", "mean or best"),

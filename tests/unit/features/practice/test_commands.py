@@ -32,5 +32,5 @@ class TestSampleRecording:
     def test_what_is_too_short_or_no_video_is_refused(self, tmp_path: Path, touchline: Run) -> None:
         assert touchline("sample-recording", tmp_path / "film.mp4", "--seconds", "20")[0] == 2
         code, _, complaint = touchline("sample-recording", tmp_path / "film.doc")
-        assert (code, "no ending of a video" in complaint) == (1, True)
+        assert (code, "does not end in .mp4, .avi or .mkv" in complaint) == (1, True)
         assert list(tmp_path.iterdir()) == []

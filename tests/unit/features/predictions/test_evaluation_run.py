@@ -44,13 +44,13 @@ class TestCheck:
     @pytest.mark.parametrize(
         ("options", "words"),
         [
-            ({"format": "csv"}, "--format is for a file of boxes"),
+            ({"format": "csv"}, "--format needs a file of boxes"),
             ({"category": 32}, "--category is for"),
             ({"size": ImageSize(960, 540)}, "--size is for"),
             ({"images": Path("t.json")}, "--images is for"),
             (
                 {"cameras_size": ImageSize(960, 540)},
-                "--cameras-size is the size of predicted cameras",
+                "--cameras-size needs predicted cameras",
             ),
         ],
     )

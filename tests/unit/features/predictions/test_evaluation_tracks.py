@@ -100,7 +100,7 @@ class TestEvaluation:
     def test_what_tracks_do_not_use_is_refused_at_once(self, accepted, own, asked) -> None:
         found = add_predictions(accepted, "flight", None, PredictionFiles(own), actor="ann")
         request = EvaluationRequest(predictions=found.id, **asked)
-        with pytest.raises(InputError, match=f"{next(iter(asked))} is not used with them"):
+        with pytest.raises(InputError, match=f"{next(iter(asked))} is not used"):
             check_evaluation(accepted, "flight", request)
 
 
@@ -124,7 +124,7 @@ class TestSets:
             add_predictions(accepted, "flight", None, PredictionFiles(path), actor="ann")
 
     def test_cameras_do_not_come_with_tracks(self, accepted, own) -> None:
-        with pytest.raises(InputError, match="come without cameras"):
+        with pytest.raises(InputError, match="cannot be imported together with cameras"):
             add_predictions(
                 accepted, "flight", None, PredictionFiles(own, cameras=own), actor="ann"
             )

@@ -93,7 +93,7 @@ class TestPredictionReader:
             reader.read(heavy, NAMES, limits)
         assert "in parts" in refused.value.hint
         empty = written(tmp_path / "empty.json", b"[]")
-        with pytest.raises(InputError, match=r"empty\.json holds no prediction"):
+        with pytest.raises(InputError, match=r"empty\.json contains no prediction"):
             reader.read(empty, NAMES, limits)
 
     def test_one_more_than_may_wait_is_told_to_come_back(

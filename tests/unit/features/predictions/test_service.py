@@ -89,7 +89,7 @@ class TestAddPredictions:
         assert (found.name, found.format, found.boxes) == ("boxes", "csv", 1)
 
     def test_neither_boxes_nor_cameras_is_refused(self, store, state) -> None:
-        with pytest.raises(InputError, match="neither boxes nor cameras"):
+        with pytest.raises(InputError, match="there are no predictions to import"):
             add_predictions(store, "demo", "x", PredictionFiles(None), actor="ann")
 
     def test_a_file_with_another_report_is_another_set(self, store, state, tmp_path) -> None:

@@ -367,7 +367,7 @@ def test_cameras_that_lines_put_on_their_side_or_that_others_tracked_are_not_tur
     assert answer.status_code == 409
     assert "lines of frame 7 already say which half of the pitch" in answer.json()["detail"]
     turned = Tracked([tracker.frame(number, {}) for number in range(4, 12)], (), True)
-    with pytest.raises(ConflictError, match="somebody tracked this shot meanwhile"):
+    with pytest.raises(ConflictError, match="the cameras of this shot were changed in the meantime"):
         module.save_cameras(store, found, (4, 11), turned, [], "ann", turned_from=present)
 
 
@@ -477,7 +477,7 @@ def test_a_video_that_changes_while_it_is_tracked_is_refused(
     store: Store = app.state.services.store
     tracked = Tracked([tracker.frame(number, {}) for number in range(4, 12)], ())
     other = Recording(**{**vars(found), "sha256": "0" * 64})
-    with pytest.raises(ConflictError, match="became another file"):
+    with pytest.raises(ConflictError, match="was replaced while the shot was tracked"):
         module.save_cameras(store, other, (4, 11), tracked, [], "ann")
     with pytest.raises(InputError):
         module.require_stretch(found, 4, 12)

@@ -97,7 +97,7 @@ class TestFile:
         self, store: Store, recording: Recording, tmp_path: Path
     ) -> None:
         path = written(tmp_path / "far.csv", (900, 1, 1, 9, 9, 0.9))
-        with pytest.raises(InputError, match='no box of a frame of "ball"'):
+        with pytest.raises(InputError, match='no box for any frame of "ball"'):
             read_boxes_of_file(store, recording, path, "far", min_score=0.1, actor="ann")
 
     def test_lies_beside_the_index_and_is_told_where_it_is_damaged(

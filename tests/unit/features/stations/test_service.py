@@ -91,7 +91,7 @@ class TestSubmitStation:
         assert after.station.calibration == "lines"
 
     def test_an_unknown_station_is_not_found(self, store) -> None:
-        with pytest.raises(NotFoundError, match="no station 9"):
+        with pytest.raises(NotFoundError, match="no static camera with id 9"):
             load_station(store, 9)
 
     def test_hundreds_of_groups_are_brought_in_step_at_once(self, store, fill, make_static) -> None:

@@ -128,12 +128,12 @@ class TestBatchesOfTracks:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"annotators": ["ada"]}, "takes reviewers, not annotators"),
-            ({"verdicts": 2}, "one verdict on each"),
-            ({"gold_every": 5}, "no gold groups"),
-            ({"query": "status:accepted"}, "has no query"),
+            ({"annotators": ["ada"]}, "has reviewers only, no annotators"),
+            ({"verdicts": 2}, "each of its tracks gets one verdict"),
+            ({"gold_every": 5}, "cannot have a query or gold groups"),
+            ({"query": "status:accepted"}, "cannot have a query or gold groups"),
             ({"tracks": []}, "the list of tracks is empty"),
-            ({"tracks": [999]}, "track 999 is not of this dataset"),
+            ({"tracks": [999]}, "track 999 does not belong to this dataset"),
         ],
     )
     def test_refuse_what_no_track_has(

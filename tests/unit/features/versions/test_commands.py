@@ -66,7 +66,7 @@ class TestFreeze:
         code, out, err = run(
             "freeze", "--dataset", "demo", "--licence-file", str(tmp_path / "pipe")
         )
-        assert (code, out, err.strip()) == (1, "", f"{tmp_path}/pipe is not a plain file")
+        assert (code, out, err.strip()) == (1, "", f"{tmp_path}/pipe is not a regular file")
 
     def test_nothing_to_freeze_is_one_sentence(self, run: Run, frozen: Path) -> None:
         code, out, err = run("freeze", "--dataset", "demo")
